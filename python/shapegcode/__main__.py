@@ -9,7 +9,7 @@ _ONCE_MORE_S = 0.01
 
 
 def main() -> int:
-    """Run the command; Ctrl-C while it loads ends it in words too.
+    """Run the command; Ctrl-C during loading also ends it with a message.
 
     Returns:
         The exit code.

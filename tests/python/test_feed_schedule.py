@@ -183,7 +183,7 @@ def test_a_limit_below_the_least_feed_is_not_within_limits() -> None:
     result = scheduled(CORNER, tool("resultant_n = 20\nfeed_per_tooth_min_mm = 0.012"))
     assert not result.ok
     assert result.feed_mm_per_min.min == pytest.approx(0.012 * 6 * 1800, abs=0.1)
-    assert any("less than the least feed" in warning for warning in result.warnings)
+    assert any("a feed below the lowest feed" in warning for warning in result.warnings)
 
 
 def test_other_limits_bind_by_their_names() -> None:
@@ -220,7 +220,7 @@ def test_the_command_writes_program_report_and_table(
     assert result["feed_mm_per_min"]["min"] == min(words)
     shown = capsys.readouterr().out
     assert "peak resultant" in shown
-    assert "what holds the feed" in shown
+    assert "what limits the feed" in shown
     assert interpret(out.read_text()).cuts
     assert (
         main(["feed", *write_files(tmp_path, "resultant_n = 20\nfeed_per_tooth_min_mm = 0.012"), "-o", str(out)]) == 1
@@ -266,7 +266,7 @@ def test_a_missed_limit_of_the_cut_is_no_missed_tolerance_but_no_success_either(
     assert scheduled.next_step.startswith("do not run it: take less material at once")
     assert b"(OUT OF TOLERANCE - DO NOT RUN  )" in scheduled.text
     assert [table.title for table in scheduled.tables()][:2] == [
-        "part.nc on VX500, tool E8", "what holds the feed",
+        "part.nc on VX500, tool E8", "what limits the feed",
     ]  # fmt: skip
     assert {"path", "feed", "vibration", "feed-along-path"} <= scheduled.plots().keys()
 

@@ -91,7 +91,7 @@ def test_g10() -> None:
     assert moves_of(moved)[-1][0].start_mm[0] == -60.0  # the origin of G54 moved by 60 mm to the right
     assert read("G10 L20 P2 G90 X100. Y80.\nG111 X0. Y0.").core.final_state.coordinate_number == 2
     for word in ("G10 L12 P1 R5.", "G10 L13 P1 R.1"):
-        with pytest.raises(sg.ProgramError, match="a diameter or a radius, as setting 40"):
+        with pytest.raises(sg.ProgramError, match="a diameter or a radius, depending on setting 40"):
             read(word)
     with pytest.raises(sg.ProgramError, match="the origin of G52"):
         read("G10 L2 P0 X1.")
@@ -156,12 +156,12 @@ def test_macros_are_fanucs() -> None:
         ("G72 I1. J0 L4", "bolt holes along an angle"), ("G150 P1 Z-1. Q1.", "general pocket milling"),
         ("G76 X1. Z-1. R1.", "fine boring"), ("G77 X1. Z-1. R1.", "back boring"), ("G87 X1. Z-1.", "manual retract"),
         ("G88 X1. Z-1.", "manual retract"), ("G93", "inverse time"), ("G96 S100", "constant surface speed"),
-        ("G68 X0. Y0. R10.", "no text was found"), ("G51 P2.", "no text was found"), ("G141 X1.", "no text was found"),
+        ("G68 X0. Y0. R10.", "no documentation"), ("G51 P2.", "no documentation"), ("G141 X1.", "no documentation"),
         ("G83 Z-1. R1. I1. J.1 K.2 F10.", "changes the pecks"), ("G83 Z-1. R1. Q.5 I-.5", "changes the pecks"),
         ("G83 Z-1. R1. Q.5 K#5", "changes the pecks"), ("G84 Z-1. R1. J[2] F10.", "changes the pecks"),
         ("G82 Z-1. R1. P#1", "the dwell of G82 by a variable"), ("G89 Z-1. R1. P[#1]", "the dwell of G89"),
         ("M97 L2 P100", "M97 takes an N number right behind it"), ("M97 P#1", "M97 takes an N number"),
-        ("M96 P10 Q8", "where an input is not set"),
+        ("M96 P10 Q8", "if an input is not set"),
     ],
 )  # fmt: skip
 def test_refused(word: str, meaning: str) -> None:

@@ -214,7 +214,7 @@ def test_tool_table(unit: str, mm: float, tmp_path: Path) -> None:
 def test_block_skip() -> None:
     assert ends(read("/G1 X5\nG1 Y2", **{"input.block_skip": "on"}))[-1] == [0.0, 2.0, 5.0]
     assert ends(read("/G1 X5\nG1 Y2", **{"input.block_skip": "off"}))[-1] == [5.0, 2.0, 5.0]
-    assert any("`/` lines run here" in each for each in read("/G1 X5").warnings)
+    assert any("`/` lines are executed" in each for each in read("/G1 X5").warnings)
 
 
 # ---- refused by name -------------------------------------------------------------------------------------------------
@@ -404,10 +404,10 @@ def test_what_is_not_shaped_is_written_in_the_words_that_are_asked_for() -> None
     text = "G21 G90 G64 P0.01\nG0 X0 Y0 Z0\nG4 P0.5\nG0 X10\nM2\n"
     done = sg.convert(text, machine_with())
     assert b"G04X0.5" in done.text
-    assert "its motion is unchanged, written in FANUC's words" in done.answer
+    assert "its motion is unchanged, written as a FANUC program" in done.answer
     own = sg.convert(text, machine_with({"emission.dialect": "linuxcnc"}))
     assert b"G04P0.5" in own.text.replace(b" ", b"").replace(b"G4P", b"G04P")
-    assert "its motion is unchanged\nwritten in the words of LinuxCNC" in own.answer
+    assert "its motion is unchanged\nwritten for LinuxCNC" in own.answer
 
 
 def test_restart_points_name_the_lines_of_the_source() -> None:

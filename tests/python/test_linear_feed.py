@@ -92,7 +92,7 @@ def test_header_and_answer_say_that_it_was_not_tried() -> None:
     linear = converted("linear")
     text = linear.text.decode()
     assert "; FEED LINEAR ALONG BLOCKS FLIN - NOT TRIED ON A CONTROL" in text
-    assert any("FLIN" in warning and "not tried on a control" in warning for warning in linear.warnings)
+    assert any("FLIN" in warning and "not tested on a control" in warning for warning in linear.warnings)
     assert text.count("FLIN ") <= text.count("FNORM") + 1 and text.rstrip().endswith("M30")
     assert "FLIN" not in converted("constant").text.decode()
 

@@ -169,14 +169,14 @@ def test_axes_that_tell_nothing(tmp_path: Path) -> None:
     gain = lagging.parameter("position gain")
     assert gain is not None
     assert gain.value is None
-    assert "no lag that tells it" in gain.note
+    assert "no lag that determines it" in gain.note
     assert running.note == "never changes its speed"
     assert running.parameters[0].value == pytest.approx(0.1 / 20.0)
     assert resting.note == "did not move"
     inches = capture(tmp_path / "c.json", {1: (way, way / 25.4), 2: (way, -way)})
     assert [axis.note.partition(":")[0] for axis in sg.fit_servo(inches).axes] == [
-        "the actual position goes 0.0394 times the way of the command",
-        "the actual position goes -1 times the way of the command",
+        "the actual position moves 0.0394 times as far as the command",
+        "the actual position moves -1 times as far as the command",
     ]
     only = capture(tmp_path / "b.json", {3: (still, still)})
     assert not sg.fit_servo(only).ok
@@ -241,7 +241,7 @@ def test_a_command_that_jumps_is_divided_there(tmp_path: Path) -> None:
     gain = axis.parameter("position gain")
     assert gain is not None
     assert gain.value == pytest.approx(40.0, rel=0.02)
-    assert any("its command jumps, first at" in warning for warning in found.warnings)
+    assert any("its command has a step, first at" in warning for warning in found.warnings)
 
 
 @pytest.mark.slow

@@ -170,7 +170,9 @@ def test_several_modes_are_convolved_and_the_band_is_wider_than_that_of_zv() -> 
 
 def test_refusals_say_what_would_do() -> None:
     band = [ModeBand(Mode(131.0, 0.02))]
-    with pytest.raises(DesignError, match=r"131 Hz .* 5 ms grid .*a period below .* ms tells its highest zero, 282\.8"):
+    with pytest.raises(
+        DesignError, match=r"131 Hz .* 5 ms grid .*a period below .* ms resolves its highest zero, 282\.8"
+    ):
         design("smooth-ei2", band, DesignOptions(period_s=0.005))
     with pytest.raises(DesignError, match="it is for modes that are damped less"):
         design("smooth-ei2", [ModeBand(Mode(30.0, 0.8))], DesignOptions(period_s=0.0005))

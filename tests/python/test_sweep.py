@@ -79,7 +79,7 @@ def test_the_axis_that_moved_most_is_taken_and_said(tmp_path: Path) -> None:
     path = save(tmp_path / "log.csv", *shaken([(1.0, 48.0, 0.06)]))
     found = identify(path)
     assert found.axis == "x"
-    assert any("the axis is not told: X moved most" in note for note in found.notes)
+    assert any("the axis is not stated: X moved most" in note for note in found.notes)
     assert identify(path, ReadOptions(axis="x")).notes[0].startswith("looked at from 10 to 130 Hz")
 
 

@@ -480,7 +480,7 @@ def test_where_no_interval_is_followed_none_is_proposed(tmp_path: Path, capsys: 
         ("radial_depth_mm,fx_n,fy_n\n0.4,1,1\n0.5,2,2\n", "2 rows of numbers: too short; needed are at least 4"),
         ("position_mm,fx_n,fy_n\n1,1,1\n2,1,2\n1.5,3,1\n3,4,1\n4,4,1\n", ":4: the position goes back"),
         ("radial_depth_mm,fx_n,fy_n\n" + "9,1,1\n" * 9, "must be above 0 and below the diameter"),
-        ("time_s,fx_n,fy_n\n" + "\n".join(f"{k},1,1" for k in range(20)), "means over time do not tell"),
+        ("time_s,fx_n,fy_n\n" + "\n".join(f"{k},1,1" for k in range(20)), "means over time have no position"),
         ("time_s,fx_n,fy_n\n" + "\n".join(f"{k / 60:.6f},1,1" for k in range(90)), "2.0 samples per revolution"),
         ("time_s,fx_n,fy_n\n" + "\n".join(f"{k / 600:.6f},1,1" for k in range(2000)), "no cut is seen"),
     ],

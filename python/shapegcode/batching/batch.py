@@ -40,7 +40,7 @@ def batch(
     memory_limit_bytes: int = 0,
     on_progress: OnBatch = lambda _share, _text: None,
 ) -> Batch:
-    """Run a command over programs and machines, and write down what came of it.
+    """Run a command over programs and machines, and record the results.
 
     Each run has a process of its own; a crash of one is a row of the result. Outputs, JSON and page of a run are those
     of the single command to the byte, and appear complete or not at all. ``batch.jsonl`` in the output folder says what

@@ -123,7 +123,7 @@ class Manifest:
 
 
 def _locked(folder: Path) -> int:
-    """Lock a folder, in a way that leaves nothing behind however the batch ends; gives what to close."""
+    """Lock a folder, and return what unlocks it when closed; the lock vanishes with the process."""
     lock = -1
     try:
         if sys.platform == "win32":  # deleted by the system when it is closed

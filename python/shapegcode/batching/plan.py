@@ -95,7 +95,7 @@ def _matching(pattern: str, avoid: Path) -> Iterator[Source]:
 
 
 def _fixed_part(pattern: str) -> str:
-    """The folder of a pattern that stands before its first wildcard."""
+    """The folder part of a pattern before its first wildcard."""
     fixed = pattern[: re.search(r"[*?\[]", pattern).start()] if glob.has_magic(pattern) else pattern  # type: ignore[union-attr]
     return os.path.dirname(fixed) or "."
 

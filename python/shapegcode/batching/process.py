@@ -80,7 +80,7 @@ class Packed:
 
 @dataclass(frozen=True)
 class JobOutcome:
-    """What came back."""
+    """What a run returned."""
 
     ending: Ending  # how it ended
     code: int  # exit code of the command; 0 where it did not end by itself
@@ -95,7 +95,7 @@ class JobOutcome:
 def pack(
     job: BatchJob, files: Mapping[str, bytes], *, seconds: float = 0.0, memory_bytes: int = 0, scratch: str = ""
 ) -> Packed:
-    """A run that can travel."""
+    """Pickle a run for another process."""
     version = this_version()
     hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
     whole = json.dumps([version, list(job.words), hashes], sort_keys=True)
@@ -174,7 +174,7 @@ class Hosts:
             shutil.rmtree(folder, ignore_errors=True)
 
     def end(self) -> None:
-        """End all of them with what they run; whoever asks later gets a job that was killed."""
+        """Kill all workers and their runs; later requests get a killed job."""
         with self._lock:
             self._ended = True
             hosts = list(self._all)

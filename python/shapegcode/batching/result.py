@@ -199,11 +199,11 @@ class Batch(Result):
         """To the worst of what is left to do."""
         counts = self.counts
         if self.not_done or counts["failed"]:
-            return "resolve the cause, then run the same command with --resume: what is done stays."
+            return "resolve the cause, then run the same command with --resume: finished runs are kept."
         if counts["refused"]:
             return f"mend what was refused ({self.summary} has why), then say the same again with --resume."
         if counts["not ok"]:
-            return f"look at the reports of what is not ok; {self.summary} lists them."
+            return f"see the reports of runs that are not ok; {self.summary} lists them."
         return "run one of the emitted programs above the workpiece first." if self.command == "convert" else (
             f"open {self.summary} in a spreadsheet."
         )  # fmt: skip

@@ -72,7 +72,7 @@ def _answer(outcome: JobOutcome, ended: Ended) -> str:
 
 
 class KeptRows(Sequence[BatchRow]):
-    """Rows of a batch that stand in its manifest and are read when somebody looks at them."""
+    """Rows of a batch, which are read from its manifest when they are used."""
 
     def __init__(self, manifest: Path, planned: Plan, places: Sequence[int], earlier: Sequence[int]) -> None:
         self._stream = manifest.open("rb")
@@ -125,7 +125,7 @@ def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
 
 
 OnBatch = Callable[[float, str], None]
-"""Told the share that is done, and how many runs are done, under way and failed."""
+"""Called with the ratio that is done, and the numbers of runs that are done, running and failed."""
 
 _AHEAD = 2
 """Runs that are ready for each process, so that none waits for files."""
@@ -219,7 +219,7 @@ class Runs:
         return ""
 
     def _collect(self, waiting: dict[Future[JobOutcome], tuple[int, str]], slots: int) -> None:
-        """Wait for one of them at least, and keep what came back."""
+        """Wait for at least one of them, and store what it returned."""
         while True:
             self._tell(min(slots, len(waiting)))
             done, _ = concurrent.futures.wait(waiting, _TOLD_EVERY_S, return_when=concurrent.futures.FIRST_COMPLETED)

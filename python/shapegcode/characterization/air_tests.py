@@ -1,4 +1,4 @@
-"""The tests: parts of equal moves in the air, those for a machine and a box, and how long they last.
+"""The tests: parts of equal moves in the air, the tests for a machine and a box, and their duration.
 
 A test is one program. The fit needs only these facts, which ``RESULTS.toml`` repeats.
 """
@@ -25,7 +25,7 @@ _LARGEST_BOX_MM = 10_000.0
 
 @dataclass(frozen=True)
 class AirBox:
-    """Where the tests may move, relative to the point at which the operator starts them."""
+    """Space in which the tests may move, relative to the operator's start point."""
 
     low: tuple[float, float, float] = (0.0, 0.0, 0.0)  # smallest X, Y, Z in mm, 0 or below
     high: tuple[float, float, float] = (100.0, 100.0, 20.0)  # largest X, Y, Z in mm, 0 or above
@@ -294,7 +294,7 @@ _ROUND_OFF = 1e-6  # periods
 
 @dataclass(frozen=True)
 class ControllerTiming:
-    """The facts of a controller that decide how long a test lasts; times in s."""
+    """Parameters of the control that determine the duration of a test; times in s."""
 
     period_s: float
     block_end: BlockEnd

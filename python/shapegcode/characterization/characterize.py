@@ -81,14 +81,14 @@ def characterize(
 
 
 def _sheet(source: Path) -> FilledSheet:
-    """The results behind a RESULTS.toml, a folder with one, or a log beside one."""
+    """The results named by a RESULTS.toml, by the folder that holds it, or by a log in that folder."""
     if source.is_dir():
         return read_sheet(source / SHEET)
     if source.suffix.lower() == ".toml":
         return read_sheet(source)
     beside = source.parent / SHEET
     if not beside.is_file():
-        raise ArgumentError(f"{source}: no {SHEET} beside it, which says what the program did")
+        raise ArgumentError(f"{source}: no {SHEET} in the same folder, which describes the program")
     sheet = read_sheet(beside)
     name = next((name for name, log in sheet.logs.items() if log.resolve() == source.resolve()), source.stem)
     if name not in sheet.tests:

@@ -70,12 +70,13 @@ def _period(
             return
     why = f"not longer than the {sampling * 1e3:g} ms between samples, or interpolated between periods"
     if len(stops) < 2 or not run:
-        why += "; log_cutting and log_run together may tell"
+        why += "; log_cutting and log_run together may determine it"
     facts.add_unknown(name, why)
 
 
 def _period_of_stops(stops: list[moves.PartLog]) -> tuple[float, float, str] | None:
-    """Of the usual periods the one that rounds two durations so far apart; its half-width and a note."""
+    """The usual interpolation period that explains the difference of two rounded durations; its half-width and a
+    note."""
     if len(stops) < 2:
         return None
     (below, half_b), (above, half_a) = stops[0].pitch_s(), stops[1].pitch_s()

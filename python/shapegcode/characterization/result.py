@@ -40,7 +40,7 @@ class ControllerFact:
         return 0.0 if self.low is None or self.high is None else self.high - self.low
 
     def contradicts(self, other: ControllerFact) -> bool:
-        """Whether both are numbers whose intervals are apart, or words that differ."""
+        """Whether both are numbers whose intervals do not overlap, or texts that differ."""
         if self.value is None or other.value is None:
             return False
         if isinstance(self.value, str) or isinstance(other.value, str):
@@ -200,7 +200,7 @@ class Characterisation(Result):
 
     @property
     def answer(self) -> str:
-        """How much is known."""
+        """Number of quantities that are known, and of keys that were measured."""
         known = sum(each.value is not None for each in self.findings)
         sentence = (
             f"{known} of {len(self.findings)} quantities of {self.machine} are known, {len(self.remarks)} keys measured"
@@ -226,7 +226,7 @@ class Characterisation(Result):
         return f"shapegcode machine show {file} explains it" if self.ok else self.next_step
 
     def to_toml(self) -> str:
-        """The machine file with everything that is known; a remark stands behind each key that was measured."""
+        """The machine file with everything that is known, and a remark at each measured key."""
         return self.fitted.to_toml(self.remarks)
 
     def tables(self) -> list[Table]:

@@ -308,7 +308,7 @@ def _ramp(facts: Facts, axis: str, ramps: FloatArray, likely: FloatArray) -> Non
     low, high = float(ramps.min()) - step, float(ramps.max()) + step
     value = float(likely @ ramps / likely.sum())
     if high - low > 2.0 * _WIDE * value:
-        why = f"from {low * 1e3:.0f} to {high * 1e3:.0f} ms all fit; longer moves would tell more"
+        why = f"from {low * 1e3:.0f} to {high * 1e3:.0f} ms all fit; longer moves would be more exact"
         facts.add_unknown(name, why, high=high)
     else:
         facts.add_interval(name, value, low, high, f"controller.rapid_time_constant_s.{axis.lower()}")

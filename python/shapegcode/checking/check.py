@@ -154,7 +154,7 @@ def _finding(severity: str, code: str, alarm: int, file: str, line: int, column:
 
 
 def _at(program: Program, severity: str, code: str, line: int, message: str) -> Finding:
-    """A finding at a line of the text that the control executes, told at the line of the source."""
+    """A finding in the expanded program, reported at the line of the source."""
     number, file = program.core.origin(line)
     return Finding(severity, code, 0, file or program.source, number, 0, message)
 
@@ -176,7 +176,7 @@ def _listed(found: Iterable[Finding], source: str) -> tuple[Finding, ...]:
 
 
 def _own_text(data: bytes, wanted: int | str | None, source: str) -> tuple[bytes, int]:
-    """The program that was asked for, of a file of several, and how many lines stand before it; else the whole file."""
+    """The requested program of a file of several, and the number of lines before it; else the whole file."""
     try:
         index = None if wanted is None else index_of(data, wanted, source)
     except ProgramError as error:

@@ -24,7 +24,7 @@ _STYLES = {"alarm": "bold red", "warning": "yellow", "note": "dim"}
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing to tell about one place of a program.
+    """An alarm, warning or note about a line of a program.
 
     Attributes:
         severity: "alarm": the control refuses it; "warning": it will not run as programmed; "note": worth knowing.
@@ -106,7 +106,7 @@ class StarvedRun:
 
 @dataclass(frozen=True)
 class SerialLine:
-    """What the serial line carries, and what the program asks for."""
+    """Characters per second of the serial line, and those that the program needs."""
 
     baud: int  # bits per second
     bits_per_character: int  # start, stop and parity bits included
@@ -207,10 +207,10 @@ class Check(Result):
             stretches = "the stretch" if count == 1 else f"the {count} stretches"
             return f"post longer blocks, or lower the feed, in {stretches} with short blocks (controller.block_time_s)."
         if "axis_feed" in worst:
-            return "lower F to what the axes allow: the control does so anyway."
+            return "lower F to the limits of the axes: the control does so anyway."
         if worst:
             return "move what stops the control out of the cut."
-        return "shapegcode time tells how long it takes, shapegcode simulate how it vibrates."
+        return "shapegcode time predicts its cycle time, shapegcode simulate its vibration."
 
     def tables(self) -> list[Table]:
         """The findings in the order of their positions; of many equal ones the first, and the number of the others."""

@@ -1,4 +1,4 @@
-"""Cutting runs of a program as a table of blocks: how long each lasts at its feed, and what stops between them.
+"""Sequences of cutting blocks of a program as a table: duration of each block at its feed, and the stops between them.
 
 All lines here are those of `Program.core.text`; `Program.place` leads back to the source.
 """
@@ -35,9 +35,9 @@ _TICK_SLACK = 1e-5
 _FIRST_PLACES = 20
 
 # What a stop between two cutting moves does, worst first.
-_STOPS = "the control stops reading ahead, and the tool stands in the cut"
-_CANCELS = "it cancels the look-ahead mode for its block, and the tool stands in the cut"
-_ASKED = "the tool stands in the cut, as programmed"
+_STOPS = "the control stops reading ahead, and the tool stops in the cut"
+_CANCELS = "it cancels the look-ahead mode for its block, and the tool stops in the cut"
+_ASKED = "the tool stops in the cut, as programmed"
 _STOPS_READING = "the control reads ahead only up to here"
 _MAY_CANCEL = "in a look-ahead mode the tool would stand in the cut"
 _EFFECTS = (_STOPS, _CANCELS, _ASKED, _STOPS_READING, _MAY_CANCEL)

@@ -277,7 +277,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "stops", "across", "start", "station", "cutoff", "lambda_s",
     ),
     "modes that were not measured on this machine": ("keep_modes", "rigid"),
-    "what a file does not say": (
+    "missing in the file": (
         "time_column", "force_column", "response_columns", "time_unit", "force_unit", "response_unit", "period_s",
         "quantity", "force_scale", "response_scale", "force_sensitivity", "response_sensitivity", "response_first",
         "exponential_window_s",
@@ -290,9 +290,10 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "output", "dialect", "update", "write_origins", "force", "full", "csv", "npz", "every", "blocks", "plots",
         "json", "html", "html_script",
     ),
-    "how much is said": ("quiet", "verbose", "cite"),
+    "verbosity": ("quiet", "verbose", "cite"),
 }  # fmt: skip
-"""Group of an option by its destination, one table for all commands: what is the same stands at the same place."""
+"""Group of an option by its destination, one table for all commands, so that every command lists it in the same
+group."""
 
 _GROUP_OF = {dest: title for title, dests in GROUPS.items() for dest in dests}
 _EXIT_CODES = "0 done and within tolerance; 1 done, but out of tolerance; 2 not done: bad input"

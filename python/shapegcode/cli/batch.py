@@ -18,8 +18,8 @@ _COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Runs a command over many programs and machines, each run in a process of its own. Options of the command "
-        "stand behind --. Results, each complete or absent, go into the folder of -o, with batch.jsonl (what is done) "
+        "Runs a command over many programs and machines, each run in a separate process. Options of the command come "
+        "after --. Results, each complete or absent, go into the folder of -o, with batch.jsonl (what is done) "
         "and summary.csv (all rows). Exit code 0 if all are within tolerance, 1 if some are not or were refused, 2 if "
         "none could be started."
     )

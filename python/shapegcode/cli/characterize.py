@@ -27,17 +27,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--write", "DIR", None, "write the test programs, RESULTS.toml to fill in, and README.txt"),
         ("--fit", "RESULTS", None, "fit a filled-in RESULTS.toml, a folder with it and logs, or one log beside it"),
         ("--servo", "LOG", None,
-         "fit the position loops to one half of a log and judge them on the other: a capture of a Sinumerik control "
+         "fit the position loops to one half of a log and validate them with the "
+         "other: a capture of a Sinumerik control "
          "(JSON, gzip, zip), or a CSV with columns of commands and actual positions"),
         ("--runs", "RUNS.toml", None,
-         "learn what the clock depends on from programs and the logs of their runs (SHDR text, MTConnect streams, "
+         "calibrate the cycle-time model from programs and the logs of their runs (SHDR text, MTConnect streams, "
          "Sinumerik Edge, CSV), which this file pairs"),
     ))  # fmt: skip
     add_machine_argument(parser)
     add_options(parser, (
         ("--look-ahead", "KIND", [None],
-         'with --runs: kind of look-ahead that is tried, for example "speed difference"; several times for several '
-         "(default: all; the one that tells left-out runs best is taken)"),
+         'with --runs: kind of look-ahead that is tried, for example "speed difference"; may be repeated (default: '
+         "all; the one that predicts left-out runs best is chosen)"),
         ("-o --output", "FILE", None, "with --fit, --servo, --runs: machine file to write, with what is known"),
         ("--axes", "X=1,Y=6,Z=2", None, "with --servo: axes of the log that are X, Y, Z (default: by their names)"),
         ("--drive", None, bool, "with --servo: fit a drive with friction too, some ten seconds for each axis"),

@@ -11,10 +11,10 @@ from shapegcode.cli.options import add_input_arguments, add_result_arguments, lo
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Lists what the controller would refuse, several alarms in one run, each with number and place; and what it "
-        "would not run as programmed: stops inside of cuts, blocks shorter than the block time, feeds above the limits "
-        "of the axes, program memory, speed of the serial line. "
-        "Exit code 0: nothing of both; 1: warnings; 2: at least one alarm."
+        "Lists what the control would refuse, several alarms in one run, each with number and position; and what it "
+        "would not run as programmed: stops inside of cuts, blocks shorter than the block time, feeds above the "
+        "limits of the axes, program memory, speed of the serial line. Exit code 0: no alarms and no warnings; 1: "
+        "warnings; 2: at least one alarm."
     )
     add_input_arguments(parser, metavar="PROGRAM")
     add_result_arguments(parser)

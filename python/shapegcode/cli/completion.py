@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def complete() -> None:
-    """Answer a shell that asks what may stand here, and end the process."""
+    """Print the completions for a shell, and end the process."""
     import argcomplete
 
     from shapegcode.cli import COMMANDS, parser_of

@@ -43,8 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
         "Rewrites the cutting moves of a program so that they no longer excite the machine's vibration modes, and "
-        "judges the emitted program by simulating it: vibration, contour error, time. The input is never "
-        "overwritten; a program that nobody should run is written beside OUT with another suffix (exit code 1)."
+        "simulates the emitted program for its verdict: vibration, contour error, time. The input is never "
+        "overwritten; a program that must not be run is written next to OUT with another suffix (exit code 1)."
     )
     parser.add_argument("input", metavar="IN", help="CNC program")
     options.add_machine_argument(parser)

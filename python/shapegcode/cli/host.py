@@ -36,7 +36,7 @@ _OF_COMMAND = {
     "measure": ("shapegcode.metrology.measure",),
     "simulate": ("shapegcode.simulation.simulate",),
 }  # fmt: skip
-"""What a run imports when it gets there: each would do so anew."""
+"""Modules that a run imports only when it needs them; loaded here, so that no run has to."""
 _CODES = {name: code for code, name in FAILED_CODES.items()}
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl
 
@@ -122,7 +122,7 @@ def _be_the_command(job: Mapping[str, Any], parent: int) -> None:
 
 
 def _follow(parent: int) -> None:
-    """End when the host ends, though nobody tells this process."""
+    """End when the server ends, without a signal."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)
     if os.getppid() != parent:

@@ -36,10 +36,10 @@ _OF_FILES = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Finds vibration modes in hammer taps or frequency responses (frequency, damping, equivalent mass, damping and "
-        "stiffness), in the decay after a rapid stop or beside a sweep (frequency and damping), each with its "
-        "95 % interval, and refuses what the data do not support. Exit code 0: all that stands out is supported; 1: "
-        "some of it is not; 2: nothing is, or bad input."
+        "Finds vibration modes from impact tests or frequency responses (natural frequency, damping ratio; equivalent "
+        "mass, damping and stiffness), from the decay after a rapid stop, or from a record made during a sweep "
+        "(frequency and damping ratio), each with its 95 % interval. A mode that the data do not support is refused. "
+        "Exit code 0: all modes that exceed the noise are supported; 1: some are not; 2: none is, or bad input."
     )
     arguments.add_options(parser, (
         ("files", "FILE", {"nargs": "*"},

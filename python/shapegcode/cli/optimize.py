@@ -1,4 +1,4 @@
-"""``shapegcode optimize``: the shortest program that is likely enough to be good on machines that are drawn."""
+"""``shapegcode optimize``: the shortest program that stays within tolerance with a given probability."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
         "Chooses block period, shaper, tolerance that is aimed at and feed on arcs, or what [choose] of the file has, "
-        "for the shortest time at which the program stays within tolerance on enough of the machines that are drawn. "
+        "for the shortest time at which the program stays within tolerance on enough of the sampled machines. "
         "The file is that of `shapegcode study`. Exit code 1 if no choice is likely enough."
     )
     add_study_arguments(

@@ -64,7 +64,7 @@ def add_json_argument(parser: argparse.ArgumentParser) -> None:
 
 def add_amount_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare ``--quiet`` and ``--verbose``."""
-    add_options(one_of(parser, "how much is said"), (
+    add_options(one_of(parser, "verbosity"), (
         ("-q --quiet", None, bool, "only the answer, warnings and errors"),
         ("-v --verbose", None, bool, "every table with every column and row, however wide"),
     ))  # fmt: skip
@@ -119,8 +119,8 @@ def load_machine(args: argparse.Namespace, *, writes_program: bool = False) -> M
     machine = machine.with_values(values, source=f"{args.machine} with --set") if values else machine
     if writes_program and (dialect := machine.emission.dialect) != "fanuc":
         raise ArgumentError(
-            f"this command writes FANUC's words, and emission.dialect is {dialect}: G04 P and other words may mean "
-            "another thing there; --set emission.dialect=fanuc writes them all the same"
+            f"this command writes for FANUC only, and emission.dialect is {dialect}: G04 P and other words may have "
+            "another meaning there; --set emission.dialect=fanuc writes them nevertheless"
         )
     return machine
 
@@ -153,7 +153,7 @@ def output_file(name: str) -> Path:
 
 
 def file_exists(name: str) -> Exception:
-    """The error of a file that nobody said to overwrite."""
+    """The error for an existing file without --force."""
     from shapegcode.errors import ArgumentError
 
     return ArgumentError(f"{name} exists; --force overwrites it, -o FILE writes another one")
@@ -268,7 +268,7 @@ def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) ->
          "tool file: end mill, cutting force, limits (docs/reference/tool_files.md); repeated, each file needs its T "
          "number"),
         ("--stock", "S.toml", {"required": required},
-         "stock file: what is there before the first block (docs/reference/tool_files.md)"),
+         "stock file: shape of the workpiece before the first block (docs/reference/tool_files.md)"),
         ("--margin", "RATIO", share, "share of each limit that is left free, for example 3%% (default: 1.5%%)"),
         ("--resolution", "LENGTH", micrometres,
          "grid of the material, for example 50um (default: a hundredth of the tool's diameter)"),

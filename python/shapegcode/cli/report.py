@@ -21,8 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
         "Makes the page that --html writes later, from the JSON: figures from the JSON, and where the programs and the "
-        "machine file are still as they were, their motion too. What has changed since is said on the page and here "
-        "(exit code 1). Files are looked for where they were, and beside the JSON."
+        "machine file are still as they were, their motion too. Changed files are reported on the page and here (exit "
+        "code 1). Files are searched at their original paths, and in the folder of the JSON."
     )
     add_options(parser, (
         ("inputs", "RESULT.json", {"nargs": "+"}, "what --json has written"),

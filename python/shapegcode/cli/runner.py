@@ -74,7 +74,7 @@ class ProgressBar:
         self.bar: Progress | None = None
 
     def update(self, fraction: float) -> None:
-        """Tell how much of the work is done, 0 to 1; cheap enough for every step of a loop."""
+        """Report the ratio of work that is done, 0 to 1; cheap enough for every step of a loop."""
         if self.bar is not None:
             self.bar.update(self.bar.task_ids[0], completed=min(max(fraction, 0.0), 1.0), total=1.0)
 
@@ -168,7 +168,7 @@ def _write_page(
     output: tuple[str | Path, bytes | memoryview] | None,
     wrote: Sequence[str | Path],
 ) -> list[str]:
-    """Say in the JSON what it was made of, and write --html; gives the files."""
+    """Write provenance into the JSON, and the page of --html; return the files."""
     html = getattr(args, "html", None)
     if html is None and getattr(args, "json", None) is None:
         return []  # nobody looks at the hashes
@@ -280,7 +280,7 @@ MACHINES = ("machine", "base", "files")
 
 
 def given_files(args: argparse.Namespace) -> Iterator[tuple[str, str]]:
-    """What was given to the options that name files to read."""
+    """The values of all options that name files to read."""
     for role in READ:
         value = getattr(args, role, None)
         for entry in value if isinstance(value, list | tuple) else [value]:

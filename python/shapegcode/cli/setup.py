@@ -15,12 +15,12 @@ from shapegcode.cli.options import add_result_arguments, file_exists, write_new
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Asks what a shop knows of its machine, says what each answer changes, reads parameter file and tap tests "
-        "where there are some, and writes a short machine file: what was answered, and why; everything else is a "
-        "default. Enter means `not known yet` at every question, and < goes back to the one before. Another machine's "
-        "modes are never taken."
+        "Asks what a shop knows about its machine, explains what each answer changes, reads the control's parameter "
+        "file and tap tests if there are any, and writes a short machine file with the answers and their provenance; "
+        "everything else is a default. Enter means `not known yet` at every question, and < goes back to the one "
+        "before. Another machine's modes are never used."
     )
-    parser.epilog = "example: shapegcode setup -o mine.toml"
+
     add_options(parser, (
         ("-o --output", "FILE", None, "machine file to write (default: %(default)s)", "machine.toml"),
         ("--answers", "FILE", None,

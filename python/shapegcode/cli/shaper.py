@@ -20,8 +20,8 @@ _FAMILIES = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Designs every family of input shapers for some vibration modes and compares them: duration, what is left of "
-        "the vibration if the frequencies are off, contour cost, negative impulses; and recommends one. "
+        "Designs every family of input shapers for some vibration modes and compares them: duration, residual "
+        "vibration if the frequencies are off, contour cost, negative impulses; and recommends one. "
         "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input."
     )
     add_options(parser, ((
@@ -49,8 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
          "largest share of the vibration that may be left anywhere in the bands (default: the machine's "
          "shaping.vibration_limit, else 5%%)"),
         ("--objective", None, ("shortest", "contour", "robust"),
-         "what is least in the design to take, within the limit: duration, contour cost, or what is left of the "
-         "vibration (default: %(default)s)", "shortest"),
+         "what the recommended design minimizes, within the limit: duration, contour cost, or residual vibration "
+         "(default: %(default)s)", "shortest"),
         ("--negative", None, bool, "a design with negative impulses may be recommended"),
         ("--taps", "TIME:A,...", None, 'compare a shaper of your own: "0:.5,10.9ms:.5"'),
         ("--speed", "MM/S", positive, "speed at which the contour cost is shown (default: %(default)g)", 200.0),

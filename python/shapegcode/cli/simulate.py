@@ -23,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_input_arguments(parser)
     add_options(parser, (
         ("--shaped", None, bool,
-         "simulate every cut as shaped blocks: at their feed, without look-ahead; needed only where the header of a "
-         "shaped program is missing, which says which of them are"),
+         "simulate every cut as shaped blocks: at their feed, without look-ahead; needed only if the header of a "
+         "shaped program, which marks its shaped cuts, is missing"),
         ("--against", "ORIGINAL", None,
          "measure the contour error against the path of this program, such as the original of a shaped one; without it "
          "against IN's own path"),

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 
 def add_study_arguments(parser: argparse.ArgumentParser, what: str, draws: str) -> None:
-    """Declare the file of a study, the machine, the number of draws; `what` is read from it, `draws` how many."""
+    """Declare the study file, the machine and the number of samples; `what` describes the file, `draws` the number."""
     parser.add_argument("input", metavar="STUDY.toml", help=what)
     add_machine_argument(parser, required=False)
     parser.add_argument("-n", "--draws", type=count, metavar="N", help=f"{draws} (default: the file's)")
 
 
 def load(args: argparse.Namespace) -> tuple[StudyFile, Machine]:
-    """The file and the machine; the program and the machine then stand among what the command reads."""
+    """The study file and the machine, with program and machine file added to the input files of the command."""
     from shapegcode.errors import ArgumentError
     from shapegcode.studies.study_file import load_study
 

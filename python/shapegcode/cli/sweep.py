@@ -12,22 +12,23 @@ from shapegcode.cli.options import add_machine_argument, add_result_arguments, l
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Writes a program that shakes one axis: strokes there and back whose frequency rises and falls, band by band, "
-        "with pauses. Says before which band the control reaches, and the acceleration of each part, simulated from "
-        "the written program. Beside it any logger of accelerations records; `identify --sweep` finds the modes. Exit "
+        "Writes a program that shakes one axis: moves back and forth whose frequency rises and falls, band by band, "
+        "with pauses. Reports the band that the control can reach and the acceleration of each part, simulated from "
+        "the written program. Any logger records accelerations while it runs; `identify --sweep` finds the "
+        "modes. Exit "
         "code 0; 2: bad input, or a band that the control does not reach."
     )
     add_machine_argument(parser)
     add_options(parser, (
         ("--axis", None, ("x", "y", "z"), "that is shaken (default: %(default)s)", "x"),
         ("--frequencies", "LOW:HIGH", frequency_band,
-         "of the strokes there and back, Hz (default: from 8 Hz up to what the control reaches, 200 Hz at most)"),
+         "of the moves back and forth, Hz (default: from 8 Hz up to what the control reaches, at most 200 Hz)"),
         ("--travel", "MM", positive,
-         "longest stroke, in the positive direction from the start point (default: 5)", 5.0),
+         "longest move, in the positive direction from the start point (default: 5)", 5.0),
         ("--acceleration", "SHARE", ratio,
-         "amplitude, of the largest acceleration of the axis: a drive bears some 30%% for as long as it lasts "
+         "amplitude, of the largest acceleration of the axis: a drive tolerates some 30%% for the whole sweep "
          "(default: 30%%)", 0.3),
-        ("--seconds", "S", positive, "all strokes together last about so long (default: 60)", 60.0),
+        ("--seconds", "S", positive, "approximate duration of all moves together (default: 60)", 60.0),
         ("-o --output", "OUT.NC", None, "program", NEEDED),
         ("--program", "O1234", program_number, "number of the program (default: O7201)", 7201),
     ))  # fmt: skip

@@ -87,7 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _add_fit(actions: Any) -> None:
     fit = actions.add_parser(
         "fit",
-        help="what the measured forces of a test cut tell",
+        help="evaluate the measured forces of a test cut",
         description="Reads the side file of a test cut and the records of its passes, in their order: of a taper the "
         "coefficients with 95 % intervals, of a corner measured against expected resultant, of an interval test the "
         "shortest interval that the controller follows.",

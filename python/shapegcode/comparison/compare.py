@@ -1,4 +1,4 @@
-"""Two programs held against each other: the same moves, tools, offsets and functions in the same order?
+"""Compare two programs: the same moves, tools, offsets and functions in the same order?
 
 Both are read as the control executes them. Nothing of a conversion is looked at: the words and canonical moves of
 either program are put in order by themselves, and aligned by what they do (Myers 1986).

@@ -55,7 +55,7 @@ class Allowed:
 
     @classmethod
     def of(cls, words: str | Iterable[str]) -> Allowed:
-        """What words such as ``feeds,blocks,path=20um,calls`` allow.
+        """Parse allowed differences such as ``feeds,blocks,path=20um,calls``.
 
         Args:
             words: in one text with commas, or one by one.
@@ -237,7 +237,9 @@ class Comparison(Result):
                 else ("nothing: the programs do the same.")
             )
         if first.kind == "emission" and first.original_line is not None:
-            return f"look at {first.place}: the other program has lost what keeps a shaped cut as it was judged."
+            return (
+                f"look at {first.place}: the other program lacks lines that a shaped cut needs for its verdict to hold."
+            )
         words = [word for word in self.allow if not word.startswith("path=")] if first.kind == "path" else [*self.allow]
         words.append(
             f"path={math.ceil(max(each.distance_um for each in self.refused))}um"
@@ -256,7 +258,7 @@ class Comparison(Result):
         )
 
     def tables(self) -> list[Table]:
-        """Counts of each kind, then the differences: those that were not allowed first."""
+        """Number of differences of each kind, then the differences, with those that are not allowed first."""
         counts = Table(
             "",
             (

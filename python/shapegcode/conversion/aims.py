@@ -171,11 +171,11 @@ class Aims:
 
     @property
     def priced(self) -> set[int]:
-        """Cuts that are shaped as closely as their price allows, and not for the tolerance that was asked for."""
+        """Cuts that are shaped for the tightest tolerance within their price, because the requested one costs more."""
         return {index for index in self._priced if not self.reasons[index]}
 
     def shaped_for_um(self, index: int) -> float:
-        """Contour tolerance that a cut is shaped for: what was asked, or the tightest that its price allows."""
+        """Contour tolerance that a cut is shaped for: the requested one, or the tightest within its price."""
         return max(self._asked_um, self.room_um[index] / MARGIN) if index in self._priced else self._asked_um
 
     def time_s(self, index: int, tolerance_um: float) -> float:
@@ -246,7 +246,7 @@ MARGIN = 0.95
 """Of the tolerance, for which a cut is planned: the rest is for rounding and for what the plan leaves out."""
 
 FACTORS = (1.0, 1.25, 1.5, 2.0)
-"""Of the tolerance that was asked for: at these it is planned."""
+"""Ratios to the requested tolerance at which a cut is planned."""
 
 _BETWEEN = (2.8, 4.0, 5.6, 8.0)  # likewise, so that the curve between them is known where a price asks for it
 _FLAT = 0.002  # of the time: a curve that falls by less has no knee
@@ -305,7 +305,8 @@ class ToleranceCurve:
 def plan_curve(
     path: _core.Path, fir: _core.Fir, options: _core.ShapingOptions, asked_um: float, original_um: float
 ) -> CutCurve:
-    """Plan a cut at several tolerances, from no slowing to what was asked; each search starts from the last speeds."""
+    """Plan a cut at several tolerances, from no slowing to the requested one; each search starts from the last
+    speeds."""
     wanted = sorted(
         {*(factor * asked_um for factor in (*FACTORS, *_BETWEEN)), max(original_um, asked_um)}, reverse=True
     )
@@ -324,7 +325,7 @@ def plan_curve(
 
 
 class CutCurves:
-    """The curve of each cut of a conversion on one grid, planned when it is asked for."""
+    """The curve of each cut of a conversion on one grid, planned when it is first used."""
 
     def __init__(
         self,

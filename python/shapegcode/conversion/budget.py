@@ -84,7 +84,7 @@ class Budget:
 
 @dataclass(frozen=True)
 class TransferLoad:
-    """What a shaped region asks of memory, line and control."""
+    """Memory, data rate and block rate that a shaped region needs."""
 
     extra_bytes: int  # size of its text less that of the original's
     baud: float  # what its section with the most blocks per second needs of the line, bit/s
@@ -93,7 +93,7 @@ class TransferLoad:
 
 @dataclass(frozen=True)
 class TextNeeds:
-    """What a whole text asks of memory, line and control."""
+    """Memory, data rate and block rate that a whole program needs."""
 
     bytes: int  # its size
     baud: float  # what its section with the most blocks per second needs of the line, bit/s
@@ -113,10 +113,10 @@ class GivenUp:
 
 @dataclass(frozen=True)
 class BudgetOutcome:
-    """What a budget did to a conversion."""
+    """Effect of a budget on a conversion."""
 
     limits: Budget  # the budget; null: no limit
-    # of the text with everything shaped; where the block period is longer: of that on the shorter one, before any
+    # of the program with everything shaped; if the block period was made longer: with the shorter one, before any
     # region is slowed for the contour tolerance
     before: TextNeeds
     after: TextNeeds  # of the text as it is
@@ -125,7 +125,7 @@ class BudgetOutcome:
 
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
-    """The load of a shaped region; a stretch lasts as long as the shaper: no transition is shorter."""
+    """The data rate of a shaped cut over windows of the shaper's duration, the shortest in which it can change."""
     durations = np.concatenate(shaped.block_periods, dtype=np.float64)
     durations *= grid.block_period_s
     window_s = max(grid.duration_s, grid.block_period_s)
@@ -144,7 +144,7 @@ _LINES_NAMED = 5  # lines of regions in the one sentence
 
 
 def keepable(region: _core.Region, machine: Machine) -> bool:
-    """Whether a region's text can stand in an emitted program: absolute arc centres cannot."""
+    """Whether a region may be left unchanged in an emitted program: not with absolute arc centres."""
     return machine.input.arc_centre != "absolute" or region.path.largest_sweep_rad <= 0.0
 
 
@@ -267,7 +267,7 @@ class Spending:
         return [factor for factor in factors if factor > 1.0 + _ROUNDING]
 
     def _worth(self, grid: Grid, loads: Mapping[int, TransferLoad], weights: Sequence[float]) -> tuple[float, int, int]:
-        """Gain of the regions that are not too fast, how many they are, and how short the shaper is, in ticks."""
+        """Gain of the regions that are not too fast, their number, and the shaper duration in interpolation periods."""
         slow = [index for index, load in loads.items() if not self.budget.too_fast(load)]
         return math.fsum(weights[index] for index in slow), len(slow), -round(grid.duration_s / self._tick_s)
 

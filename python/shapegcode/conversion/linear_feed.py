@@ -254,7 +254,7 @@ class _JoinedBlocks:
         return float(np.linalg.norm(step)) / ((behind - before) * self._period)
 
     def _bias(self, at: int, end: int) -> float:
-        """By how much speeds at the ends are higher than those of the command, whose mean the block has to keep.
+        """Excess of the speeds at the ends over those of the command, so that the block keeps its mean speed.
 
         The mean over time of a speed that is linear over the path is the logarithmic mean of those at its ends.
         """

@@ -1,4 +1,4 @@
-"""What an emitted program asks of the control and of its operator: memory, line, override, restart, first run."""
+"""Requirements of an emitted program for the control and the operator: memory, line, override, restart, first run."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def at_the_control(
     block_period_s: float,
     restarts: Sequence[CutRestarts],
 ) -> tuple[ControlNote, ...]:
-    """Cautions with an emitted program."""
+    """Cautions for the operator of an emitted program."""
     if not placed:
         return ()
     machine = model.machine
@@ -58,7 +58,7 @@ def at_the_control(
     elsewhere = []
     if turned and machine.emission.override != "lock":
         worst = max(turned, key=lambda each: max(each.residual_um))
-        elsewhere = [f"at {worst.override * 100:.0f} % up to {max(worst.residual_um):.1f} µm of vibration stay"]
+        elsewhere = [f"at {worst.override * 100:.0f} % up to {max(worst.residual_um):.1f} µm of residual vibration"]
     return (
         ControlNote("memory", _memory(emitted.size, machine)),
         ControlNote("drip feed (DNC)", _line(loads, machine)),
@@ -125,15 +125,15 @@ def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_perio
         return f"{needs}{before}; {own.control}: {own.facts['look-ahead'].text}"
     if machine.emission.leaves_look_ahead:
         on = " ".join(machine.emission.epilogue)
-        again = f", {on} behind it on again" if on else ""
+        again = f", {on} after it on again" if on else ""
         return f"{needs}; {prologue} before each shaped cut switches the look-ahead mode off{again}"
     if prologue:
-        return f"{needs}; {prologue} before each shaped cut is meant to put the control into the mode for them"
+        return f"{needs}; {prologue} before each shaped cut must select the control's mode for shaped cuts"
     return f"{needs}; the program switches no mode: contour control with look-ahead (G05.1Q1, G08P1) must be off"
 
 
 def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFigures, model: MachineModel) -> str:
-    """What single block does to the cut that vibrates most: its blocks simulated one by one, each from rest to rest."""
+    """Effect of single block on the cut that vibrates most: its blocks simulated one by one, each from rest to rest."""
     index = max(range(len(placed)), key=lambda each: max(figures.regions[each].residual_vibration_um.original))
     place, region = placed[index], figures.regions[index]
     blocks = place.blocks(emitted)
@@ -175,7 +175,7 @@ def _duration(time_s: float) -> str:
 def _restarts(
     emitted: Program, placed: Sequence[Placed], restarts: Sequence[CutRestarts], machine: Machine
 ) -> Iterator[str]:
-    """Where to restart, what to do before it, and where there is no restart point, and why."""
+    """Restart lines and points, preparations, and cuts without a restart point with the reason."""
     emission = machine.emission
     if (own := dialect_of(emission.dialect)) is not None:
         yield f"{own.control}: {own.facts['restart'].text}"
@@ -195,7 +195,7 @@ def _restarts(
         cost_s = sum(each.stops_s for each in restarts)
         yield (
             f"{stops} of them {'is a stop that was' if stops == 1 else 'are stops that were'} put in "
-            f"(emission.restart_stops): {cost_s:.1f} s more, and a dwell mark where the tool stands in the cut"
+            f"(emission.restart_stops): {cost_s:.1f} s more, and a dwell mark where the tool stops in the cut"
         )
     long = [
         (place.original_lines, each)
@@ -204,7 +204,7 @@ def _restarts(
     ]
     for (first, last), each in sorted(long, key=lambda pair: -pair[1].longest_s)[:1]:
         more = f" (and {len(long) - 1} more cuts)" if len(long) > 1 else ""
-        why = each.reason or "no place where it is nearly at rest"
+        why = each.reason or "no position where it is nearly at rest"
         remedy = "" if each.reason or emission.restart_stops else "; emission.restart_stops = true stops there"
         yield (
             f"no restart point for {_duration(each.longest_s)} in the cut of lines {first} to {last}{more}: "
@@ -227,7 +227,7 @@ def _restart_lines(emitted: Program, placed: Sequence[Placed]) -> str:
 
 
 def _lines_from(emitted: Program, number: int) -> Iterator[bytes]:
-    """The lines of a text from one on, of which it has a million perhaps."""
+    """Yield the lines of a program from a line number on; it may have millions of lines."""
     passed, rest = 1, b""
     for begin in range(0, emitted.size, _CHUNK):
         chunk = emitted.text_slice(begin, min(begin + _CHUNK, emitted.size))

@@ -1,4 +1,4 @@
-"""What a conversion comes to: the whole emitted program judged, and the result made of it."""
+"""Make the result of a conversion: simulate the whole emitted program for its verdict, and collect the figures."""
 
 from __future__ import annotations
 

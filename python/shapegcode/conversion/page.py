@@ -1,4 +1,5 @@
-"""The page of a conversion: whether to run it, what it gains, what that rests on, and the operator's run sheet."""
+"""The page of a conversion: whether to run it, what it gains, its sensitivity to unverified parameters, and the
+operator's run sheet."""
 
 from __future__ import annotations
 
@@ -61,8 +62,8 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
 
 
 def sections_of(conversion: Conversion, made: Made | None = None) -> Iterator[Section]:
-    """What stands on the page."""
-    how = "Each card: original → emitted. The limit is what the emitted figure is judged by."
+    """The sections of the page."""
+    how = "Each card: original → emitted. The limit applies to the emitted program."
     yield Section("gain", "What it gains", (Figures(tuple(_figures(conversion))),), how=how)
     if conversion.proof is not None:
         how = "The emitted program was read once more and compared with the original; shapegcode compare does the same."
@@ -90,7 +91,7 @@ def sections_of(conversion: Conversion, made: Made | None = None) -> Iterator[Se
 
 
 def _picker(conversion: Conversion, made: Made | None) -> CutPicker:
-    """The cuts to tick; what a cut left unchanged would be is not known."""
+    """The cuts that can be chosen; figures of a cut that was not shaped are not known."""
     rows = [
         CutRow(
             cut.lines, "" if cut.tool is None else f"T{cut.tool}", cut.gain_um, _tried(cut.residual_um, cut),
@@ -117,7 +118,7 @@ def _tried(pair: Pair[N], cut: CutOutcome) -> Pair[N | None]:
 def _price(conversion: Conversion, made: Made | None) -> Iterator[Section]:
     """Cut by cut, and what other tolerances would cost."""
     if len(conversion.cuts) > 1:
-        how = "Tick the cuts to shape: the sums follow, and the command below shapes only them."
+        how = "Select the cuts to shape: the sums are updated, and the command below shapes only them."
         parts, many = (_picker(conversion, made),), len(conversion.cuts) > _SHOWN_CUTS
         yield Section("cuts", "Cut by cut", parts, how=how, folded=many, printed=False)
     if conversion.tolerance_curve is not None:
@@ -128,7 +129,7 @@ def _price(conversion: Conversion, made: Made | None) -> Iterator[Section]:
 
 
 def _figures(conversion: Conversion) -> Iterator[Figure]:
-    """The few that people look at first."""
+    """The main figures."""
     residual = conversion.residual_vibration_um
     for axis in "xyz":
         if max(residual.original[axis], residual.emitted[axis]) >= _LEAST_SHOWN_UM:
@@ -218,7 +219,7 @@ def _times(conversion: Conversion) -> Section:
 
 
 def _machine(machine: Machine) -> Section:
-    """What the machine was taken for: modes, tolerances, and every value that was not measured."""
+    """The machine data used: modes, tolerances, and every value that was not measured."""
     values = [value for value in machine.values() if value.unmeasured or value.key.startswith(_SHOWN_KEYS)]
     unmeasured = sum(value.unmeasured for value in values)
     columns = (
@@ -227,22 +228,22 @@ def _machine(machine: Machine) -> Section:
         Column("where it comes from", value=lambda row: "assumed" if row.assumed else row.origin, text=True),
         Column("meaning", text=True),
     )
-    how = f"{unmeasured} values here were not measured on this machine: assumed, inherited, or left at their default."
+    how = f"{unmeasured} of these values were not measured on this machine: assumed, inherited, or default."
     table = Table("", columns, values, row_style=lambda row: "" if row.unmeasured else "bold")
-    return Section("machine", "What the machine was taken for", (table,), how=how, folded=True, printed=False)
+    return Section("machine", "Machine data used", (table,), how=how, folded=True, printed=False)
 
 
 def _sheet(conversion: Conversion, made: Made | None) -> Section:
-    """What the operator takes to the machine, on one page."""
+    """The run sheet: what the operator takes to the machine, on one page."""
     output = None if made is None else made.file("output")
     name = f"{Path(conversion.program).name}, shaped" if output is None else Path(output.name).name
     if output is not None:
         sha256 = output.sha256
     else:
         sha256 = "not known" if conversion.from_json else hashlib.sha256(conversion.text).hexdigest()
-    rows = [("load", f"{name}, for {conversion.machine}, {conversion.bytes_emitted} bytes")]
-    rows.append(("SHA-256 of what to load", sha256))
-    for role, name in (("input", "made from"), ("machine", "for the machine file")):
+    rows = [("program to load", f"{name}, for {conversion.machine}, {conversion.bytes_emitted} bytes")]
+    rows.append(("SHA-256 of the program", sha256))
+    for role, name in (("input", "original program"), ("machine", "machine file")):
         if made is not None and (file := made.file(role)) is not None:
             rows.append((name, f"{Path(file.name).name}, SHA-256 {file.sha256 or 'not known'}"))
     rows += [(note.topic, note.text) for note in conversion.at_the_control]

@@ -106,7 +106,7 @@ _TRIALS = (0.9, 0.7, 0.5)  # of the time constant that a rounding in proportion 
 
 @dataclass(frozen=True)
 class FilterAdvice:
-    """A contour error that the control's own filter makes, and what cures it without shaping."""
+    """A contour error caused by the control's own filter, and its remedy without shaping."""
 
     key: str  # of the machine file, the filter's time constant
     now_s: float  # its value
@@ -128,7 +128,7 @@ class FilterAdvice:
 def filter_advice(
     program: Program, machine: Machine, model: MachineModel, judge: Judge, originals: Sequence[_core.SimulationFigures]
 ) -> FilterAdvice | None:
-    """Whether a smaller filter of the control would do instead of shaping."""
+    """Find a smaller filter of the control with which the original keeps its limits without shaping."""
     limit_um, floor_um = machine.tolerance.contour_um, machine.tolerance.residual_floor_um
     errors = [(getattr(run, judge.target).max_abs_mm * 1e3, run.command.max_abs_mm * 1e3) for run in originals]
     if not any(error > limit_um for error, _ in errors):
@@ -180,7 +180,7 @@ def open_axes(program: Program, machine: Machine) -> list[str]:
 def simulation_warnings(
     program: Program, figures: ProgramFigures, machine: Machine, *, is_priced: bool
 ) -> Iterator[str]:
-    """What simulating the emitted program showed: misses, the tolerance that binds, figures made worse."""
+    """Warnings from the simulation of the emitted program: misses, exceeded tolerances, figures made worse."""
     expanded = " expanded" if program.core.expanded else ""
     for region in figures.regions:
         for miss in region.misses:
@@ -203,13 +203,13 @@ def simulation_warnings(
 
 
 def _binding(figures: ProgramFigures, tolerance: Tolerance, rounding_um: float, *, is_priced: bool) -> Iterator[str]:
-    """Which tolerance a conversion left, by how much, and what would be feasible; nothing where all were kept."""
+    """Tolerances that a conversion exceeds, by how much, and feasible values; nothing if all are kept."""
     contour = max((region.contour_error_um for region in figures.regions), default=0.0)
     if contour > tolerance.contour_um:
         how = "within the price (price.*)" if is_priced else "with the feed lowered as far as it helps"
         share = f"; rounding the words alone may take {rounding_um:.1f} um of it"
         yield (
-            f"tolerance.contour_um = {tolerance.contour_um:g} binds: {contour:.1f} um were reached "
+            f"tolerance.contour_um = {tolerance.contour_um:g} is exceeded: {contour:.1f} um were reached "
             f"{how}{share if rounding_um > 0.2 * contour else ''}; "
             f"feasible: {_rounded_up(contour):g} um"
         )
@@ -217,7 +217,7 @@ def _binding(figures: ProgramFigures, tolerance: Tolerance, rounding_um: float, 
     if over:
         left, limit = max(over)
         yield (
-            f"the tolerance of residual vibration binds: {left:.2f} um are left, limit {limit:.2f} um "
+            f"the tolerance of residual vibration is exceeded: {left:.2f} um remain, limit {limit:.2f} um "
             f"(tolerance.residual_*); feasible: tolerance.residual_floor_um = {_rounded_up(left):g}, "
             "or a longer shaper (`shapegcode shaper`)"
         )
@@ -233,13 +233,13 @@ def _rounded_up(value: float) -> float:
 def text_warnings(
     program: Program, placed: Sequence[Placed], figures: ProgramFigures, machine: Machine, size: int, blocks: int
 ) -> Iterator[str]:
-    """What the control must be told or cannot do with the emitted text."""
+    """Warnings on settings of the control, and on what it cannot do with the emitted program."""
     controller, emission = machine.controller, machine.emission
     on = next((place.region for place in placed if place.region.look_ahead_mode), None)
     if on is not None and not emission.prologue:
         yield (
-            f"{program.place(on.first_line)}: shaped blocks run while the program's look-ahead mode is on; the "
-            'verdict holds for it off: set emission.prologue = ["G05.1Q0"] and emission.epilogue = ["G05.1Q1"]'
+            f"{program.place(on.first_line)}: shaped blocks run while the program's look-ahead mode is on; the verdict "
+            'is for look-ahead off: set emission.prologue = ["G05.1Q0"] and emission.epilogue = ["G05.1Q1"]'
         )
     fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
     fast = next((place.region for place in placed if place.region.path.fastest_feed_mm_per_s * 60.0 > fastest), None)
@@ -264,7 +264,7 @@ def text_warnings(
     if figures.slowed_blocks and not emission.leaves_look_ahead:
         example = ', for example ["G05.1Q0"]' if emission.dialect == "fanuc" else ""
         yield (
-            f"{figures.slowed_blocks} of {blocks} shaped blocks step an axis by more than "
+            f"{figures.slowed_blocks} of {blocks} shaped blocks change the speed of an axis by more than "
             "controller.corner_speed_difference_mm_per_min: run them with the look-ahead mode off "
-            f"(emission.prologue{example}), or it slows them"
+            f"(emission.prologue{example}), or look-ahead slows them down"
         )

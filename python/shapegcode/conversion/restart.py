@@ -82,7 +82,7 @@ class FreeNumbers:
         self._free: list[int] | None = None
 
     def first(self, count: int) -> list[int]:
-        """So many of them, always the same, ascending where there is room."""
+        """N numbers that the program does not use, reproducible and, if possible, ascending."""
         if self._free is None:
             self._free = self._found()
         if count > len(self._free):
@@ -198,7 +198,7 @@ class RestartPlaces:
         self.last = period
 
     def further_stops(self, points: Sequence[int], reached: Sequence[int], end: int) -> list[int]:
-        """Segments before which the command shall come to rest, where it is nowhere near that for too long."""
+        """Segments before which the command must come to rest, because it is not nearly at rest for too long."""
         stops: list[int] = []
         begins = np.asarray(reached)
         near = self._interval * _APART

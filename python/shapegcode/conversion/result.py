@@ -63,7 +63,7 @@ class DialectNotes:
     def sentence(self) -> str:
         """In one sentence."""
         assumed = f"; assumed: {', '.join(self.assumed)}" if self.assumed else ""
-        return f"written in the words of {self.control} (emission.dialect = {self.name}){assumed}"
+        return f"written for {self.control} (emission.dialect = {self.name}){assumed}"
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
@@ -194,7 +194,7 @@ class Conversion(ProgramFigures, Result):
         if self.dialect is not None:
             return "its motion is unchanged"
         in_other_words = self.simulated is not None and self.simulated.original.foreign is not None
-        return "its motion is unchanged, written in FANUC's words" if in_other_words else "the program is unchanged"
+        return "its motion is unchanged, written as a FANUC program" if in_other_words else "the program is unchanged"
 
     def _headline(self) -> str:
         verdict = self.recommendation + ("" if self.is_written_as_output else ", OUT OF TOLERANCE")
@@ -280,7 +280,8 @@ class Conversion(ProgramFigures, Result):
             return f"do not run it ({self.reason}): {remedy}."
         if not self.within_tolerance:
             return (
-                "decide whether what stays out matters for this part (the table of cuts says where); then run the "
+                "decide whether the cuts that stay out of tolerance matter for this part (see the table of "
+                "cuts); then run the "
                 "emitted program above the workpiece, without a tool."
             )
         if self.warnings:
@@ -423,7 +424,7 @@ class Conversion(ProgramFigures, Result):
         return replace(page, scene=replace(page.scene, variants=(*others, with_verdict)))
 
     def page_sections(self, made: Made | None = None) -> tuple[Section, ...]:
-        """What it gains, what that rests on, where the time goes, and the operator's run sheet.
+        """What it gains, its sensitivity to unverified parameters, where the time goes, and the operator's run sheet.
 
         Args:
             made: of what it was made; None: it is not known.

@@ -65,7 +65,7 @@ class _Trial:
 
 
 StartedTrials = Mapping[tuple[str, str], "Future[CaseFigures]"]
-"""Simulations under way, by the value and what it is moved to."""
+"""Running simulations, by the value and what it is changed to."""
 
 
 @dataclass(frozen=True)
@@ -255,7 +255,7 @@ def _modes(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str, na
 
 
 def _frequencies(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
-    """Both ways; a table over a position or a mass moves as a whole."""
+    """Changed up and down; a table over a position or a mass changes as a whole."""
     for letter, number in _modes(machine, unmeasured, moving, "frequency_hz"):
         stem = f"axes.{letter}.modes.{number}"
         stated = getattr(machine.axes, letter).modes[number - 1].frequency_uncertainty_percent
@@ -268,7 +268,7 @@ def _frequencies(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: s
 
 
 def _shares(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
-    """Less damping, more participation: the ways in which more is left."""
+    """Changed towards more residual vibration: less damping, more participation."""
     for name, sign in (("damping_ratio", -1.0), ("participation", 1.0)):
         for letter, number in _modes(machine, unmeasured, moving, name):
             mode, stem = getattr(machine.axes, letter).modes[number - 1], f"axes.{letter}.modes.{number}"

@@ -94,7 +94,8 @@ def require_dialect(program: Program, machine: Machine, budget: Budget | None) -
     other_blocks = dialect.arc_radius != "R" or dialect.time_feed
     if budget is not None and (dialect.one_code or (budget.limits_rate and other_blocks)):
         raise _core.ArgumentError(
-            f"a budget is counted in FANUC's words, and {dialect.control} (emission.dialect = {name}) has others: give "
+            f"budgets are computed for FANUC's blocks only, not for {dialect.control} (emission.dialect = {name}): "
+            "give "
             f"{'none' if dialect.one_code else '--max-bytes alone'}"
         )
     decimals = machine.emission.position_decimals
@@ -122,8 +123,8 @@ def with_dialect(conversion: Converted) -> Converted:
     if limit is not None and len(found.text) > limit:
         less = limit * conversion.emitted.size // len(found.text)
         raise _core.ArgumentError(
-            f"in the words of {dialect.control} the program has {len(found.text)} bytes, the budget is {limit} "
-            f"(--max-bytes): give {less}, which counts FANUC's words"
+            f"written for {dialect.control} the program has {len(found.text)} bytes, the budget is {limit} "
+            f"(--max-bytes): give {less}, the size for FANUC"
         )
     facts = {topic: fact.text for topic, fact in dialect.facts.items()}
     points = [replace(each, line=int(found.lines[each.line - 1])) for each in conversion.restart_points]
@@ -170,7 +171,7 @@ class _State:
 
 
 class _Translator:
-    """Writes line by line."""
+    """Writes the program for another control line by line."""
 
     def __init__(
         self,
@@ -233,7 +234,8 @@ class _Translator:
         self._joined_um = max(self._joined_um, off_mm * 1e3)
         self.cautions["FLIN"] = (
             f"blocks with a feed that is linear along their path (FLIN): the command is within {self._joined_um:.2f} "
-            "µm of the blocks of constant feed that were judged, at the ends of their periods; not tried on a control"
+            "µm of the blocks of constant feed, for which the verdict holds, at the ends of block periods; not tested "
+            "on a control"
         )
 
     def lines(self, number: int, line: str) -> list[str]:
@@ -243,7 +245,7 @@ class _Translator:
             return self._linear[number]
         if state.percents > 1 or (state.ended_at and line.lstrip()[:1] not in ("%", "(", "")):
             # Another control might run it.
-            left_out = f"{self._where(number)}: what stands behind the end of the program is left out"
+            left_out = f"{self._where(number)}: lines after the end of the program are left out"
             self.cautions.setdefault("end", left_out)
             return []
         if (place := _PLACE.fullmatch(line)) is not None:
@@ -365,7 +367,7 @@ class _Translator:
         return lines
 
     def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
-        """Words that stand for others of the same control, from which the original was read."""
+        """Words of the control for which the original was written, in place of their translation."""
         held = dict(words)
         found = {}
         if (tool := self._names.get(f"T{held.get('T', '')}")) is not None:
@@ -421,7 +423,7 @@ class _Translator:
             if code != "G04":
                 return ""
             if [each for each in codes if each != "G04"] or number not in self._dwells:
-                raise self._error(number, "G04 stands in a block with other codes, or has no time")
+                raise self._error(number, "G04 is in a block with other codes, or has no time")
             return self._seconds(number, self._dwells[number], dialect.dwell)
         if letter in "GM":
             if code == "G43" and dialect.arc_radius == "CR=":
@@ -454,10 +456,10 @@ class _Translator:
                 raise self._error(number, f"P{value}: only in a block with G82 is it known what it means there")
             return self._seconds(number, int(value) * 1e-3, dialect.dwell.partition("G04")[2])
         why = " repeats a drilling cycle" if letter == "K" else ""
-        raise self._error(number, f"{letter}{value}{why}: what it means to {dialect.control} is not known{_CURE}")
+        raise self._error(number, f"{letter}{value}{why}: its meaning on {dialect.control} is not known{_CURE}")
 
     def _length(self, letter: str, value: str, dialect: Dialect) -> str:
-        """A number with a point: without one each control reads it in its own way."""
+        """A number with a decimal point: without it its meaning differs between controls."""
         controller = self._machine.controller
         if "." not in value:
             if letter != "F" and not controller.calculator_decimal_point:
@@ -561,13 +563,13 @@ class _Translator:
         here = fanuc_meaning(code)
         there = self._dialect.means.get(code, "not known")
         return self._error(
-            number, f"{code} is {here} on FANUC, and {there} on {self._dialect.control}: take it out, or say what it "
-            f'becomes there: emission.words = {{ "{code}" = "..." }}'
+            number, f"{code} is {here} on FANUC, and {there} on {self._dialect.control}: delete it, or state a "
+            f'replacement: emission.words = {{ "{code}" = "..." }}'
         )  # fmt: skip
 
 
 _BEHIND_THE_MOVE = {"M00", "M01", "M02", "M05", "M09", "M30"}
-_CURE = ": take it out of the program, or say what it becomes there (emission.words)"
+_CURE = ": delete it in the program, or state a replacement (emission.words)"
 
 
 def _arcs(program: Program) -> Iterator[tuple[int, _core.Segment]]:

@@ -92,7 +92,7 @@ class Written:
     restarts: list[CutRestarts]  # of each shaped region, as in `placed`
 
     def read_back(self, machine: Machine) -> Program:
-        """Read the text and hold it against the original; from then on it stands in the program that is given."""
+        """Read the emitted program and compare it with the original; the given program refers to it from then on."""
         for text, _ in self.texts:
             text.hand_over()
         emitted = read_back(self.parts, self.placed, machine)
@@ -247,7 +247,7 @@ class TextWriter:
         return replace(written, parts=parts, size=sum(map(len, parts)), blocks=blocks)
 
     def _numbered(self, shaped: EmittedRegion, before: Sequence[CutRestarts]) -> CutRestarts:
-        """The restart points of a region with N words that stand nowhere else in the program."""
+        """The restart points of a region, with N words that the program does not use elsewhere."""
         marks = shaped.restarts.marks
         if not marks:
             return shaped.restarts
@@ -271,7 +271,7 @@ class TextWriter:
         return Room(controller.max_program_bytes - size, controller.max_program_moves - moves, self._machine)
 
     def _ahead(self, aims: Mapping[int, Aim], on_moves: Callable[[float], None]) -> Prefetch[EmittedRegion]:
-        """Regions under way in the pool; one whose tolerance and feed are as in the text before is not shaped again."""
+        """Regions being shaped in the pool; one with the same tolerance and feed as before is not shaped again."""
         if self._started is not None and aims.items() <= self._started[0].items():
             prefetch = self._started[1]
             prefetch.on_progress = on_moves

@@ -1,4 +1,4 @@
-"""From a cutting region to the text of its shaped blocks: the lines around them and the places of marks."""
+"""Write the shaped blocks of a cutting region, with the lines around them and the positions of N words and comments."""
 
 from __future__ import annotations
 

@@ -131,7 +131,7 @@ class _Allowance:
         return self._stock.error(f"allowance.{key}", toml(getattr(self._keys, key)), limit)
 
     def _runs(self, paths: Sequence[_core.Path]) -> Iterator[Points]:
-        """Stretches of the paths below the top of the stock, in the plane, without points that repeat."""
+        """Parts of the paths below the top of the stock, projected to the plane, without repeated points."""
         top = self._keys.z_mm[1] - 1e-9
         for path in paths:
             points = path.polyline(self._step_rad(path))
@@ -302,7 +302,7 @@ def _quarter(distance_mm: float) -> int:
 
 
 def _placed(shape: Geometry, source: Geometry, distance_mm: float) -> Geometry:
-    """A shape with its corners moved to the distance from the line that it was offset from."""
+    """An offset shape whose corners are moved to the exact distance from the original line."""
     import shapely
 
     if shape.is_empty:

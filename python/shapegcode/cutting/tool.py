@@ -47,7 +47,7 @@ class WorkMaterial(TomlTable):
     )
     cutter: Text = key("what cut it")
     source: Text = key("where the values come from")
-    assumed: Text = key("what the source does not say and is assumed here; empty: nothing")
+    assumed: Text = key("values that the source does not give and that are assumed here; empty: none")
 
     @model_validator(mode="after")
     def _range_ascends(self) -> WorkMaterial:
@@ -183,13 +183,13 @@ class Cutter(TomlTable):
         default=None,
     )
     runout_um: tuple[Float, ...] | None = key(
-        "how far each flute stands out beyond the mean radius, one number per flute in the order in which they cut; "
-        "left out: none",
+        "radial runout: radius of each flute less the mean radius, one number per flute in the order in which they "
+        "cut; left out: none",
         default=None,
     )
     spindle: Literal["clockwise", "counter_clockwise"] | None = key(
-        'sense in which the spindle turns, "clockwise" (M03) or "counter_clockwise" (M04); left out: as the program '
-        "says, clockwise where it does not",
+        'sense in which the spindle turns, "clockwise" (M03) or "counter_clockwise" (M04); left out: as programmed '
+        "(M03, M04), else clockwise",
         default=None,
     )
 

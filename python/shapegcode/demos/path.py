@@ -58,7 +58,7 @@ class Statement:
 
 @dataclass(frozen=True)
 class PathRun:
-    """One way of driving the path."""
+    """One command for the path: unshaped or shaped."""
 
     time_s: float  # for the path
     time_increase_percent: float  # of it, over the unshaped
@@ -123,7 +123,7 @@ class PathDemo(Result):
         return "shapegcode convert YOUR.NC -m vx500 -o SHAPED.NC --plots plots"
 
     def tables(self) -> list[Table]:
-        """The statements; what the path costs and leaves in each way of driving it."""
+        """The statements; time and residual vibration for each command."""
         statements = (
             Column("place", left=True),
             Column("what", text=True),
@@ -163,7 +163,7 @@ def path_program(feed_mm_per_s: float, machine: Machine) -> Program:
 
 
 def ideal_command(path: _core.Path, machine: Machine, arc_feed_ratio: float) -> tuple[Any, _core.SimulationFigures]:
-    """The paper's own way: its minimal shaper in continuous time; set-points in mm every 10 us, and their figures."""
+    """The paper's method: its minimal shaper in continuous time; set-points in mm every 10 us, and their figures."""
     modes = [mode for axis in machine.axes.as_tuple() for mode in axis.modes]
     first, second = (_core.Mode(mode.frequency_hz, mode.damping_ratio) for mode in modes)
     designs = _core.minimal_two_mode(first, second, _LONGEST_IDEAL_S)

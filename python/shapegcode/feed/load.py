@@ -56,7 +56,8 @@ class PathLoad(Pair[Load]):
 def region_load(
     part: SurveyedRegion, plan: FeedPlan | None, written: _core.Path, *, before: Mover, after: Mover
 ) -> PathLoad | None:
-    """Load along a region as programmed and as written; None where engagement or spindle speed are not known."""
+    """Load along a cut for the original and the emitted program; None where engagement or spindle speed is not
+    known."""
     if part.track is None or part.tool is None or not part.spindle_rev_per_min > 0.0 or len(part.track) == 0:
         return None
     stations = np.asarray(part.track.s_mm)
@@ -100,7 +101,8 @@ def exceeded(tool: Tool, load: Load, machine: Machine) -> Iterator[tuple[str, st
 
 @dataclass(frozen=True)
 class FeedTraces:
-    """A schedule along the cutting path, all regions in a row; each value holds on the stretch before its station."""
+    """A schedule along the cutting path, all cuts in sequence; each value applies to the interval before its
+    station."""
 
     distance_mm: Vector  # where each stretch ends, (n,)
     length_mm: Vector  # of each stretch, (n,)

@@ -185,7 +185,8 @@ def _kept_segments(surveyed: SurveyedRegion, programmed: Vector, lowest: float, 
 def _limits_along(
     surveyed: SurveyedRegion, programmed: Vector, lowest: Vector, machine: Machine, margin: float
 ) -> tuple[Vector, npt.NDArray[np.str_], Vector]:
-    """Wanted feed on the stretch before each station, what holds it, and what the load allows there."""
+    """Desired feed in the interval before each station, the limit that determines it, and the feed that the load
+    allows."""
     tool, track = surveyed.tool, surveyed.track
     assert tool is not None and track is not None
     axes = machine.axes

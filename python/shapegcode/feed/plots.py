@@ -66,7 +66,7 @@ def _summary(schedule: FeedSchedule) -> str:
 
 
 def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
-    """What does the tool meet, how fast does it go, and what does it bear, before and after?
+    """Engagement, feed and load of the tool along the path, before and after.
 
     Long programs are drawn as bands between the least and the largest value of each stretch, so that no peak is lost.
 
@@ -127,7 +127,7 @@ def _feed_axis(panel: Axes, feeds: Vector) -> None:
 
 
 class _Along:
-    """Draws values over the distance: steps, or bands where stretches hold several stations."""
+    """Plot values over the distance: steps, or bands where an interval holds several stations."""
 
     def __init__(self, traces: FeedTraces, starts: npt.NDArray[np.intp]) -> None:
         self._starts = starts

@@ -34,7 +34,7 @@ _LIMIT_WORDS = {
 
 @dataclass(frozen=True)
 class FeedRange:
-    """Feeds from the lowest to the highest."""
+    """Range of feeds."""
 
     min: float  # lowest
     max: float  # highest
@@ -42,7 +42,7 @@ class FeedRange:
 
 @dataclass(frozen=True)
 class ResultantForce:
-    """The resultant in the XY plane over a stretch."""
+    """Resultant force in the XY plane over an interval."""
 
     mean: float  # over the time in material, of the mean over a revolution
     max: float  # largest of the peak in a revolution
@@ -191,7 +191,9 @@ class FeedSchedule(Result):
         unknown = [region for region in self.regions if region.misses and region.resultant_force_n is None]
         if unknown or any(move.load is None for move in self.moves):
             return "say what is not known: S in the program or feed.spindle_rev_per_min in the tool file"
-        return "take less material at once there, lower the feed of what stays as it was, or choose another limit"
+        return (
+            "take less material at once there, lower the feed of moves that are left unchanged, or choose another limit"
+        )
 
     @cached_property
     def traces(self) -> FeedTraces | None:
@@ -267,7 +269,7 @@ class FeedSchedule(Result):
     def _limit_table(self) -> Table:
         """The ranges of lines with the lowest feeds, in order."""
         slowest = sorted(self.limits, key=lambda entry: entry.feed_mm_per_min.min)[:_SHOWN_RANGES]
-        title = "what holds the feed"
+        title = "what limits the feed"
         if len(self.limits) > len(slowest):
             title += f" (the {len(slowest)} slowest of {len(self.limits)} ranges; --json has all)"
         columns = (

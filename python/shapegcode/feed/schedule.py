@@ -316,7 +316,7 @@ def _misses(
         line = int(part.region.path.segment_lines[part.track.segment[worst]])
         cause = ""
         if plan is None or plan.holds[worst] == KEPT:
-            cause = ", where the feed stays as it was: lower it yourself"
+            cause = ", where the feed is left unchanged: lower it in the program"
         elif plan.holds[worst] == MINIMUM:
             cause = ", at the least feed"
         message = f"{words} {float(values[worst]):.4g} {unit} in line {line}, limit {limit:.4g} {unit}{cause}"
@@ -412,7 +412,7 @@ def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[HeldLines]:
 
 
 def _feeds_of_segments(plan: FeedPlan, path: _core.Path) -> list[list[float]]:
-    """The programmed feeds of each segment."""
+    """Programmed feed of each segment."""
     ends = np.array([stretch.end_mm for stretch in plan.stretches])
     feeds = [stretch.feed_mm_per_min for stretch in plan.stretches]
     borders = np.concatenate(([0.0], path.segment_ends_mm))
@@ -433,8 +433,8 @@ def _warnings(surveyed: Survey, plans: Plans, moves: Sequence[KeptMove], machine
         own = limits_of(tool, machine, 0.0)
         if not any(np.isfinite(getattr(own, name)) for name in (*LOADS, "feed_per_tooth_mm")):
             yield (
-                f"tool {tool.tool.name}: no limit of force, deflection, torque or power is set, so nothing slows "
-                "its feed: set one of [limits] in its file; the column before shows what it takes now"
+                f"tool {tool.tool.name}: no limit of force, deflection, torque or power is set, so nothing limits its "
+                "feed: set one of [limits] in its file; the column before shows the present load"
             )
     for part, plan in zip(surveyed.regions, plans, strict=True):
         place = f"{program.place(part.region.first_line)}: {program.lines(part.region)}"
@@ -444,7 +444,7 @@ def _warnings(surveyed: Survey, plans: Plans, moves: Sequence[KeptMove], machine
             yield from _kept_blocks(program.place, part, plan)
             if plan.held_at_minimum.any():
                 yield (
-                    f"{place}: the limits ask for less than the least feed, which is what is written: take less "
+                    f"{place}: the limits need a feed below the lowest feed, which is written instead: take less "
                     "material at once"
                 )
     yield from (f"{move.place}: {miss}" for move in moves for miss in move.misses)

@@ -123,7 +123,7 @@ def left_by(modes: Sequence[IdentifiedMode], record: Record) -> float:
 
 
 def told_moves(mode: IdentifiedMode) -> dict[str, Estimate]:
-    """Of a mode, by axis, what the data tell from nothing."""
+    """The significant motions of a mode along other axes: those whose interval does not include zero."""
     if mode.moves is None:
         return {}
     named = zip(_AXES, mode.moves, strict=True)
@@ -170,7 +170,7 @@ def _amplitudes(
 
 @dataclass(frozen=True, eq=False)
 class _FreePart:
-    """A record behind its hit or stop, and by what its amplitudes are divided: the hammer's force at each pole."""
+    """A record after its impact or stop, and the divisor of its amplitudes: the hammer's force at each pole."""
 
     values: FloatArray  # (n,)
     period_s: float
@@ -222,13 +222,13 @@ def _beside(use: Record, records: Sequence[Record], files: Sequence[str]) -> Rec
 
 
 def _is_of_refused(each: Measured, found: Identification) -> bool:
-    """Whether it was recorded together with hits or stops none of which is used."""
+    """Whether it was recorded with impacts or stops none of which is used."""
     own = any(f"{each.source} ".startswith(f"{name} ") for name in found.files)
     return own and isinstance(each, Record) and not any(_same_file(use, each, found.files) for use in found.taps)
 
 
 def _same_file(use: Record, other: Record, files: Sequence[str]) -> bool:
-    """By the names of files, behind which channels and hits may stand."""
+    """Records by file name; the name may be followed by channel and impact."""
     return any(all(f"{each.source} ".startswith(f"{name} ") for each in (use, other)) for name in files)
 
 
@@ -256,7 +256,7 @@ def _in_time(part: _FreePart, poles: _Poles) -> _Amplitudes:
 
 
 def _decays(poles: _Poles, period_s: float, values: FloatArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Amplitudes of the modes at the first sample beside a straight line, their variance, and what is left."""
+    """Amplitudes of the modes at the first sample, fitted with a straight line, their variance, and the residual."""
     time_s = period_s * np.arange(len(values))
     waves = np.exp(time_s[:, None] * poles.in_plane)
     smooth = np.stack((np.ones(len(time_s)), np.linspace(-1.0, 1.0, len(time_s))), axis=1)

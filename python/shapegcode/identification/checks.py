@@ -88,7 +88,7 @@ _SAME_PERIOD = 1e-5
 
 
 def _mean_to_remove(values: FloatArray) -> float:
-    """Mean of a quiet stretch, 0 where it is within its own uncertainty."""
+    """Mean of a quiet interval; 0 if it is within its own uncertainty."""
     mean = float(np.mean(values))
     error = float(np.std(values)) / np.sqrt(len(values))
     return mean if abs(mean) > _OFFSET_ERRORS * error else 0.0
@@ -232,7 +232,7 @@ def _decay(record: Record, band_hz: float | None, start_s: float | None, warning
 
 
 def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s: float | None = None) -> Prepared:
-    """Divide recordings into hits, find where decays begin, and leave out what cannot be used."""
+    """Divide recordings into impacts, find the starts of decays, and leave out what cannot be used."""
     if not records:
         raise RecordError("no record: needed is at least one tap or decay")
     _refuse_mixture(records)
@@ -297,7 +297,7 @@ FOLDING = 0.8
 
 
 def is_clipped(values: FloatArray) -> bool:
-    """Whether a signal is cut off: three or more samples at its extreme, steeper beside it than a smooth peak is."""
+    """Whether a signal is clipped: three or more samples at its extreme, and steeper next to it than a smooth peak."""
     centred = values - np.median(values)
     largest = float(np.max(np.abs(centred)))
     if largest == 0.0:
@@ -332,7 +332,7 @@ def _is_flat_topped(signal: FloatArray) -> bool:
 
 
 def _run_around(inside: npt.NDArray[np.bool_], at: int) -> int:
-    """Length of the run of True that holds a place."""
+    """Length of the sequence of True around an index."""
     outside = np.flatnonzero(~inside)
     place = int(np.searchsorted(outside, at))
     before = int(outside[place - 1]) if place > 0 else -1
@@ -424,7 +424,7 @@ _MAD = 1.4826  # Normal noise: standard deviation over median absolute deviation
 
 @dataclass(frozen=True)
 class Hit:
-    """One hit of the hammer."""
+    """One impact of the hammer."""
 
     first: int  # first sample of the pulse
     peak: int  # sample of its largest force
@@ -457,7 +457,7 @@ def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
 
 
 def _has_rested(record: Record, noise: float, hit: Hit, next_hit: Hit) -> bool:
-    """Whether the response has died away between two hits, or down to its noise."""
+    """Whether the response has decayed between two impacts, or to its noise."""
     between = (record.response - np.median(record.response))[hit.end : next_hit.first]
     peak = float(np.max(np.abs(between)))
     power = float(np.mean(between[-max(1, len(between) // 10) :] ** 2)) - noise**2
@@ -465,7 +465,7 @@ def _has_rested(record: Record, noise: float, hit: Hit, next_hit: Hit) -> bool:
 
 
 def find_hits(record: Record) -> list[Hit]:
-    """The hits of a record, in their order; pulses of a bounce belong to the hit before."""
+    """The impacts of a record, in their order; pulses of a bounce belong to the impact before."""
     if record.force_n is None or not np.ptp(record.force_n) > 0.0:
         return []
     force = record.force_n - np.median(record.force_n)
@@ -491,7 +491,7 @@ def find_hits(record: Record) -> list[Hit]:
 
 
 def split_hits(record: Record) -> list[Record]:
-    """One record for each hit of a recording, each with some time before the hit; one hit alone stays as it is."""
+    """One record for each impact of a recording, with some time before it; a single impact is returned unchanged."""
     hits = find_hits(record)
     if len(hits) < 2:
         return [record]

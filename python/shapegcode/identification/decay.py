@@ -103,7 +103,8 @@ class _Scales:
 
 
 def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_samples: float) -> _Scales:
-    """What a decay tells of its modes: the slowest from its tail, where no command is left, the strongest from all."""
+    """Estimates of the modes of a decay: the slowest from its tail, after the command has ended, the strongest from all
+    of it."""
     rate = 1.0 / record.period_s
     tail = quiet[start + int(_TAIL * (end - start)) : end]
     peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= _MIN_TAIL else ()
@@ -117,7 +118,8 @@ def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_sample
 
 
 def _onset(quiet: FloatArray, scales: _Scales, start: int, end: int) -> int:
-    """Where the vibration has begun for certain: a period of the strongest one from there holds half of its power."""
+    """Sample at which the vibration has certainly started: a period of the strongest one from there holds half of its
+    power."""
     last = min(end, start + max(2, round(scales.window)))
     one = max(2, round(scales.strongest))
     short = _forward_rms(quiet[start : min(end, last + one)], one)

@@ -1,4 +1,5 @@
-"""Modes of frequency responses and of hits with many modes, each with its 95 % interval, or the reason why not."""
+"""Modes of frequency responses and of impacts with many modes, each with its 95 % interval, or the reason for its
+refusal."""
 
 from __future__ import annotations
 
@@ -153,7 +154,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
 
 
 def _all_opposed(found: FrfModes) -> bool:
-    """Whether the modes that stand out go against the push, all that is supported counted."""
+    """Whether the significant modes move against the force, counting all that are supported."""
     with_it = [_height(mode) for mode in found.modes if not mode.refusal]
     against = [_height(mode) for mode in found.modes if mode.refusal == OPPOSED]
     return sum(against) > sum(with_it)
@@ -230,7 +231,7 @@ def _of_responses(responses: Sequence[FrequencyResponse], applied_s: float | Non
 
 
 def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -> tuple[_Measured, Hits]:
-    """Hits with these responses as they are fitted."""
+    """The impacts with these responses, as they are fitted."""
     period = ready.records[0].period_s
     duration = min(len(each) for each in responses) * period
     excited = min(max(each.excited_hz or 0.0 for each in ready.usable), 0.45 / period)
@@ -245,7 +246,7 @@ def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -
 
 
 def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[FloatArray]]:
-    """Find modes in hits, and the model's response of each record."""
+    """Find modes in impacts, and the model's response for each record."""
     period = ready.records[0].period_s
     at_first = [steady_sines(each.record.response, period) for each in ready.usable]
     quiet = [each.record.response - sines for each, (sines, _) in zip(ready.usable, at_first, strict=True)]
@@ -276,7 +277,7 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
 
 
 def _left(measured: _Measured, hits: Hits, model: ComplexArray) -> ComplexArray:
-    """(hits, n) what a model leaves of the responses of hits, in the band."""
+    """(impacts, n) residual of the responses of impacts after a model, in the band."""
     return np.where(_inside(measured.parts[0], measured), hits.response - model * hits.force, 0.0)
 
 
@@ -468,7 +469,7 @@ def _logarithms(
 
 
 def _misfit(fit: ModalFit, parts: Sequence[Lines], index: int) -> float:
-    """How much more the fit leaves around a mode than in the whole window, in power; 1 where it leaves less."""
+    """Residual power of the fit around a mode over that in the whole window; 1 if it is smaller."""
     omega, width = float(fit.omega[index]), 2.0 * float(fit.zeta[index] * fit.omega[index])
     around, count = 0.0, 0
     for lines, left in zip(parts, fit.left, strict=True):
@@ -481,7 +482,7 @@ def _misfit(fit: ModalFit, parts: Sequence[Lines], index: int) -> float:
 def _scatter(
     window: Window, known: Uncertainty, index: int, measured: _Measured, change: FloatArray, scale: FloatArray
 ) -> FloatArray:
-    """Half widths from what single hits would have made of a mode; 0 where noise explains it."""
+    """Half widths of the intervals from the scatter of a mode between single impacts; 0 if noise explains it."""
     hits, fit, lines = measured.hits, window.fit, window.parts[0]
     assert hits is not None
     count = len(hits.force)

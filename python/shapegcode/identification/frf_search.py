@@ -43,7 +43,7 @@ _NO_VIBRATION = 0.5
 
 @dataclass(frozen=True)
 class StablePole:
-    """A pole that models of several orders have."""
+    """A pole that occurs in models of several orders (stabilisation)."""
 
     omega: float  # rad/s
     zeta: float
@@ -290,7 +290,7 @@ def _pruned(parts: Sequence[Lines], starts: Starts, share: float) -> Starts:
 
 
 def _split(parts: Sequence[Lines], fit: ModalFit, share: float, evidence: float) -> tuple[ModalFit, float] | None:
-    """The fit with two modes in place of one, where around it most is left for its width."""
+    """The fit with two modes instead of the one around which the residual is largest relative to its width."""
     left = []
     for omega, zeta in starts_of(fit):
         near = np.abs(parts[0].omega - omega) < 2.0 * zeta * omega
@@ -378,7 +378,8 @@ def _grown(
 
 
 def _twins(fit: ModalFit) -> bool:
-    """Whether two modes are one, drawn twice to make up for what is no mode, or one is no vibration."""
+    """Whether two modes are really one, fitted twice to compensate for something that is no mode, or one is no
+    vibration."""
     order = np.argsort(fit.omega)
     omega, zeta = fit.omega[order], fit.zeta[order]
     near = np.diff(omega) < _TWINS * np.maximum(zeta[1:], zeta[:-1]) * omega[1:]

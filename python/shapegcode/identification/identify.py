@@ -176,7 +176,7 @@ def _identified(
 def _refuse_of_sensors(
     capture: Path, options: ReadOptions, start_s: float | None, *, stops: bool, across: bool
 ) -> None:
-    """Refuse what is said of a sensor's record where a capture would silently go without it."""
+    """Refuse options for a sensor's record that would have no effect on a capture."""
     said = {each.name: getattr(options, each.name) != each.default for each in fields(options)} | {
         "start": start_s is not None, "stops": stops, "across": across, "axis": False,
     }  # fmt: skip
@@ -190,14 +190,14 @@ def _refuse_of_sensors(
 
 
 def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: bool = False) -> None:
-    """Refuse what is said of a decay or tap where it would silently change nothing."""
+    """Refuse options for a decay or impact that would have no effect."""
     for option, is_said in (("--stops", stops), ("--start", start_s is not None), ("--across", across)):
         if is_said:
             raise ArgumentError(f"{what}, in which {option} changes nothing: it goes with the record of a tap or decay")
 
 
 def _turned_if_opposed(ready: Prepared, found: Identification, sought: model_search.Sought) -> Identification:
-    """What was found; with the sign of the responses turned where all that stands out goes against the push."""
+    """The modes found; with the sign of the responses reversed if all significant modes move against the force."""
     if found.modes or not any(mode.refusal == model_search.OPPOSED for mode in found.refused):
         return found
     text = f"{ready.records[0].source}: {model_search.TURNED}"
@@ -323,7 +323,7 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sou
 
 
 def _few(ready: Prepared, problem: Taps, many: FrfModes, narrow: bool) -> int | None:
-    """Number of modes that explain the whole record, down to its noise, if a fit in time tells so few best."""
+    """Number of modes that explain the whole record to its noise, if a fit over time is best for so few."""
     starts = [
         (2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in many.modes if not mode.refusal
     ]
@@ -349,7 +349,8 @@ def _few(ready: Prepared, problem: Taps, many: FrfModes, narrow: bool) -> int | 
 
 
 def _of_similar_length(ready: Prepared) -> Prepared:
-    """The hits whose records are at least half as long as the longest: over frequency all are cut to the shortest."""
+    """The impacts whose records are at least half as long as the longest: over frequency all are cut to the
+    shortest."""
     longest = max(len(record.response) for record in ready.records)
     short = [each for each in ready.usable if 2 * len(each.record.response) < longest]
     return ready.without(short, "shorter than half of the longest record")
@@ -416,7 +417,7 @@ def _result(
         evidence=dict(enumerate(models.evidence)),
         fit_percent=0.0,
         noise_rms=float(np.sqrt(squares / sum(len(response) for response in problem.responses))),
-        reason="no mode stands out of the noise",
+        reason="no mode exceeds the noise",
         warnings=tuple(warnings),
         notes=(*ready.notes, *_thinned_note(ready, problem, sought.band_hz)),
         prepared=ready,
@@ -525,7 +526,7 @@ def _alone(problem: FitProblem, fit: Fit) -> list[Fit]:
 
 
 def _mass_check(problem: FitProblem, fit: Fit) -> MassCheck | None:
-    """The equivalent mass by paper 003's way, from the first tap, where the model has one mode."""
+    """The equivalent mass by paper 003's method, from the first impact, if the model has one mode."""
     if isinstance(problem, Decays) or len(fit.omega_rad_s) != 1 or problem.hold == "impulse":
         return None
     args = (

@@ -1,4 +1,4 @@
-"""Modes from the record of any accelerometer beside a program whose command is known.
+"""Modes from the record of any accelerometer during a program whose command is known.
 
 But for a smooth lag of the drive the sensor shows the command's acceleration times 1 - sum of G s²/(s² + 2 zeta omega s
 + omega²). Start and clock of the logger, and the waits of the control, are found from the record, part by part.
@@ -118,7 +118,7 @@ def find_modes_of_command(
     *,
     across: bool = False,
 ) -> Identification:
-    """Find the modes in records beside a known command, with `across` what they move of the sensor's other axes too."""
+    """Find the modes in records of a known command; with `across` their motion along the sensor's other axes, too."""
     if options.axis not in (None, command.axis):
         raise RecordError(
             f"axis {options.axis.upper()} is asked for, {command.source} moves {command.axis.upper()}: leave the axis "
@@ -182,7 +182,7 @@ def _aligned(
 
 
 def _held_at_ends(values: FloatArray) -> bool:
-    """Whether the largest or the smallest value stands for samples in a row, again and again."""
+    """Whether the largest or smallest value is repeated for several samples, more than once."""
     for end in (np.max(values), np.min(values)):
         at = np.flatnonzero(values == end)
         if np.count_nonzero(np.diff(at) == 1) > _HELD * len(values) and abs(end - np.median(values)) > 0.0:
@@ -429,7 +429,7 @@ class _Clock:
         self.places_s = self.places_s + _WAIT_GRID_S[int(np.argmax(agreed))] * late / (1.0 + self.rate)
 
     def _notes(self, rows: npt.NDArray[np.intp]) -> list[str]:
-        """What is said of the clock, and of parts that are not used."""
+        """Notes on the clock, and on parts that are not used."""
         first = int(rows[0])
         begins_s = self.places_s[first] - self.middles[first] / (1.0 + self.rate)
         waits = np.polyfit(rows, self.places_s[rows] * (1.0 + self.rate) - self.middles[rows], 1)[0]

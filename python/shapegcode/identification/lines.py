@@ -59,7 +59,7 @@ def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, lis
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """Hits behind one window, in the frequency domain."""
+    """Impacts with one window, in the frequency domain."""
 
     lines: Lines  # of all hits together (H1)
     force: ComplexArray  # (hits, n)
@@ -158,7 +158,7 @@ def smoothed(power: FloatArray) -> FloatArray:
 
 
 def neighbours_correlation(left: Sequence[ComplexArray]) -> ComplexArray:
-    """Correlation of what a fit leaves between lines 0, 1, 2, ... apart, as far as it stands out of chance."""
+    """Correlation of the residual between lines 0, 1, 2, ... apart, if it is significant."""
     power = sum(float(np.sum(np.abs(part) ** 2)) for part in left)
     count = sum(len(part) for part in left)
     found = [1.0 + 0.0j]

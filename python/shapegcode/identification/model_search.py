@@ -65,7 +65,7 @@ class Search:
 
 
 def search(problem: FitProblem, sought: Sought) -> Search:
-    """Fit models of 0, 1, 2, ... modes until the data ask for no more."""
+    """Fit models of 0, 1, 2, ... modes until a further mode is not significant."""
     squares = problem.squares
     evidence = [evidence_of(problem, None)]
     fits: list[Fit] = []
@@ -102,7 +102,7 @@ def chart_modes(problem: FitProblem) -> Iterator[Starts]:
 
 
 def chart_of(models: Iterable[tuple[int, Starts]]) -> tuple[ChartPole, ...]:
-    """Poles of models by ascending order, each held against the model before."""
+    """Poles of models by ascending order, each compared with the model before."""
     chart: list[ChartPole] = []
     before = np.empty((0, 2))
     for order, now in models:
@@ -129,7 +129,8 @@ def _pool(problem: FitProblem) -> Starts:
 
 
 def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None:
-    """The best fit with one mode more, from peaks of what the last one leaves and the pole that explains most."""
+    """The best fit with one mode more, started from peaks of the last residual and the pole that explains most of
+    it."""
     so_far = [] if last is None else starts_of(last)
     candidates: list[Starts] = []
     for omega in problem.peaks_left(last):
@@ -191,7 +192,7 @@ OPPOSED = "moves against the push of the hammer: hammer and sensor are not at th
 
 @dataclass(frozen=True, eq=False)
 class Doubts:
-    """What a mode must stand up to."""
+    """Limits that a mode must meet."""
 
     limit_percent: float  # least certainty of damping ratio and stiffness
     band_hz: tuple[float, float]  # frequencies that were searched
@@ -349,7 +350,7 @@ def lasting_refusal(lasting: float, record_s: float) -> str:
 
 
 def interval_refusal(mode: IdentifiedMode, limit_percent: float, folded_percent: float = 0.0) -> str:
-    """Why an interval is too wide; empty if none is. `folded_percent`: of the force, from above half the rate."""
+    """Reason why an interval is too wide; empty if none is. `folded_percent`: aliased part of the force."""
     limits = (
         ("frequency", mode.frequency_hz, min(_FREQUENCY_PERCENT, limit_percent)),
         ("damping ratio", mode.damping_ratio, limit_percent),

@@ -209,8 +209,8 @@ def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
         named = zip(_AXES, machine.axes.as_tuple(), strict=True)
         recordings = tuple(recording_for(name, _modes(axis)) for name, axis in named)
         about = (
-            f"Lengths follow from the modes of the machine file (an axis without modes: {usual}); every axis is looked "
-            f"at up to {_LOOK_LEAST_HZ:g} Hz or more, as there may be modes that the file does not state."
+            f"Lengths follow from the modes of the machine file (an axis without modes: {usual}); every axis is "
+            f"measured up to {_LOOK_LEAST_HZ:g} Hz or more, as there may be modes that the file does not state."
         )
     dwell_s = max(_LONG_STOP_S, 2.0 * max(how.duration_s for how in recordings))
     ways = [_stop_distance_mm(machine, index) for index in range(len(_AXES))]

@@ -332,6 +332,6 @@ def _first_below(envelope: FloatArray, level: float) -> int:
 
 
 def _last_seen(fitted: FloatArray) -> int:
-    """The last sample that is worth drawing."""
+    """The last sample that a plot shows."""
     large = np.flatnonzero(np.abs(fitted - fitted[-1]) > _SEEN * np.abs(fitted).max())
     return int(large[-1]) if len(large) else len(fitted) - 1

@@ -52,7 +52,7 @@ class _OverTime:
         return _core.stabilisation_poles(self.responses, most, self.forces)
 
     def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
-        """Ranks of the candidates that explain most, beside those that are kept."""
+        """Indices of the candidates that explain most in addition to those already chosen."""
         omega, zeta = np.array(candidates).T
         ranking = _core.rank_modes(
             self.responses, self.period_s, omega, zeta, kept + 1, self.forces, self.quantity, kept
@@ -258,7 +258,7 @@ class Thinned:
 
 
 def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
-    """Up to where a tap must be sampled; what stands out of the response above the band is fitted along."""
+    """Highest frequency at which an impact must be sampled; peaks of the response above the band are fitted, too."""
     excited = max(each.excited_hz or 0.0 for each in ready.usable)
     margin = _MARGIN
     if are_blows(ready):  # they excite all that the rate holds

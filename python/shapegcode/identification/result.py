@@ -296,7 +296,7 @@ class Identification(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether there are modes to use, and all that stands out of the noise is supported or left out."""
+        """Whether there are modes to use, and every peak above the noise is supported or left out."""
         return bool(self.modes) and not self._unsupported and not self.doubt
 
     @property
@@ -317,7 +317,11 @@ class Identification(Result):
     def answer(self) -> str:
         """Whether to use it or why not, the frequencies, and how well the model explains the records."""
         if not self.modes:
-            why = "what stands out is not supported by the data, the table says why" if self.refused else self.reason
+            why = (
+                "the peaks are not supported by the data, see the table for the reasons"
+                if self.refused
+                else self.reason
+            )
             return f"do not use: no mode in {', '.join(self.files)}: {why}"
         count = f"{len(self.modes)} mode{'' if len(self.modes) == 1 else 's'}"
         axis = "" if self.axis is None else f" of the {self.axis.upper()} axis"
@@ -333,7 +337,7 @@ class Identification(Result):
         if self.sweep is not None and self.sweep.command and (self._unsupported or self.doubt or not self.modes):
             return "sweep again, for longer or with more acceleration (shapegcode sweep), or tap"
         if not self.modes:
-            return "shapegcode identify --tap-plan says how to do the test"
+            return "shapegcode identify --tap-plan describes the test"
         if self._unsupported or self.doubt:
             return "tap again, longer or more often, for what is not supported (shapegcode identify --tap-plan)"
         if self.machine_file is not None:
@@ -403,9 +407,9 @@ def _estimate(name: str, factor: float = 1.0) -> Any:
 def by_support(found: Sequence[IdentifiedMode]) -> dict[str, Any]:
     """The modes that the data support, those that they do not, and why there is no mode (empty: there is)."""
     modes, refused = (tuple(mode for mode in found if bool(mode.refusal) == bad) for bad in (False, True))
-    reason = "" if modes else "no mode stands out of the noise"
+    reason = "" if modes else "no mode exceeds the noise"
     if refused and not modes:
-        reason = "what stands out is not supported by the data: " + "; ".join(
+        reason = "the peaks are not supported by the data: " + "; ".join(
             f"{mode.frequency_hz.value:.4g} Hz: {mode.refusal}" for mode in refused
         )
     return {"modes": modes, "refused": refused, "reason": reason}

@@ -139,7 +139,7 @@ def _fit(frequency: FloatArray, power: FloatArray, starts: list[tuple[float, ...
 
 
 def _next(frequency: FloatArray, power: FloatArray, last: _Model) -> _Model:
-    """The best model with a mode more, begun where the last one leaves most."""
+    """The best model with one mode more, started where the last residual is largest."""
     rows = [tuple(row) for row in np.exp(last.parameters[2:].reshape(-1, 3))]
     left = np.log(power) - _log_power(last.parameters, frequency)
     smooth = np.convolve(left, np.ones(5) / 5.0, "same")

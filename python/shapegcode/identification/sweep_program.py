@@ -236,7 +236,7 @@ class _Stroke:
 
 
 class _Planner:
-    """Strokes of an axis by frequency."""
+    """Plan the moves of an axis by frequency."""
 
     def __init__(self, machine: Machine, axis: str, travel_mm: float, share: float) -> None:
         limits = getattr(machine.axes, axis)

@@ -83,7 +83,7 @@ def update_machine(path: str | Path, found: Identification, *, keep_modes: str =
 
 
 def check_updatable(path: str | Path) -> Machine:
-    """Tell before the work what would make `update_machine` fail whatever the modes."""
+    """Check, before the calculation, what would make `update_machine` fail whatever the modes."""
     if isinstance(path, str) and path in Machine.builtin_names():
         raise ArgumentError(
             f"{path} is a built-in machine, which stays as it is: shapegcode machine init {path} -o mine.toml makes a "
@@ -152,7 +152,7 @@ def open_modes(machine: Machine, measured: str | None) -> dict[str, str]:
 
 
 def require_decisions(open_axes: Mapping[str, str], keep: str, rigid: str, file: str) -> None:
-    """Refuse modes over which nobody decided."""
+    """Refuse modes of other axes without a decision (--keep-modes, --rigid)."""
     check_axes(keep, rigid)
     undecided = {axis: modes for axis, modes in open_axes.items() if axis not in keep + rigid}
     if undecided:
@@ -165,7 +165,7 @@ def require_decisions(open_axes: Mapping[str, str], keep: str, rigid: str, file:
 
 
 def decide_axes(text: str, keep: str, rigid: str, file: str) -> tuple[str, list[str]]:
-    """Take the modes of rigid axes out of a file, and say of kept ones that they are."""
+    """Delete the modes of rigid axes from a file, and mark those of other axes as kept."""
     notes: list[str] = []
     for axis in rigid:
         tables = ModeTables(text, axis, "", file)
@@ -251,13 +251,13 @@ class ModeTables:
         self._tell_sum(modes)
         said = self.data["axes"][self.axis].get("rigid")
         if said:
-            self.notes.append("it was said to be rigid: that is taken back")
+            self.notes.append("it was marked as rigid: the mark is removed")
         if said or (said is False and self._remarks.get(f"axes.{self.axis}.rigid", "").startswith("assumed")):
             self._say_rigid(False, "a mode was measured")
         return self._finished([*stay, *added])
 
     def make_rigid(self) -> str:
-        """The text without modes of the axis, which is said to be rigid."""
+        """The file without modes of the axis, which is marked as rigid."""
         _, left = self._old_tables({}, {}, "it is taken as rigid")
         entries = self.home.value.body
         place = next((n for n, (key, item) in enumerate(entries) if _is_modes(key, item)), len(entries))
@@ -332,7 +332,7 @@ class ModeTables:
         entries = table.value.body
         values = self._values(mode)
         if mode.moves is not None and "moves" in old:
-            values = {"moves": ({self.axis: 1.0}, "no other axis is told from nothing")} | values
+            values = {"moves": ({self.axis: 1.0}, "no motion along another axis is significant")} | values
         kept = ["participation " + toml(old.get("participation", 1.0))]
         stated = old.get("frequency_uncertainty_percent")
         if stated is not None and _MEASURED not in table["frequency_uncertainty_percent"].trivia.comment:
@@ -390,7 +390,7 @@ class ModeTables:
         return {key: values[key] for key in _KEYS if key in values} | self._moves(mode)
 
     def _moves(self, mode: IdentifiedMode) -> dict[str, tuple[Any, str]]:
-        """What a mode moves of other axes, where that was measured and is told from nothing."""
+        """The motion of a mode along other axes, if it was measured and is significant."""
         told = {letter: each for letter, each in told_moves(mode).items() if abs(each.value) >= LEAST_MOVE}
         if len(told) < 2:
             return {}

@@ -37,7 +37,7 @@ def named_errors(path: str | Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
-    """A stream whose content takes the place of a file when the block ends well; otherwise the file stays as it was.
+    """A stream whose content replaces a file when the block ends without an error; otherwise the file is unchanged.
 
     A symbolic link is followed, but not round in a circle; a device or pipe is written to directly.
     """
@@ -73,7 +73,7 @@ def _target_of(path: str | Path) -> Path:
 
 
 def is_temporary(path: str | Path) -> bool:
-    """Whether a file has the name of one that was being written and never took its place: its process was killed."""
+    """Whether a file is a temporary one whose process was killed before it replaced the target."""
     return _TEMPORARY.fullmatch(Path(path).name) is not None
 
 

@@ -18,7 +18,7 @@ from shapegcode.io.units import Measured, Unit, find_unit, is_foreign_unit, unit
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a name stands for."""
+    """The meaning of a column name."""
 
     what: str  # the quantity under the name that the reader of the file gives it, such as "fx"
     measures: Measured | Literal["response"]  # its kind; "response" for a response of unknown kind

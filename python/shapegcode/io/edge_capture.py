@@ -254,7 +254,7 @@ class EdgeCapture:
         return bool(np.any(np.abs(self.position(axis) - self.column("DES_POS", axis)) > TURN_DEG / 2.0))
 
     def speed(self, axis: int | str, *, actual: bool = False) -> FloatArray:
-        """Speed of an axis: differences of its position over two cycles, over one at the ends of a stretch.
+        """Speed of an axis: differences of its position over two cycles, over one at the ends of a section.
 
         Args:
             axis: number or label.

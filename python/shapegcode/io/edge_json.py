@@ -113,7 +113,7 @@ def _counters(
     steps = np.diff(raw)
     over = steps < -COUNTER_RANGE / 2
     if over.any():
-        notes.append(f"the counter begins anew at 0 behind {int(raw[np.flatnonzero(over)[0]])}: counted on")
+        notes.append(f"the counter starts again at 0 after {int(raw[np.flatnonzero(over)[0]])}: counted on")
     counter = raw.astype(np.int64)
     counter[1:] += COUNTER_RANGE * np.cumsum(over)
     repeated = np.flatnonzero(np.diff(counter) == 0) + 1
@@ -135,7 +135,7 @@ def _counters(
 EVENTS = ("HFBlockEvent", "HFCallEvent", "HFTimestamp")
 """Entries of a payload that are one event each."""
 COUNTER_RANGE = 1 << 31
-"""Behind its last number the counter begins anew at 0."""
+"""After its last number the counter starts again at 0."""
 _APART_S = 0.5
 
 
@@ -200,7 +200,7 @@ class Events:
         """Counter and time of an event."""
         counter = _integer(where, event, "HFProbeCounter")
         if counter is None:
-            raise RecordError(f"{where}.HFProbeCounter is missing: nobody knows when it was")
+            raise RecordError(f"{where}.HFProbeCounter is missing: the time is unknown")
         if self.start - counter > COUNTER_RANGE // 2:
             counter += COUNTER_RANGE  # it began anew at 0 after the first sample
         return counter, (counter - self.start) * self.cycle_s
@@ -486,7 +486,9 @@ def edge_runs(path: Path) -> Iterator[RunLog]:
     capture = read_edge_json(path)
     count = Counter(block.path for block in capture.blocks if block.line is not None)
     if not count:
-        raise RecordError(f"{path}: no block events (HFBlockEvent) with a line: nobody knows what ran; record them")
+        raise RecordError(
+            f"{path}: no block events (HFBlockEvent) with a line: the executed lines are unknown; record them"
+        )
     program = count.most_common(1)[0][0]
     blocks = [block for block in capture.blocks if block.path == program and block.line is not None]
     notes = list(capture.notes)

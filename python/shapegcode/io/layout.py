@@ -155,7 +155,7 @@ class Layout:
 
     @property
     def delimiter_name(self) -> str:
-        """For messages."""
+        """Name of the delimiter, for messages."""
         return _NAMES[self.delimiter]
 
 

@@ -24,7 +24,7 @@ _NO_TEXT = (".uff", ".unv", ".uf", ".uf58", ".wav", ".wave")
 
 
 def read_records(path: str | Path, options: ReadOptions | None = None) -> list[Record]:
-    """Read a file: CSV or other text columns, UFF (dataset 58, text or binary) or WAV, told apart by its content."""
+    """Read a file: CSV or other text columns, UFF (dataset 58, text or binary) or WAV, recognized by its content."""
     path = Path(path)
     options = options or ReadOptions()
     head = _head(path)

@@ -142,7 +142,7 @@ class Track:
         return self.times[-1] if self.times else -math.inf
 
     def add_text(self, time: float, text: bytes) -> None:
-        """Take a value of text."""
+        """Add a text value."""
         assert self.texts is not None
         self.times.append(time)
         self.texts.append(text.decode("utf-8", errors="replace").strip())
@@ -201,7 +201,7 @@ class RunPart:
     has_status: bool = True
 
     def restarted(self, tracks: Sequence[Track]) -> Iterator[RunPart]:
-        """Divide it where the program began anew after a stop, without a word of its end."""
+        """Divide it where the program started again after a stop, without an end in the log."""
         rest = self
         for hold in self.holds:
             if hold.end is None or not hold.resumed[0] or not _began_anew(hold, rest, tracks):
@@ -276,7 +276,7 @@ def run_of(part: RunPart, tracks: Sequence[Track], feed_unit: str | None, notes:
 
 
 def _compare_clocks(part: RunPart, runtime: Signal | None, notes: FileNotes) -> None:
-    """The control's own count of seconds against the clock of the log."""
+    """Compare the control's own timer with the clock of the log."""
     if runtime is None or part.cut_start or part.cut_end or not part.has_status:
         return
     counted, clock = float(runtime.value[-1]), part.end - part.start
@@ -301,7 +301,7 @@ def _best(part: RunPart, tracks: Sequence[Track], role: Role, notes: FileNotes) 
 
 
 def _text_values(part: RunPart, tracks: Sequence[Track], role: Role) -> Iterator[tuple[Item, list[tuple[float, str]]]]:
-    """The values of text until the end of a run, by item, the best name first; those without anything left out."""
+    """The text values until the end of a run, by item, preferred names first; items without values are left out."""
     for track in sorted((track for track in tracks if track.item.role == role), key=lambda each: each.item.rank):
         pairs = zip(track.times, track.texts or (), strict=True)
         yield (

@@ -102,7 +102,7 @@ class _Chooser:
         return _Column(index, label, unit.factor, next(each for each in _RESPONSES if each == unit.measures))
 
     def _volts(self, index: int) -> float:
-        """Volts of 1 in a column of a sensor whose sensitivity is stated."""
+        """Scale of a column to volts, for a sensor whose sensitivity is stated."""
         label = self.labels[index]
         factor = None if label.unit is not None else volts_of(label.unknown_unit)
         if factor is None:
@@ -295,7 +295,11 @@ def read_sweep(path: Path, options: ReadOptions) -> Record:
     told = options.axis or _axis_of_name(path.name)
     records = read_csv(path, replace(klipper_options(options), axis=told))
     record = max(records, key=lambda each: float(each.response.std()))
-    note = () if told else (f"{path}: the axis is not told: {(record.axis or '').upper()} moved most (--axis says it)",)
+    note = (
+        ()
+        if told
+        else (f"{path}: the axis is not stated: {(record.axis or '').upper()} moved most (state it with --axis)",)
+    )
     return replace(record, source=str(path), notes=(*record.notes, *note))
 
 

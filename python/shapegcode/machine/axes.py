@@ -20,7 +20,7 @@ class Drive(TomlTable):
     screw_lead_mm: Positive = key(
         "travel for one turn of the motor: lead of the ball screw, times the gear ratio where there is one"
     )
-    table_mass_kg: Positive = key("moving mass: table or slide with what it carries")
+    table_mass_kg: Positive = key("moving mass: table or slide with its load")
     stiffness_n_per_um: Positive = key(
         "axial stiffness from motor to table: screw, nut, bearings and coupling in series"
     )
@@ -28,7 +28,8 @@ class Drive(TomlTable):
         "damping ratio of motor against table on that stiffness", assumed=0.05
     )
     backlash_um: NonNegative = key(
-        "free travel between motor and table (a ball bar shows it together with the stretch of the screw); 0: none",
+        "free travel between motor and table (a ball bar shows it together with the elastic windup of the screw); 0: "
+        "none",
         assumed=0.0,
     )
     position_feedback: Literal["motor", "table"] = key(
@@ -136,7 +137,7 @@ class FrequencyOver(InlineTable):
 
     @property
     def abscissa_name(self) -> str:
-        """Key that the rows are counted along."""
+        """Key of the independent variable of the rows."""
         return "position_mm" if self.mass_kg is None else "mass_kg"
 
     @property
@@ -180,7 +181,7 @@ class AxisMode(TomlTable):
     )
     excited_by: Direction | None = key(
         "shares of the accelerations of X, Y and Z that excite this mode, { y = 1, z = 0.2 }; left out: that of its "
-        "axis alone, { y = 1 } under axes.y. A mode that several axes excite stands at one of them",
+        "axis alone, { y = 1 } under axes.y. A mode that several axes excite is listed under one of them only",
         default=None,
     )
     moves: Direction | None = key(
@@ -189,13 +190,12 @@ class AxisMode(TomlTable):
         default=None,
     )
     frequency_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
-        "the frequency may be off by this much either way (position of the table, weight of the workpiece); "
-        "left out: not known. Only the nominal frequency is designed for then, and up to 0.2 %",
+        "uncertainty of the frequency, up and down (position of the table, mass of the workpiece); left out: not "
+        "known. With no value, or up to 0.2 %, the shaper is designed for the nominal frequency only",
         default=None,
     )
     damping_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
-        "the damping ratio may be off by this much of itself either way; left out: not known, and the ratio is taken "
-        "as exact",
+        "uncertainty of the damping ratio, up and down, relative; left out: not known, and the ratio is taken as exact",
         default=None,
     )
     mass_kg: Positive | None = key(
@@ -203,7 +203,7 @@ class AxisMode(TomlTable):
         "frequency_hz)^2. Shapers do not need it; left out: not measured",
         default=None,
     )
-    mass_uncertainty_percent: NonNegative | None = key("the mass may be off by this much either way", default=None)
+    mass_uncertainty_percent: NonNegative | None = key("uncertainty of the mass, up and down", default=None)
     source: Text | None = key("where the values of this mode come from", default=None)
     frequency_over: FrequencyOver | None = key(
         'table of the frequency over the position of an axis, { axis = "z", position_mm = [0, 200, 400], '
@@ -256,8 +256,8 @@ class Axis(TomlTable):
         "vibration modes, one table each; none: the axis is taken as rigid", default=()
     )
     rigid: Bool = key(
-        "no vibration mode of this axis counts: looked for and not found, or decided. false, and no modes: nobody "
-        "knows; the axis is taken as rigid, and every verdict says so",
+        "this axis has no significant vibration mode: none was found in a test, or so decided. false, and no modes: "
+        "not known; the axis is simulated as rigid, and every verdict says so",
         default=False,
     )
     drive: Drive | None = key(

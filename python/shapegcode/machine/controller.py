@@ -29,15 +29,16 @@ class Controller(TomlTable):
     """How the controller turns blocks into set-points, and what it accepts."""
 
     kind: ControllerKind = key(
-        'whose planner executes programs. "fanuc": as the keys below say. "linuxcnc", "klipper", "grbl": by the rules '
-        "of that control, from the limits of the axes and the table of its name; shaped programs too, since it cannot "
-        "be switched off. motion, law, corner_rule and their keys are then those by which the shaped motion is planned",
+        'control whose planner executes programs. "fanuc": by the keys below. "linuxcnc", "klipper", "grbl": by the '
+        "rules of that control, with the limits of the axes and the table of its name; shaped programs too, since its "
+        "planner cannot be switched off. motion, law, corner_rule and their keys are then used only to plan the "
+        "shaped motion",
         default="fanuc",
     )
     dialect: Literal["auto", "fanuc", "linuxcnc", "haas", "siemens"] = key(
-        'in whose words programs are read. "auto": told by words that one control alone knows, and a warning says '
-        "which; where none tells, LinuxCNC's with kind = \"linuxcnc\", else FANUC's. A program with words of another "
-        "control than this says is refused",
+        'dialect in which programs are read. "auto": recognized by words that only one control has, and a warning '
+        "names the word; without such a "
+        "word LinuxCNC's with kind = \"linuxcnc\", else FANUC's. A program with words of another control is refused",
         default="auto",
     )
     linuxcnc: LinuxcncPlanner | None = key(
@@ -49,11 +50,11 @@ class Controller(TomlTable):
     grbl: GrblPlanner | None = key('settings of kind = "grbl"; left out: the control\'s own defaults', default=None)
     interpolation_period_s: Annotated[Positive, Field(le=0.1)] = key("time between two set-points", assumed=0.001)
     block_time_s: Annotated[NonNegative, Field(le=1)] = key(
-        "shortest time in which the controller can take in a block; emitted blocks are not shorter", assumed=0.005
+        "shortest time in which the control can execute a block; emitted blocks are not shorter", assumed=0.005
     )
     block_end: Literal["ceil", "carry"] = key(
         '"ceil": each block starts with an interpolation period; "carry": the remainder of a period is '
-        "carried into the next block. The round trip is judged under both",
+        "carried into the next block. The verdict covers both",
         assumed="ceil",
     )
     motion: Literal["look_ahead", "after_interpolation"] = key(
@@ -91,7 +92,7 @@ class Controller(TomlTable):
         'what look-ahead does at corners. "speed_difference": no axis changes its speed by more than '
         'corner_speed_difference_mm_per_min (FANUC); "junction_deviation": it passes as an arc within '
         'junction_deviation_mm (GRBL and others); "stops": it stops where the direction turns by '
-        "corner_stop_angle_deg. Programs are written for a FANUC control, whatever it says",
+        "corner_stop_angle_deg. Programs are written for a FANUC control with every value",
         fanuc="1783",
         default="speed_difference",
     )
@@ -225,8 +226,8 @@ class Controller(TomlTable):
         default=4_000_000,
     )
     max_program_moves: Annotated[int, Strict(), Field(ge=1, le=10**9)] = key(
-        "moves that a program may come to, with the pecks of drilling cycles, dwells and blocks with M, S, T, and "
-        "moves of what is written",
+        "largest number of moves of a program, with pecks of drilling cycles, dwells and blocks with M, S, T; and of "
+        "the emitted program",
         unit="moves",
         default=100_000_000,
     )
@@ -240,7 +241,7 @@ class Controller(TomlTable):
         default=1_000_000_000,
     )
     max_expansion_bytes: Annotated[int, Strict(), Field(ge=1, le=4 * 10**9)] = key(
-        "by how much the expanded program (macros, calls, modes resolved) may be longer than the text",
+        "by how much the expanded program (macros, calls, modes resolved) may be larger than the program",
         default=33_554_432,
     )
     max_program_s: Annotated[Positive, Field(le=1e9)] = key(
@@ -371,11 +372,11 @@ class OpenTime(TomlTable):
 
 
 class Times(TomlTable):
-    """What takes time beside the motion."""
+    """Times in addition to the motion."""
 
     program_start_s: Seconds = key("from the start key to the first block", assumed=0.0)
     last_tool_in_spindle: Bool = key(
-        "parts are made in series: the last tool of a program is in the spindle when it starts anew, and an M06 that "
+        "parts are made in series: the last tool of a program is in the spindle when it starts again, and an M06 that "
         "calls it changes nothing; false: every M06 changes",
         assumed=False,
     )
@@ -390,13 +391,12 @@ class Times(TomlTable):
         "M codes with a time of their own, { code = [1, 8], s = [0.3, 5.1] }; left out: none", default=None
     )
     spindle_start: SpindleTimes | None = key(
-        "time in which the spindle comes from rest to a speed, { rpm = [5000, 12000], s = [1.0, 7.3] }; it passes "
-        "while the axes move, and what is left is waited for before the next M code or cut; left out: none",
+        "time in which the spindle comes from rest to a speed, { rpm = [5000, 12000], s = [1.0, 7.3] }; it elapses "
+        "while the axes move; the control waits for the remainder before the next M code or cut; left out: none",
         default=None,
     )
     spindle_stop: SpindleTimes | None = key(
-        "likewise to rest behind M05; what is left is waited for by M00, M01, M02, M30, M06 and the next M03; left "
-        "out: none",
+        "likewise to rest after M05; M00, M01, M02, M30, M06 and the next M03 wait for the remainder; left out: none",
         default=None,
     )
     unknown_move_s: AxisTimes = key(

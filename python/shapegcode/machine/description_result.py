@@ -61,9 +61,9 @@ class MachineDescription(Result):
         name, count = self.machine["name"], len(self._open())
         if self.program is None:
             if not count:
-                return f"{name}: every value is said"
+                return f"{name}: every value is stated"
             sentence = f"{count} of {len(self.keys)} values are assumed or inherited"
-            return f"{name}: {sentence}; --for part.nc ranks them by what they do to your program"
+            return f"{name}: {sentence}; --for part.nc ranks them by their effect on your program"
         if not self.matters:
             return f"{name}: none of {count} unverified parameters matters for {Path(self.program).name}"
         first = self.matters[0]
@@ -83,7 +83,7 @@ class MachineDescription(Result):
             how = "`shapegcode identify --tap-plan`" if ".modes" in key else "docs/howto/characterize.md"
             return f"measure {key} first: {how} says how."
         if self._open() and self.program is None:
-            return f"`shapegcode machine show {self.source} --for part.nc` ranks them by what they do to your program."
+            return f"`shapegcode machine show {self.source} --for part.nc` ranks them by their effect on your program."
         return f"use it: shapegcode convert IN -m {self.source} -o OUT."
 
     def tables(self, *, everything: bool = True) -> list[Table]:
@@ -238,10 +238,10 @@ class MachineDifference(Result):
         """The one thing to do next, in one sentence."""
         if self.ok:
             return "nothing: programs come out the same on both."
-        return f"`shapegcode machine show {self.second}` says what each key means."
+        return f"`shapegcode machine show {self.second}` explains each key."
 
     def tables(self) -> list[Table]:
-        """The keys that differ, those of one table of the file below its name."""
+        """The keys that differ, grouped by table of the file."""
         rows = list(_by_table(self.different))
         columns = (
             _KEY,

@@ -23,7 +23,7 @@ _LONGEST_NAME = 60
 _MAX_DUMP_BYTES = 16 << 20
 _CLAMP = "read, but not the smallest of the clamps 1422, 1430, 1432 for any axis"
 _NO_KEY = {
-    1020: "read: it says which of A1, A2, ... is X, Y, Z; no key holds it",
+    1020: "read: it determines which of A1, A2, ... is X, Y, Z; no key stores it",
     **dict.fromkeys((1422, 1430, 1432), _CLAMP),
 }
 """Why a parameter that was read made no key, where there is more to say."""
@@ -98,7 +98,7 @@ def _started(base: Machine | None, name: str | None, file: str) -> dict[str, Any
     own = re.sub(r"[ _.-]*(CNC[ _-]?PARA\w*)?$", "", stem, flags=re.IGNORECASE) or stem
     data["name"] = (name or own or "machine")[:_LONGEST_NAME]
     data["description"] = f"read from {Path(file).name}" + (
-        f"; what it does not say is from {base.name}" if base else ""
+        f"; parameters that it does not contain are from {base.name}" if base else ""
     )
     return data
 
@@ -149,7 +149,7 @@ def _remark_the_rest(draft: Draft, machine: Machine, base: Machine | None) -> No
 
 
 def _assume_limits(draft: Draft) -> None:
-    """Acceleration and feed limits that a control without them keeps by its time constants."""
+    """Limits of acceleration and feed for a control without such parameters, from its time constants."""
     ramp_s = draft.get("controller.time_constant_s")
     for axis in "xyz":
         feed_key, acceleration_key = f"axes.{axis}.max_feed_mm_per_min", f"axes.{axis}.max_acceleration_mm_s2"
@@ -158,7 +158,7 @@ def _assume_limits(draft: Draft) -> None:
             draft.assume_key(feed_key, rapid, "no 1422 or 1430: the rapid rate")
         feed = draft.get(feed_key)
         if feed and ramp_s and draft.get(acceleration_key) is None:
-            why = "no 1660: what the largest cutting feed asks for within the time constant after interpolation"
+            why = "no 1660: acceleration for the largest cutting feed with the time constant after interpolation"
             draft.assume_key(acceleration_key, round(feed / 60.0 / ramp_s, 3), why)
 
 

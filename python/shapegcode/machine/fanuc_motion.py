@@ -281,5 +281,5 @@ def _systems(draft: Draft, tables: ControlTables) -> None:
 def _put(draft: Draft, tables: ControlTables, group: str, key: str, value: object, count: int) -> None:
     file, first, last = tables.sources[group]
     draft.put(key, value)
-    draft.remarks[key] = f"FANUC {file}: as it was when it was punched"
+    draft.remarks[key] = f"FANUC {file}: state at the time of punching"
     draft.tables.append(ReadTable(file, first, last, key, count))

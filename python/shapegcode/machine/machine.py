@@ -95,7 +95,7 @@ class Machine(TomlTable):
                 "controller.block_time_s",
                 self.controller.block_time_s,
                 f"must not be below {toml(shortest)} with emission.dialect = {toml(self.emission.dialect)}: "
-                f"{own.facts['least block'].text}",
+                f"{own.facts['shortest block'].text}",
             )
         emission = self.emission
         written = {
@@ -111,7 +111,7 @@ class Machine(TomlTable):
                         f"emission.{name}",
                         list(lines),
                         f"{code} is {fanuc_meaning(code)} on FANUC, and {own.means[code]} on {own.control}: "
-                        f"these lines are in the words of emission.dialect = {toml(self.emission.dialect)}",
+                        f"these lines are written for emission.dialect = {toml(self.emission.dialect)}",
                     )
         return self
 
@@ -123,7 +123,7 @@ class Machine(TomlTable):
                     raise KeyProblem(
                         f"axes.{letter}.modes.{number}.excited_by",
                         mode.excited_by.model_dump() if mode.excited_by else {},
-                        f"must have a share of {letter}: a mode stands at an axis that excites it",
+                        f"must have a share of {letter}: a mode is listed under an axis that excites it",
                     )
         return self
 
@@ -191,7 +191,7 @@ class Machine(TomlTable):
 
     @property
     def remarks(self) -> Mapping[str, str]:
-        """What stands behind the values in the file, by dotted key: where they come from."""
+        """Provenance of the values in the file, by dotted key."""
         return self._remarks
 
     @property
@@ -218,7 +218,7 @@ class Machine(TomlTable):
         return remarks
 
     def with_remarks(self, remarks: Mapping[str, str]) -> Machine:
-        """The same machine with other words on where its values come from.
+        """The same machine with other provenance of its values.
 
         Args:
             remarks: by dotted key, in place of those that there are; see `shapegcode.settings.remarks` for their form.
@@ -484,7 +484,7 @@ _OF_A_MACHINE = ("axes.", "controller.", "times.", "power_on.", "feed_control.")
 
 
 def inherited_text(name: str) -> str:
-    """A built-in machine's file as the start of another one: what was measured there is inherited here."""
+    """A built-in machine's file as the start of another one: its measured values become inherited."""
     from shapegcode.settings.edit import with_remarks
 
     text = Machine.builtin_text(name)

@@ -41,8 +41,8 @@ class LinuxcncPlanner(TomlTable):
         "[TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH: segments that it looks ahead", unit="segments", assumed=50
     )
     rapid_follows: Bool = key(
-        "a rapid follows each cut; false: a dwell, an M function or the end of the program does, and the last move "
-        "brakes with half of the acceleration",
+        "a rapid follows each cut; false: a dwell, an M function or the end of the program follows, and the last move "
+        "decelerates with half of the acceleration",
         assumed=True,
     )
 

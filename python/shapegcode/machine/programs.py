@@ -75,9 +75,9 @@ class Input(TomlTable):
     )
     tool_length_wear_mm: _Lengths = key("wear of the length by offset number H", default={})
     compensation: Literal["refuse", "expand", "keep"] = key(
-        'what `convert` does with cutter compensation G41/G42. "refuse": says so and stops; "expand": shapes the tool '
-        'path of the radius given here: the offset in the control no longer acts; "keep": leaves these moves as they '
-        "are. Cycle time and pictures always use the expanded path where the radius is known",
+        'what `convert` does with cutter compensation G41/G42. "refuse": stops with an error; "expand": shapes the '
+        'tool path for the radius given here, so that the offset in the control no longer acts; "keep": leaves these '
+        "moves unchanged. Cycle time and pictures always use the expanded path where the radius is known",
         default="refuse",
     )
     compensation_start_up: Literal["A", "B"] = key(
@@ -112,9 +112,9 @@ class Input(TomlTable):
         default=(),
     )
     opaque_programs: tuple[Annotated[int, Strict(), Field(ge=0)], Annotated[int, Strict(), Field(ge=0)]] = key(
-        "first and last O number of programs of the machine builder or of a probe: a call of one that is not at hand "
-        "is kept as it stands, and position and variables are not known afterwards; a missing program outside of "
-        "these is an error",
+        "first and last O number of programs of the machine builder or of a probe: a call of one that is not available "
+        "is left unchanged, and position and variables are unknown after it; outside of this range a missing program "
+        "is an error",
         assumed=(9000, 9999),
     )
     g_macros: Annotated[_Programs, _G_CODED] = key(
@@ -151,24 +151,25 @@ class Emission(TomlTable):
     """How shaped programs are written."""
 
     dialect: DialectName = key(
-        "control whose words `convert` writes; in whose words programs are read says controller.dialect, and other "
-        "commands that write a program refuse all but fanuc",
+        "control for which `convert` writes (for input programs: controller.dialect); other commands that write "
+        "programs refuse all but fanuc",
         default="fanuc",
     )
     words: dict[str, Text] = key(
-        "what codes of the original become in another dialect, where they mean something else there or are not known: "
-        '{ "M11" = "M61", "G49" = "" } ("": left out). What takes the place of G10, G28, G30, G52, G53, G92 takes that '
-        'of the coordinates in the block too, unless it is one code: { "G28" = "SUPA G0 Z0 D0" }',
+        "replacements for codes of the original that mean something else in the dialect, or are unknown in it: "
+        '{ "M11" = "M61", "G49" = "" } ("": left out). A replacement for G10, G28, G30, G52, G53, G92 also replaces '
+        'the coordinates in the block, unless it is one code: { "G28" = "SUPA G0 Z0 D0" }',
         default={},
     )
     feed_form: Literal["constant", "linear"] = key(
-        'feed of shaped blocks. "constant": each has its own; "linear": along the path of a block from the F before it '
-        'to its own (FLIN), which takes fewer blocks; for dialect = "siemens" alone, and not tried on a control',
+        'feed of shaped blocks. "constant": each block has its own; "linear": from the F of the block before to its '
+        'own, linear along its path (FLIN), which needs fewer blocks; only for dialect = "siemens", and not tested on '
+        "a control",
         default="constant",
     )
     decimals: Annotated[int, Strict(), Field(ge=2, le=6)] | None = key(
-        "decimals of positions in mm in shaped blocks, one more in inch; left out: as the dialect wants them, else "
-        "those of controller.least_increment_mm",
+        "decimals of positions in mm in shaped blocks, one more in inch; left out: those of the dialect, else those of "
+        "controller.least_increment_mm",
         unit="digits",
         default=None,
     )
@@ -182,11 +183,10 @@ class Emission(TomlTable):
     )
     epilogue: tuple[Text, ...] = key("lines written after each shaped cut", default=())
     override: Literal["ask", "any", "lock"] = key(
-        'what is done about the feed override while shaped moves run. "ask": the header asks for 100 %, but for a '
-        'verdict.override_percent that states more, where it is as "any"; "lock": '
-        "lock_lines switch the feed override off before each shaped cut, unlock_lines switch it on again behind it; "
-        '"any": blocks of one duration, of which the override changes the speed and little else (more text, and a '
-        "block period that suits other overrides)",
+        'how shaped cuts deal with the feed override. "ask": the header asks the operator for 100 %; with a wider '
+        'verdict.override_percent as "any". "lock": lock_lines switch the feed override off before each shaped cut, '
+        'unlock_lines switch it on again after it; "any": blocks of equal duration and a block period for which other '
+        "overrides cause little vibration (a larger program)",
         default="ask",
     )
     lock_lines: tuple[Text, ...] = key(
@@ -196,8 +196,8 @@ class Emission(TomlTable):
         default=_FANUC_LOCK[0],
     )
     unlock_lines: tuple[Text, ...] = key(
-        "lines that give the feed override back as it was. Macro statements run when they are read, so G53 comes "
-        'first: it is not read past until the moves before it are done. For a builder\'s own code ["M48"]',
+        "lines that restore the feed override. Macro statements are executed when they are read, so G53 comes first: "
+        'the control does not read beyond it until the moves before it are finished. For a builder\'s own code ["M48"]',
         fanuc="#3004",
         default=_FANUC_LOCK[1],
     )
@@ -205,13 +205,13 @@ class Emission(TomlTable):
         "dwell before each shaped cut, in which the block buffer fills; 0: none", default=0.0
     )
     restart_interval_s: Positive = key(
-        "cutting time between restart points of a shaped cut, at most, where its command comes nearly to rest anyway; "
-        "a block period or more; longer than the cuts: none",
+        "longest cutting time between restart points of a shaped cut, which are at positions where its command is "
+        "nearly at rest; a block period or more; longer than the cuts: no restart points",
         default=60.0,
     )
     restart_stops: Bool = key(
-        "let a shaped cut stop for a restart point where it comes nowhere near rest for restart_interval_s: costs "
-        "time, and the tool stands in the cut",
+        "let a shaped cut stop to make a restart point if it is nowhere nearly at rest for restart_interval_s: costs "
+        "time, and the tool dwells in the cut",
         default=False,
     )
     compensation_guard: Literal["alarm", "stop"] = key(
@@ -221,11 +221,11 @@ class Emission(TomlTable):
         default="alarm",
     )
     header: Bool = key(
-        "write comments: tool version, machine, modes, block period, shaper length, override, time constant",
+        "write comments: program version, machine, modes, block period, shaper duration, override, time constant",
         default=True,
     )
     failed_suffix: Annotated[str, Strict(), Field(min_length=1, pattern=r"^[^/\\\x00-\x1f]+$")] = key(
-        "added to the name of an output that misses its tolerance, so that nobody runs it by mistake",
+        "added to the name of an output that misses its tolerance, so that it is not run by mistake",
         default=".out-of-tolerance",
     )
     max_line_length: Annotated[int, Strict(), Field(ge=30, le=250)] = key(
@@ -372,8 +372,8 @@ class Shaping(TomlTable):
         default="look-ahead",
     )
     rapids: Bool = key(
-        "write rapids (G00) as shaped cutting moves where the table is settled for the next cut sooner; rapid override "
-        "does not act on them",
+        "write rapids (G00) as shaped cutting moves where the vibration then settles sooner for the next cut; rapid "
+        "override does not act on them",
         default=False,
     )
     least_gain_um: NonNegative = key(
@@ -416,9 +416,9 @@ class Tolerance(TomlTable):
         default=5.0,
     )
     feed_excess_ratio: Annotated[NonNegative, Field(ge=0.01, le=10)] = key(
-        "share by which the set-points may run faster along the path than the program says at the same place, counted "
-        "over one, four and sixteen shortest blocks less the two increments by which rounding may lengthen a block; "
-        "corrections of the contour keep to it, and ask for 0.01 at least",
+        "ratio by which the set-points may be faster along the path than the programmed feed at the same position, "
+        "averaged over one, four and sixteen shortest blocks, less the two increments by which rounding may lengthen "
+        "a block; contour compensation keeps to it, and needs at least 0.01",
         default=0.05,
     )
 
@@ -440,9 +440,10 @@ class Verdict(TomlTable):
     """The stated band: which of the cases that are simulated decide. All are shown; 100 % override always counts."""
 
     plant: Literal["modal", "feed-drive"] = key(
-        'what stands behind the command: "modal": the modes behind an ideal servo, so that servo lag is no part of the '
-        'verdict; "feed-drive": motor, screw, friction and servo loops of axes.*.drive with the modes, where they are '
-        "known: the contour error then holds their lag, the residual is the vibration of the table behind its motor",
+        'model between command and machine table. "modal": ideal servo and vibration modes, so that the verdict does '
+        'not include servo lag; "feed-drive": motor, screw, friction and servo loops of axes.*.drive, where they are '
+        "known, and the modes: the contour error then includes the lag, the residual is the vibration of the table "
+        "relative to its motor",
         default="modal",
     )
     override_percent: tuple[_Override, _Override] = key(
@@ -461,8 +462,8 @@ class Verdict(TomlTable):
         default="both",
     )
     look_ahead: Bool = key(
-        "whether the program must be good with the look-ahead mode left on, which plans the shaped blocks anew; "
-        "false: it is off while they run (emission.prologue)",
+        "whether the program must stay within tolerance with the look-ahead mode left on, which plans the speed of "
+        "shaped blocks again; false: it is off in shaped cuts (emission.prologue)",
         default=False,
     )
     starved_block: Bool = key(

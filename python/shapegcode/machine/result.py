@@ -92,9 +92,9 @@ class ParameterImport(Result):
 
     @property
     def answer(self) -> str:
-        """How much of the machine the dump says."""
+        """Number of keys that were read from the parameter file, are inherited, or assumed."""
         if not self.ok:
-            return f"{self.dump}: nothing in it says anything about the motion or the programs: no machine"
+            return f"{self.dump}: it has no parameter of motion or programs, so no machine file can be made"
         keys = len({row.key for row in self.read} | {row.key for row in self.tables_read})
         values = self.machine.values()
         here = {row.key for row in self.assumed}
@@ -131,7 +131,7 @@ class ParameterImport(Result):
         if open_axes:
             names = ", ".join(open_axes).upper()
             return f"tap {names}, whose modes nobody knows: {find}."
-        return "look at what is assumed, and measure it: shapegcode characterize."
+        return "measure the assumed values: shapegcode characterize."
 
     def to_toml(self) -> str:
         """The machine file, each value with the parameter it comes from."""

@@ -115,7 +115,7 @@ class WallDeviation:
 
 @dataclass(frozen=True)
 class Width:
-    """From wall to wall, in mm; None where there are no two walls."""
+    """Width from wall to wall, in mm; None without two walls."""
 
     nominal: float  # the tool's diameter
     min: float | None  # least

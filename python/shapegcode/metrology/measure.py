@@ -275,7 +275,7 @@ def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArra
 
 @dataclass(frozen=True)
 class Job:
-    """A region to play, the nominal one, and its sections."""
+    """A region to simulate, the nominal one, and its sections."""
 
     simulated: _core.Region
     nominal: _core.Region
@@ -285,7 +285,7 @@ class Job:
 
 
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:
-    """Pairs of regions that are measured, those without a section left out."""
+    """Pairs of regions that are measured, without those that have no section."""
     pairs = [pair for pair in paired_regions(program, nominal) if pair[1].path.length_mm > 0.0]
     own_blocks = program.shaped_regions > 0 and nominal is program
     joined = 1.0 if lines is not None else _joined(pairs, machine, own_blocks=own_blocks)

@@ -25,7 +25,7 @@ _MAX_MARKED = 12
 
 
 def plots_of(measurement: Measurement) -> dict[str, Plot]:
-    """Its pictures by name: of the region whose walls leave their place most; none where no walls were measured."""
+    """Its pictures by name: of the region with the largest deviation of walls; none if no walls were measured."""
     if _worst_region(measurement) is None:
         return {}
     return {"measure-part": partial(plot_part, measurement), "measure-walls": partial(plot_walls, measurement)}
@@ -124,7 +124,7 @@ def _mark_sections(panels: list[Axes], region: MeasuredRegion) -> None:
 
 
 def _worst_region(measurement: Measurement) -> int | None:
-    """The region whose walls leave their place most in any program, of those whose walls were kept in all."""
+    """The region with the largest deviation of walls in any program, of those whose walls were measured in all."""
     beside = enumerate(zip(*(program.regions for program in measurement.programs), strict=False))
     found = {index: max(map(_largest_um, regions)) for index, regions in beside if all(map(_walls, regions))}
     return max(found, key=lambda index: found[index], default=None)

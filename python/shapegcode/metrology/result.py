@@ -1,4 +1,4 @@
-"""What virtual metrology found: programs side by side, held against the tolerance."""
+"""Results of virtual metrology: programs side by side, compared with the tolerance."""
 
 from __future__ import annotations
 
@@ -380,7 +380,7 @@ class Measurement(Result):
 
     @property
     def answer(self) -> str:
-        """For each program that is held against the tolerance: what it keeps, or by how much it does not."""
+        """For each program that is compared with the tolerance: whether it keeps it, or by how much it does not."""
         judged = [program for program in self.programs if program.ok is not None] or self.programs
         return "; ".join(program.verdict(self.contour_tolerance_um) for program in judged)
 
@@ -429,5 +429,5 @@ class Measurement(Result):
         return found
 
     def plots(self) -> Mapping[str, Plot]:
-        """`measure-part` and `measure-walls` of the region whose walls leave their place most; none without walls."""
+        """`measure-part` and `measure-walls` of the region with the largest deviation of walls; none without walls."""
         return self._drawn_beside()

@@ -1,4 +1,4 @@
-"""A machine as the core simulates it: made once from the machine file, and asked by everything that simulates.
+"""A machine as the core simulates it: made once from the machine file, used by every simulation.
 
 Whether a path is planned or simulated block by block is decided in `SimulatedController` alone.
 """
@@ -143,7 +143,7 @@ _LEAST_DECAY_PER_S = 0.01  # below it a mode has no damping to speak of
 
 @dataclass(frozen=True)
 class OwnFilter:
-    """The control's own filter behind the interpolation, while shaped blocks run."""
+    """The control's acceleration/deceleration after interpolation, while shaped blocks run."""
 
     shape: str  # "linear" (moving averages) or "exponential"
     time_constant_s: float  # length of the moving average, or time constant; 0: none
@@ -173,10 +173,11 @@ class SimulatedController:
         self._override = override
         model.limits.feed_override *= override
         self.filters = _core.acceleration_filters(model)
-        """Acceleration filters behind the interpolation."""
+        """Filters of acceleration/deceleration after interpolation."""
 
     def _planned(self, path: _core.Path) -> tuple[_core.Path, _core.SpeedProfile] | None:
-        """What the planner makes of a path, and its speed along it; None where the control executes block by block."""
+        """Motion that the planner computes for a path, and its speed along it; None if the control executes block by
+        block."""
         model = self.model
         look_ahead = model.motion == _core.MotionKind.look_ahead or model.planner.kind != _core.ControllerKind.fanuc
         return _core.controlled_motion(path, model.limits, model.planner) if look_ahead else None
@@ -264,7 +265,7 @@ class MachineModel:
 
     @cached_property
     def shaped_filter(self) -> OwnFilter:
-        """What smooths shaped blocks behind the interpolation."""
+        """Acceleration/deceleration after interpolation for shaped blocks."""
         controller, filters = self.machine.controller, self.shaped.filters
         return OwnFilter(
             controller.shaped_filter_shape,
@@ -329,9 +330,9 @@ class MachineModel:
         only: str | None = None,
         offset: Offset = NO_OFFSET,
     ) -> _core.SimulationOptions:
-        """Options with the plant of the verdict.
+        """Simulation options with the plant of the verdict.
 
-        Behind feed drives the residual is the vibration of the table against its motor once that has arrived: the lag
+        With feed drives the residual is the vibration of the table relative to its motor after its arrival: the lag
         that runs out at a stop is no vibration.
         """
         plant = self.machine.verdict.plant

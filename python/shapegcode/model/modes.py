@@ -68,7 +68,7 @@ def axis_modes(machine: Machine, shift: float = 0.0, only: str | None = None) ->
 
 
 def own_modes(machine: Machine, shift: float = 0.0, only: str | None = None) -> list[list[_core.Mode]]:
-    """Those of them that the axis which they move excites alone."""
+    """The modes that are excited only by the axis along which they move."""
     return [[mode for mode in modes if not any(mode.excited_by)] for modes in axis_modes(machine, shift, only)]
 
 
@@ -91,7 +91,7 @@ def slowest_excited_hz(machine: Machine) -> list[float]:
 
 
 def _excitations(machine: Machine) -> Iterator[tuple[int, float, int, AxisMode]]:
-    """An axis, by which share it excites a mode, the axis at which that stands, and the mode."""
+    """An axis, the ratio with which it excites a mode, the axis under which the mode is listed, and the mode."""
     for _, axis, mode in numbered_modes(machine):
         for exciting, share in enumerate(mode.excitation(axis)):
             if share:
@@ -156,7 +156,7 @@ def region_offset(region: _core.Region, machine: Machine) -> Offset:
 
 
 def machine_warnings(machine: Machine) -> list[str]:
-    """What a user should know of the tables before any program is read: a mass that is missing, unused or outside."""
+    """Warnings about the tables of modes before any program is read: a mass that is missing, unused or outside."""
     mass = machine.shaping.part_mass_kg
     over_mass = [
         (name, mode, mode.frequency_over.mass_kg)

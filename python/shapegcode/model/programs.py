@@ -19,7 +19,7 @@ _WHOLE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class SimulatedPrograms:
-    """A program, and the one that was made of it."""
+    """A program and its emitted program."""
 
     original: Program  # what is simulated
     machine: Machine  # controller and plant
@@ -81,7 +81,8 @@ def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]
         found.append(
             (
                 "edited",
-                f"the program was changed since it was shaped (its header says {stamp.mark}, it comes to {mark}): the "
+                f"the program was changed since it was shaped (mark in its header: {stamp.mark}, computed: "
+                f"{mark}): the "
                 "verdict in its header does not hold for it; convert the original again",
             )
         )

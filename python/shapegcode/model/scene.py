@@ -72,7 +72,7 @@ def scene_of(
     plant: str = "modal",
     on_progress: Callable[[float], None] = lambda _done: None,
 ) -> Scene:
-    """Simulate a program, and the one that was made of it, for a page."""
+    """Simulate a program and its emitted program for a page."""
     programs = [original, *([emitted] if emitted is not None else [])]
     period_s = MachineModel(machine).period_s
     variants, spectra, notes = [], [], []
@@ -179,7 +179,7 @@ def _scales(program: Program) -> dict[str, float]:
 
 
 def _most_hz(machine: Machine, period_s: float) -> float:
-    """Up to where a spectrum is drawn: twice the highest mode and at least 200 Hz, as far as there are samples."""
+    """Highest frequency of a spectrum: twice the highest mode and at least 200 Hz, within half the sample rate."""
     highest = max((mode.frequency_hz for modes in axis_modes(machine) for mode in modes), default=0.0)
     return min(max(2.0 * highest, 200.0), 0.5 / period_s)
 

@@ -23,7 +23,7 @@ KINDS = tuple(kind.name for kind in sorted(_core.BlockKind.__members__.values(),
 """Names of what `Chunk.kind` numbers."""
 
 REST_S = 0.25
-"""How long the set-points rest behind the end of a program."""
+"""Duration for which the set-points rest after the end of a program."""
 
 _CHUNK_SAMPLES = 65536
 _OF_EVERY_PLANT = ("line", "kind", "command_mm", "response_mm", "velocity_mm_per_s")
@@ -32,7 +32,7 @@ _OF_DRIVES = ("motor_mm", "motor_force_n", "friction_force_n")
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """A stretch of a simulated program; one row per interpolation period."""
+    """A section of a simulated program; one row per interpolation period."""
 
     sample: npt.NDArray[np.int64]  # number of each row since the start of the program, (k,)
     time_s: FloatArray  # since the start of the program, (k,)
@@ -56,7 +56,7 @@ class Chunk:
         return self.response_mm - self.command_mm
 
     def columns(self) -> dict[str, npt.NDArray[np.generic]]:
-        """What a file of the motion holds, by name with its unit; each of the shape (k,)."""
+        """Columns of a file of the motion, by name with unit; each of shape (k,)."""
         named: dict[str, npt.NDArray[np.generic]] = {"time_s": self.time_s, "line": self.line}
         for name in ("command_mm", "response_mm", "error_mm", *_OF_DRIVES):
             if (table := getattr(self, name)) is not None:

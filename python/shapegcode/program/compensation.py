@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 RADIUS_NOT_KNOWN = "the radius of offset D"
-"""How the reader's warning of a G41 or G42 begins whose radius nothing gives."""
+"""Start of the reader's warning about a G41 or G42 whose radius is not given."""
 
 _ZERO_RADIUS = re.compile(r"offset D(\d+) has a radius of 0\b")
 _KEPT = "cutter compensation is on and not expanded"

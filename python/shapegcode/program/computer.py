@@ -13,7 +13,7 @@ _PER_LINE = 130
 """Bytes for each line that is read: blocks, path and plan (docs/evidence/benchmarks.md)."""
 _SMALL_BYTES = 2**20
 MEMORY_NEEDED = "bytes of memory are needed"
-"""What a refusal for want of memory says: a batch that limits it tells it apart by that."""
+"""Start of the message when there is not enough memory; a batch with a memory limit recognizes it."""
 
 
 def cores() -> int:

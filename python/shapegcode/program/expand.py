@@ -17,7 +17,7 @@ from shapegcode.results.result import Result
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Expansion(Result):
-    """The plain program that calls, macros and coordinate modes come to.
+    """The expanded program: calls, macros and coordinate modes resolved.
 
     Attributes:
         program: name of the program.
@@ -49,7 +49,7 @@ class Expansion(Result):
 
     @property
     def answer(self) -> str:
-        """What came out, and whether it differs from what went in."""
+        """The expanded program, and whether it differs from the original."""
         what = "expanded" if self.expanded else "nothing to expand: the program is unchanged"
         return f"{self.program}: {self.lines} lines, {self.size_bytes} bytes, {what}"
 
@@ -117,8 +117,8 @@ def expand(
     if program.stamp is not None and core.expanded:
         # The control keeps the switch of the override in a variable: worked out here, it would be overwritten.
         raise _core.ProgramError(
-            f"{program.source}:1:1: written by shapegcode (its header says so), and plain but for the lines that lock "
-            "the feed override: these only the control can work out"
+            f"{program.source}:1:1: written by shapegcode (see its header); it is expanded already, except for the "
+            "lines that lock the feed override, which only the control can evaluate"
         )
     return Expansion(
         program.source,

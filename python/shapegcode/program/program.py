@@ -179,7 +179,7 @@ class Program:
         return _read, (self.text, self.source, self.reading, self.folder, self.number, self.foreign)
 
     def __eq__(self, other: object) -> bool:
-        """Whether it is the same text, read in the same way."""
+        """Whether it is the same program, read with the same settings."""
         if not isinstance(other, Program):
             return NotImplemented
         mine, others = ((each.source, each.number, each.reading, each.size) for each in (self, other))
@@ -214,7 +214,7 @@ class Program:
             ProgramError: its header says so.
         """
         if self.stamp is not None:
-            raise ProgramError(f"{self.source}:1:1: shaped by shapegcode already (its header says so): {remedy}")
+            raise ProgramError(f"{self.source}:1:1: shaped by shapegcode already (see its header): {remedy}")
 
     @property
     def text(self) -> bytes:
@@ -308,7 +308,8 @@ class Program:
 
     @cached_property
     def doubt(self) -> tuple[int, str] | None:
-        """A word that means another thing on another control, where nothing tells for which one the program is."""
+        """A warning about a word with another meaning on another control, if the program's control is not
+        recognized."""
         stated = self.reading.machine.controller.dialect != "auto"
         return (
             None
@@ -337,7 +338,7 @@ class Program:
         return f"{file or self.source}:{number}"
 
     def source_lines(self, first: int, last: int) -> tuple[int, int]:
-        """Lines of the expanded text, as they are told: of the source where that is in another control's words.
+        """Lines of the expanded program as they are reported: those of the source if it is for another control.
 
         Args:
             first: of them, from 1.
@@ -351,7 +352,7 @@ class Program:
         return int(self.core.origin(first)[0]), int(self.core.origin(last)[0])
 
     def lines(self, region: _core.Region) -> str:
-        """The lines of a region in words: of the source, or of the expanded text.
+        """Text with the line numbers of a region: of the source, or of the expanded program.
 
         Args:
             region: of this program.
@@ -428,7 +429,7 @@ def _read(
 
 
 def _read_foreign(data: bytes, source: str, reading: Reading, folder: Path | None, foreign: ForeignProgram) -> Program:
-    """A program in another control's words: its plain program is read, and its lines lead back."""
+    """A program for another control: its expanded program is read, and messages name its lines."""
     beside = folder if foreign.settings.called_text is not None else None
     try:
         core = _core.read_program(foreign.text.encode("latin-1", "replace"), reading.options(beside, foreign.settings))

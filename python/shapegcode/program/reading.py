@@ -116,7 +116,7 @@ def _shown(value: object) -> str:
 
 
 def _apply(foreign: ForeignSettings, options: _core.ReaderOptions) -> None:
-    """What differs where a plain program was made of one in another control's words."""
+    """Differences in reading if the expanded program was made from a program for another control."""
     if foreign.calculator_decimal_point is not None:
         options.calculator_decimal_point = foreign.calculator_decimal_point
     options.absolute_arc_centres = False
@@ -262,7 +262,7 @@ _LIKELY = (
 
 
 def signs_of_turning(text: bytes) -> tuple[int, str] | None:
-    """What shows that a program is one of a lathe; a program with Y words or a tool change M06 is none."""
+    """The word that shows that a program is for a lathe; none in a program with Y words or M06."""
     code = COMMENT.sub(b"", text[:LOOKED_AT_BYTES].upper())
     sure = [(found, meaning) for sign, meaning in _SURE if (found := sign.search(code))]
     likely = [(found, meaning) for sign, meaning in _LIKELY if (found := sign.search(code))]

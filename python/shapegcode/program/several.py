@@ -37,7 +37,7 @@ def is_subprogram(text: bytes) -> bool:
 
 
 def programs_of(text: bytes) -> tuple[ProgramPlace, ...]:
-    """The programs of a text, in the order in which they stand."""
+    """The programs of a file, in their order."""
     entries = _core.list_programs(text)
     short = [_own_name(entry) for entry in entries]
     long = [f"{entry.folder.rstrip('/')}/{own}" for entry, own in zip(entries, short, strict=True)]
@@ -75,7 +75,7 @@ def place_of(text: bytes, wanted: str, source: str) -> int:
 
 
 def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
-    """Place of a program among several of a text, so that it is read alone."""
+    """Position of one of several programs in a file, to read it alone."""
     try:
         entries = _core.list_programs(text)
     except _core.ProgramError:
@@ -89,7 +89,7 @@ def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
 
 
 def called_from(text: bytes, index: int, kept: Iterable[int]) -> tuple[ProgramPlace, ...]:
-    """Programs of a text that one of them needs on the control, because calls of them were kept."""
+    """Programs of a file that one of them needs on the control, because their calls were not expanded."""
     entries, places = _core.list_programs(text), programs_of(text)
     found: set[int] = set()
     waiting = [(index, number) for number in kept]

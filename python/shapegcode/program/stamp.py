@@ -43,8 +43,8 @@ OVERRIDE = Habit(
 OVERRIDE_LOCKED = Habit(
     "override",
     "FEED OVERRIDE IS OFF IN SHAPED MOVES",
-    "the program switches the feed override off in shaped moves and gives it back behind them: there only feed hold "
-    "acts",
+    "the program switches the feed override off in shaped moves and on again after them; in these moves only feed hold "
+    "works",
 )
 OVERRIDE_ANY = Habit(
     "override",
@@ -52,19 +52,19 @@ OVERRIDE_ANY = Habit(
     "blocks of one duration: another feed override scales all of them alike; vibration is lowest at 100 %",
 )
 OVERRIDES = {"ask": OVERRIDE, "lock": OVERRIDE_LOCKED, "any": OVERRIDE_ANY}
-"""By `emission.override`."""
+"""Comment in the header by `emission.override`."""
 SINGLE_BLOCK = Habit(
     "single block",
     "NO SINGLE BLOCK IN SHAPED CUTS",
-    "no single block inside of shaped cuts: the control would stop at every block, some milliseconds apart; to look "
-    "through the program use the graphic display, machine lock, or dry run above the part, and single block between "
+    "no single block inside of shaped cuts: the control would stop at every block, some milliseconds apart; to check "
+    "the program use the graphic display, machine lock, or dry run above the part, and single block between "
     "the cuts; then the first run above the part",
 )
 FEED_HOLD = Habit(
     "feed hold",
     "AFTER FEED HOLD GO ON AT 100 PCT",
-    "feed hold is safe; the machine may vibrate once, since the control decelerates in its own way; "
-    "cycle start resumes the program",
+    "feed hold is safe; the machine may vibrate once, since the control decelerates with its own acceleration; cycle "
+    "start resumes the program",
 )
 RESTART = Habit(
     "restart",
@@ -80,15 +80,15 @@ FIRST_RUN = Habit(
 
 
 def no_room(room_bytes: int) -> str:
-    """What to do with a shaped program that the memory of the control does not hold."""
+    """Remedy for a shaped program that does not fit into the memory of the control."""
     return f"convert the original with --max-bytes {room_bytes}; or memory card, data server or drip feed (DNC)"
 
 
 REGION_MARK = "(SHAPED)"
-"""Stands before each shaped region."""
+"""Comment before each shaped region."""
 
 RAPID_MARK = "(SHAPED RAPID)"
-"""Stands before shaped blocks in place of a rapid."""
+"""Comment before shaped blocks that replace a rapid."""
 
 STAMP_BEGIN = b"(SHAPEGCODE "
 """How the header begins."""
@@ -144,7 +144,7 @@ class Stamp:
         return [first, _PENDING.decode(), *rest]
 
     def difference(self, other: Stamp) -> str:
-        """In what the machine of another header differs, in words; empty: in nothing that counts."""
+        """Text on how the machine of another header differs; empty: in nothing that matters."""
         pairs = (
             ("machine", self.machine, other.machine),
             ("modes", ", ".join(self.modes) or "none", ", ".join(other.modes) or "none"),
@@ -197,7 +197,7 @@ def stamp_of(text: bytes) -> Stamp | None:
 
 
 def text_mark(text: bytes) -> str:
-    """Eight digits that stand for what a program does.
+    """Eight digits: a hash of the motion and functions of a program.
 
     Comments, blanks, kinds of line end, N words, the program's number and `%` do not count: what a control or an
     editor changes in passing.

@@ -183,7 +183,7 @@ _SIMPLE: dict[Any, dict[str, Any]] = {
 
 
 def schema(result: type) -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of what `plain` makes of a dataclass, from its annotations and docstrings.
+    """JSON Schema (draft 2020-12) of the output of `plain` for a dataclass, from its annotations and docstrings.
 
     Args:
         result: the class. One with `json_extra` (names to types) has those keys too, and where the command wrote

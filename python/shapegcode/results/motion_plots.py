@@ -126,7 +126,7 @@ _FLAT = 0.06  # of an axis in µm or mm/min
 def thin_min_max(
     times: npt.ArrayLike, values: npt.ArrayLike, max_points: int = _MAX_POINTS
 ) -> tuple[FloatArray, FloatArray]:
-    """Fewer points of a curve that look the same: of each stretch only its smallest and largest value."""
+    """Reduce the points of a curve without a visible change: only the smallest and largest value of each interval."""
     t, v = np.asarray(times, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.shape != v.shape or t.ndim != 1:
         raise ValueError(f"times have shape {t.shape}, values {v.shape}: must be equal and one-dimensional")
@@ -145,7 +145,7 @@ def thin_min_max(
 
 @dataclass(frozen=True)
 class View:
-    """A stretch of time, drawn as one column of a picture.
+    """Smallest and largest value of an interval of time, plotted as one column of a picture.
 
     Attributes:
         traces: usually the original and the emitted program.
@@ -196,7 +196,7 @@ def plot_feed(views: Sequence[View], ax: Axes | None = None, *, part: str = "") 
 
 
 def plot_vibration(views: Sequence[View], ax: Axes | None = None, *, part: str = "") -> Axes:
-    """How much does each axis swing about its command, and how much of it remains after the stop?
+    """Plot the vibration of each axis about its command, and what remains after the stop.
 
     Axes that do not swing are named, not drawn.
 

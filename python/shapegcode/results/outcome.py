@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class NotKeptError(_core.ArgumentError):
-    """Something was asked of a result that was read back, from its JSON or a pickle, which does not hold it."""
+    """A result that was read back from its JSON or a pickle does not hold the requested data."""
 
 
 class CoreFigures:
@@ -117,7 +117,7 @@ copyreg.pickle(types.MappingProxyType, lambda mapping: (types.MappingProxyType, 
 T = TypeVar("T")
 
 Plot = Callable[..., "Axes"]
-"""Draws one picture: ``plot(ax=None) -> Axes``, into the caller's axes or into a new figure."""
+"""Plot one picture: ``plot(ax=None) -> Axes``, into the caller's axes or into a new figure."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class Outcome:
 
     @property
     def answer(self) -> str:
-        """What was asked, answered in one line: the first that the command says."""
+        """The result in one line: the first line of the command's output."""
         raise NotImplementedError
 
     @property
@@ -206,7 +206,7 @@ class Outcome:
         return []
 
     def plots(self) -> Mapping[str, Plot]:
-        """What can be drawn of it, by name; each is called as ``plot(ax=None)`` and returns the axes."""
+        """Its pictures by name; each is called as ``plot(ax=None)`` and returns the axes."""
         return {}
 
     def save_plots(self, folder: str | Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""A path and what was driven of it, from above, deviations magnified; the pictures of the worst place of a region."""
+"""A path and its motion from above, deviations magnified; the pictures of the worst position of a region."""
 
 from __future__ import annotations
 
@@ -147,7 +147,8 @@ def _deviation(
 
 
 def _at_corners(along: FloatArray, polyline: FloatArray, curve: FloatArray, apart_mm: float) -> npt.NDArray[np.intp]:
-    """Samples before which the foot goes from one side of a corner to the other, and the drawn curve with it.
+    """Samples before which the nearest point, and the plotted curve with it, changes from one side of a corner to the
+    other.
 
     A table that rounds a corner on the inside is nearest to the one side, then, from one sample to the next, to the
     other. Magnified from there the two lie far apart, and a line between them would close a loop that nobody drove.
@@ -206,7 +207,7 @@ def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:
 
 
 def _deviation_scale(axes: Axes, factor: float, largest_mm: float) -> None:
-    """A bar that shows how long a round number of µm is drawn."""
+    """A scale bar: a round number of µm at the magnification of the deviation."""
     from matplotlib.lines import Line2D
     from matplotlib.offsetbox import AnchoredOffsetbox, AuxTransformBox, TextArea, VPacker
 
@@ -248,7 +249,7 @@ def follow(
 
 
 def _feet(points: FloatArray, vertices: FloatArray, gone: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:
-    """Nearest points of the polyline, as distances along it and places."""
+    """Nearest points of the polyline, as distances along it and positions."""
     from scipy.spatial import KDTree
 
     if len(vertices) < 2:
@@ -376,7 +377,7 @@ def motion_pictures(simulated: Callable[[], SimulatedRegion]) -> dict[str, Plot]
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """What of a region is drawn."""
+    """The part of a region that is plotted."""
 
     views: tuple[View, ...]  # stretches of time: the whole, or the worst place and the stop
     part: str  # which part of the program they are of

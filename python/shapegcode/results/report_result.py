@@ -1,4 +1,4 @@
-"""What `shapegcode report` made: pages of results, and what was not as it should be with each."""
+"""Result of `shapegcode report`: pages of results, and the problems found with each."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ReportPage:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Reports(Result):
-    """Pages made of results that were written earlier.
+    """Pages of results that were written earlier.
 
     Attributes:
         pages: in the order of the files.

@@ -80,11 +80,11 @@ class Result(Outcome):
         return title_of(self)
 
     def key_figures(self) -> tuple[Figure, ...]:
-        """The few figures that stand first on its page; none as a rule."""
+        """The main figures at the top of its page; usually none."""
         return ()
 
     def page_sections(self, made: Made | None = None) -> tuple[Section, ...]:
-        """What stands on its page between the verdict and what it was made of.
+        """Sections of its page between verdict and provenance.
 
         Args:
             made: of what the result was made; None: it is not known.

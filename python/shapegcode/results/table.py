@@ -30,8 +30,8 @@ class Column:
         unit: behind the heading; empty: none.
         value: what a cell shows: name of an attribute of the row (dots lead further), or a function of the row.
         digits: behind the point of numbers; None: as text.
-        text: of words, which wrap and stand at the left; other columns stand at the right and are never cut.
-        left: stands at the left, though it is never cut: a column of names.
+        text: left-aligned text, which wraps; other columns are right-aligned and never wrapped.
+        left: left-aligned, though never wrapped: a column of names.
         style: of a cell, as rich names it, from the row; None: plain.
         link: where a cell of a page leads: as `value`; empty: nowhere.
         priority: which columns go first where the table is too wide: those of the highest, of these the last one; 0
@@ -54,7 +54,7 @@ class Column:
         return f"{self.name} {self.unit}".strip()
 
     def cell(self, row: object) -> str:
-        """What stands in a row; empty where there is nothing.
+        """Text of a cell; empty without a value.
 
         Args:
             row: of the table.

@@ -162,7 +162,7 @@ def _allow_origins(model: type[TomlTable], found: dict[str, Any], defs: dict[str
 
 
 def keys_schema(model: type[TomlTable], value: dict[str, Any], kind: str, defs: dict[str, Any]) -> dict[str, Any]:
-    """JSON Schema of a table that says something of some keys of a file, by their dotted names or as tables."""
+    """JSON Schema of a table that describes some keys of a file, by their dotted names or as tables."""
     name = f"{kind}.{model.__name__}"
     if name not in defs:
         defs[name] = {}

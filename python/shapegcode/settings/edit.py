@@ -137,7 +137,7 @@ def _unwrap(table: Any) -> None:
 
 
 def with_remarks(text: str, change: Callable[[str, str], str]) -> str:
-    """A file whose values come from elsewhere; comments that said the same as an origin follow it."""
+    """A file with other provenance of its values; comments that repeat an origin are updated."""
     old = remarks_of(text)
     new = {key: change(key, remark) for key, remark in old.items()}
     lines = []

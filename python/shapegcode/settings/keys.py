@@ -1,4 +1,4 @@
-"""What the tables of the machine file are made of: types of values, fields with their facts, TOML notation."""
+"""Building blocks of the tables of the machine file: types of values, fields with their metadata, TOML notation."""
 
 from __future__ import annotations
 

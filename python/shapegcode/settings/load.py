@@ -207,7 +207,7 @@ def validated(model: type[_Model], data: dict[str, Any], source: str, text: str,
 
 
 def loaded(model: type[_Model], path: str | Path, error: type[FileError]) -> _Model:
-    """A file as its model."""
+    """Parse a file into its model."""
     text = read_text(Path(path), error)
     return validated(model, parsed(text, str(path), error), str(path), text, error)
 

@@ -37,7 +37,7 @@ ORIGIN_WORDS: dict[Origin, str] = {
     "file": "stated",
 }
 ORIGIN_TEXT = rf"^({'|'.join(ORIGIN_WORDS.values())})($|: .|, .| \(.)"
-"""What the text of an origin begins with; a note may follow."""
+"""Start of the text of an origin; a note may follow."""
 
 _BEGINNINGS: tuple[tuple[str, Origin], ...] = (
     (r"measured\b(?!\?)|95 %:|half of the 95 %", "measured"),

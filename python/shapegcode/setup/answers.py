@@ -34,7 +34,7 @@ _LIKELY = {
     "max_feed_mm_per_min": (100.0, 500_000.0, "unit: mm/min; 24 m/min are 24000"),
     "max_acceleration_mm_s2": (50.0, 100_000.0, "unit: mm/s²; 3 m/s² are 3000, 1 g is 9810"),
 }
-"""What an axis can do: a value beyond it is one in another unit."""
+"""Range of an axis: a value outside of it is in another unit."""
 _MODE = re.compile(r"\s*\d+(\.\d*)?\s*(:\s*\d*\.?\d+)?\s*")
 
 
@@ -66,7 +66,7 @@ class ModesAnswer(InlineTable):
 
 
 class Answers(TomlTable):
-    """What a shop says of its machine."""
+    """A shop's answers about its machine."""
 
     name: Text = key("What do you call the machine?", default="unnamed")
     control: Literal["fanuc", "linuxcnc", "other"] | None = key("Which control does it have?", default=None)
@@ -82,7 +82,7 @@ class Answers(TomlTable):
     program_memory_kb: Annotated[Positive, Field(le=1e9)] | None = key("How large is the program memory?", default=None)
     look_ahead: LookAhead | None = key("By which code does a look-ahead mode go on?", default=None)
     contour_um: Positive | None = key("How far may the contour leave the path?", default=None)
-    modes: ModesAnswer = key("What is known of its vibration?", default={})
+    modes: ModesAnswer = key("What is known about its vibration?", default={})
 
     @field_validator("name")
     @classmethod
@@ -104,7 +104,7 @@ class Answers(TomlTable):
         if self.control == "linuxcnc" and self.look_ahead not in (None, "none"):
             raise KeyProblem("look_ahead", self.look_ahead, 'is a code of FANUC controls, and control is "linuxcnc"')
         if self.dnc_baud is not None and self.delivery != "dnc":
-            raise ValueError('dnc_baud is given, and delivery is not "dnc": take one of both out')
+            raise ValueError('dnc_baud is given, and delivery is not "dnc": delete one of them')
         return self
 
     def stem_from(self, folder: Path) -> Answers:
@@ -127,7 +127,7 @@ def is_mode(answer: str) -> bool:
 
 
 def mode_of(answer: str) -> tuple[float, float]:
-    """An answer that `is_mode` as frequency in Hz and damping ratio, 0.02 where none is said."""
+    """An answer that `is_mode` as frequency in Hz and damping ratio, 0.02 if none is given."""
     frequency, _, damping = answer.partition(":")
     return float(frequency), float(damping) if damping.strip() else _USUAL_DAMPING
 
@@ -193,13 +193,13 @@ def _of_modes(modes: ModesAnswer) -> str:
 
 
 EXPLAINED: Mapping[str, Callable[[Any], str]] = {
-    "name": lambda _: "It stands in the header of every program that is written.",
+    "name": lambda _: "It is written in the header of every program.",
     "control": lambda answer: {
         "fanuc": "A parameter file of it can be read; look-ahead is switched by G05.1 or G08.",
-        "linuxcnc": "Its INI file can be read; programs are written in its words, and judged by its own planner.",
+        "linuxcnc": "Its INI file can be read; programs are written in its dialect and simulated with its planner.",
     }.get(answer, "Programs are written as FANUC controls read them: try one above the part first."),
     "dump": lambda answer: (
-        "Limits and what else it says of the motion come from it; it holds no vibration."
+        "Limits and other parameters of motion are read from it; it has no vibration modes."
         if answer
         else "Limits and time constants are then what you say, or assumed and marked so."
     ),
@@ -212,7 +212,7 @@ EXPLAINED: Mapping[str, Callable[[Any], str]] = {
         "Feeds above it are cut down, and cost time." if answer else "The rapid rate is assumed for it."
     ),
     "max_acceleration_mm_s2": lambda answer: (
-        "It says how sharply corners are taken, and what excites vibration."
+        "It determines the speed in corners and how much vibration is excited."
         if answer
         else "0.3 g is assumed, as usual for a machining centre: measure it with `shapegcode characterize`."
     ),
@@ -222,7 +222,7 @@ EXPLAINED: Mapping[str, Callable[[Any], str]] = {
         else "0.001 mm is assumed (IS-B)."
     ),
     "delivery": lambda answer: {
-        "memory": "What is written must fit the memory; convert says whether it does.",
+        "memory": "Emitted programs must fit into the memory; convert checks that.",
         "dnc": "Blocks cannot come faster than the line carries them.",
         "data server": "Size and speed of the line hold nothing back.",
         None: "Nothing is held back for it.",
@@ -231,7 +231,7 @@ EXPLAINED: Mapping[str, Callable[[Any], str]] = {
         f"{answer / 11:.0f} characters, or some {answer / 11 / 25:.0f} short blocks a second: convert warns where that "
         f"is too slow, and `--baud {answer}` fits the program to it."
         if answer
-        else "Nobody can say then whether blocks arrive in time: set controller.dnc_baud before a shaped program runs."
+        else "Whether blocks arrive in time cannot be checked: set controller.dnc_baud before you run a shaped program."
     ),
     "program_memory_kb": lambda answer: "A larger program gets a warning." if answer else "256 kB are assumed.",
     "look_ahead": lambda answer: (

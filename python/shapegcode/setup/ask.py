@@ -70,7 +70,7 @@ def ask_all() -> Answers:
 
 
 def _open_questions(questions: Sequence[str], asked: Sequence[str], given: Mapping[str, Any]) -> list[str]:
-    """Those behind the last one asked that the answers so far do not make needless."""
+    """The remaining questions that the answers so far do not make superfluous."""
     needless = set(_left_out(given))
     behind = questions[questions.index(asked[-1]) + 1 :] if asked else questions
     return [name for name in behind if name not in needless]
@@ -112,7 +112,7 @@ def _asked(name: str, given: Mapping[str, Any]) -> Any:
 
 
 def _chosen(question: str, titles: Mapping[str, str]) -> str:
-    """One of a few answers, or that it is not known yet, which stands first, or back."""
+    """Ask for one of a few answers; the first is `not known yet`, the last goes back."""
     shown = {_UNKNOWN: _TITLES[_UNKNOWN], **titles, _BACK: _TITLES[_BACK]}
     choices = [questionary.Choice(title, value) for value, title in shown.items()]
     return str(questionary.select(question, choices=choices).unsafe_ask())

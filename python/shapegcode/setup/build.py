@@ -1,4 +1,4 @@
-"""A short machine file from answers: what was said, with where it comes from; everything else is a default."""
+"""A short machine file from answers, with their provenance; everything else is a default."""
 
 from __future__ import annotations
 
@@ -87,7 +87,8 @@ def _started(answers: Answers) -> tuple[Machine, list[str]]:
 
 
 def _imported(answers: Answers, rigid: str) -> ParameterImport:
-    """The machine of the dump; limits that it does not hold are as they are said, or assumed and marked so."""
+    """The machine of the parameter file; limits that it does not contain are those of the answers, or assumed and
+    marked so."""
     dump = answers.dump
     assert dump is not None
     try:
@@ -137,7 +138,7 @@ def tap_problem(file: str) -> str:
 
 
 def _plain(answers: Answers) -> Machine:
-    """Limits as they are said; what is not said is assumed, and marked so."""
+    """Limits of the answers; the others are assumed, and marked so."""
     rapid, feed, acceleration = answers.rapid_mm_per_min, answers.max_feed_mm_per_min, answers.max_acceleration_mm_s2
     axes: dict[str, Any] = {}
     remarks = {}
@@ -168,7 +169,7 @@ def _plain(answers: Answers) -> Machine:
 
 
 def _answered_values(answers: Answers) -> Iterator[tuple[str, tuple[object, str]]]:
-    """Key of the machine file, value and remark of what was said beside limits and dump."""
+    """Key of the machine file, value and remark of all answers but limits and parameter file."""
     yield "name", (answers.name, "")
     if answers.dump is not None:
         yield "description", (f"read from {Path(answers.dump).name}; set up by answers", "")
@@ -202,7 +203,7 @@ def _answered_values(answers: Answers) -> Iterator[tuple[str, tuple[object, str]
 
 
 def _for_axes(machine: Machine, remarks: dict[str, str]) -> dict[str, str]:
-    """Remarks of the keys that the machine has; modes that were said are in tables of their own."""
+    """Remarks of the keys that the machine has; modes from answers are in separate tables."""
     held = {value.key for value in machine.values()}
     found = {key: remark for key, remark in remarks.items() if key in held and remark}
     for axis, table in zip("xyz", machine.axes.as_tuple(), strict=True):
@@ -216,7 +217,7 @@ def _for_axes(machine: Machine, remarks: dict[str, str]) -> dict[str, str]:
 
 
 def _with_modes(answers: Answers, axis: str) -> str:
-    """The other axes whose modes were said: they are this machine's."""
+    """The other axes whose modes are in the answers: they are this machine's."""
     answer = answers.modes.model_dump()
     return "".join(other for other in "xyz" if other != axis and answer[other] not in ("rigid", "unknown"))
 

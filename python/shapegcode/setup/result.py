@@ -12,7 +12,7 @@ from shapegcode.results.table import Column, Table
 
 @dataclass(frozen=True)
 class OpenQuestion:
-    """A value that nobody said."""
+    """A value that is not known yet."""
 
     key: str  # of the machine file
     value: str  # that holds until then, with its unit
@@ -51,7 +51,7 @@ class MachineSetup(Result):
 
     @property
     def answer(self) -> str:
-        """How much of it is said, and what is open."""
+        """How many values are known, and which are not."""
         count = len(self.answered)
         sentence = f"{self.machine}: {count} value{'' if count == 1 else 's'} answered, {len(self.imported)} imported"
         unknown = [each.key.split(".")[1].upper() for each in self.open if each.key.endswith(".modes")]
@@ -61,10 +61,12 @@ class MachineSetup(Result):
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
         file = self.file or "MACHINE"
-        return f"`shapegcode machine show {file} --for part.nc` says which of the open values matters for your program."
+        return (
+            f"`shapegcode machine show {file} --for part.nc` ranks the unknown values by their effect on your program."
+        )
 
     def tables(self) -> list[Table]:
-        """What is open; axes of which the same is said share a row."""
+        """The values that are not known; axes with the same text share a row."""
         shared: dict[tuple[str, str, str], list[str]] = {}
         for each in self.open:
             stem, axis, name = _split(each.key)

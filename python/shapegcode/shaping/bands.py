@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 NO_MODE = (
     "the machine file gives no vibration mode (axes.x.modes): nothing to shape for; `shapegcode identify --tap-plan` "
-    "says how to find them"
+    "describes the test"
 )
 """Why there is no shaper."""
 NARROW_PERCENT = 0.2
-"""A band of a mode of a machine is designed for if it is wider than this, either way."""
+"""Half width above which a shaper is designed for the band of a mode."""
 _SLOWEST_HZ = 0.1  # the period of a load on 25 m of rope; no machine tool has a slower mode
 _FASTEST_HZ = 10_000.0  # as in a machine file
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -32,7 +32,8 @@ _TEXT = re.compile(
 VIBRATION_LIMIT = 0.05
 """Residual ratio that a robust design may leave anywhere in the bands unless another one is asked for."""
 SAME = 0.02
-"""Durations (or, where none is good, worst residuals) that differ by less, relative, give way to a longer period."""
+"""Relative difference of durations (or, if none is within the limit, of worst residuals) below which the longer block
+period is preferred."""
 ON_GRID = 1e-9
 """Periods; forgives the rounding of a quotient."""
 
@@ -130,8 +131,9 @@ def parse_mode_band(text: str, uncertainty: float = 0.0) -> ModeBand:
 def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
     """The modes of all axes of a machine with the bands that it states; equal ones once, with the wider band.
 
-    A band as narrow as a tap test gives is none: a shaper that is exact at the nominal frequency leaves less there than
-    one that spends `shaping.vibration_limit` all over it. The verdict simulates its ends nevertheless.
+    Bands as narrow as those of a tap test are ignored: a shaper that is exact at the nominal frequency leaves less
+    there than
+    one with `shaping.vibration_limit` over the whole band. The verdict simulates the ends of the band nevertheless.
     """
     from shapegcode.model.modes import still_mode
 

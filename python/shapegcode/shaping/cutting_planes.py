@@ -74,7 +74,7 @@ class LinearProgram:
         self._add(matrix, np.full(len(above), -math.inf), above)
 
     def set_cost(self, cost: FloatArray) -> None:
-        """Take another cost."""
+        """Replace the cost vector."""
         self._solver.changeColsCost(len(cost), self._columns, cost)
 
     def bound(self, column: int, lower: float, upper: float) -> None:
@@ -358,7 +358,7 @@ class TapProblem:
         return worst
 
     def _forget(self, taps: FloatArray, worst: float) -> None:
-        """Take out of the pool what was found on the way and does not bound the result."""
+        """Remove cutting planes that do not bound the result from the pool."""
         self._program = None
         for rows, omegas, directions in zip(self._rows, self.pool.omegas, self.pool.directions, strict=True):
             keep = [

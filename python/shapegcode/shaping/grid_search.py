@@ -175,7 +175,8 @@ class GridSearch:
         return halved(lambda last: self._feasible(last) is not None, too_few, enough)
 
     def _usual_periods(self) -> int:
-        """About where the search ends: half a swing for each zero, a whole one for each limit without a zero in it."""
+        """Estimate of the duration found: half a cycle for each zero, a whole one for each limit without a zero in
+        it."""
         swings_s = sum(0.5 * zero.multiplicity / zero.mode.frequency_hz for zero in self._conditions.zeros)
         if not self._conditions.zeros:
             swings_s = sum(1.0 / limit.mode.frequency_hz for limit in self._conditions.limits)

@@ -97,7 +97,7 @@ def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
     """
     upper, lower = plot.column(
         ax, 2, size_inch=(9.0, 7.0), part=", ".join(map(str, result.modes)),
-        title="Duration against what is left: filled = Pareto front, ringed = recommended",
+        title="Duration against residual vibration: filled = Pareto front, ringed = recommended",
     )  # fmt: skip
     families = list(dict.fromkeys(each.family for each in result.designs))
     colours = {family: plot.COLOURS[number % len(plot.COLOURS)] for number, family in enumerate(families)}
@@ -135,7 +135,7 @@ def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
 def plot_sensitivity(
     result: Shapers, ax: Axes | None = None, *, modes: Sequence[float | str | Mode | ModeBand] = ()
 ) -> Axes:
-    """What is left if the frequency is another one? Residual vibration over the frequency of a mode, bands shaded.
+    """Plot the residual vibration over the frequency of a mode, bands shaded.
 
     Args:
         result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, or shapers by name.
@@ -148,7 +148,7 @@ def plot_sensitivity(
     """
     shapers, bands = _shapers_and_bands(result, modes)
     vibration_limit = result.vibration_limit if isinstance(result, Recommendation) else None
-    panel = plot.axes(ax, size_inch=(9.0, 5.4), title="What is left if the frequency is another one")
+    panel = plot.axes(ax, size_inch=(9.0, 5.4), title="Residual vibration at other frequencies")
     panel.text(
         1.0, 1.01, "a curve that comes down to 0 turns there: an amplitude has no sign", ha="right", fontsize=8,
         color="#555555", transform=panel.transAxes,

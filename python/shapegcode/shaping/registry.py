@@ -66,7 +66,7 @@ def _mirrored(bands: Sequence[ModeBand], options: DesignOptions, *, mirrored: bo
 
 
 _KALICO = "the printer firmware Kalico; on a grid: this project"
-_SMOOTH = "as smooth-zv; flat towards faster modes, so a grid must tell its highest zero from slower ones"
+_SMOOTH = "as smooth-zv; flat towards faster modes, so a grid must resolve its highest zero"
 
 FAMILIES: tuple[Family, ...] = (
     Family(
@@ -168,7 +168,7 @@ FAMILIES: tuple[Family, ...] = (
     ),
     Family(
         "taps", "impulses as given", "the user",
-        "judged as they are; on a grid only if their times lie on it", True, True, user_taps,
+        "evaluated as given; on a grid only if their times lie on it", True, True, user_taps,
     ),
 )  # fmt: skip
 """Every family, in the order of tables."""

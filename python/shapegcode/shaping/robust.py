@@ -205,7 +205,7 @@ class Task:
         return whole_periods(duration_s, self.period_s)
 
     def conditions(self, last: int) -> tuple[FloatArray, FloatArray]:
-        """Matrix and right-hand side of what the taps at 0 ... `last` periods meet exactly."""
+        """Matrix and right-hand side of the equality conditions on the taps at 0 ... `last` periods."""
         matrix, right = exact_conditions(self.exact, self.period_s, last)
         if not self.mirrored:
             return matrix, right

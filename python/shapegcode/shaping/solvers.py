@@ -283,7 +283,7 @@ def _samples(mode: Mode, ratios: tuple[float, ...], period_s: float, steps: int)
 def _other_period(highest_hz: float, period_s: float) -> str:
     """What to do where there is no kernel."""
     if 2.0 * highest_hz * period_s > 1.0:
-        return f"a period below {ms(0.5 / highest_hz)} tells its highest zero, {highest_hz:.4g} Hz, from slower ones"
+        return f"a period below {ms(0.5 / highest_hz)} resolves its highest zero, {highest_hz:.4g} Hz"
     return "it is for modes that are damped less"
 
 

@@ -154,7 +154,8 @@ def taps_of_mean(
 
 
 def _conditions(modes: Sequence[Mode], period_s: float, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sum 1, and of every mode both parts of the residual sum 0; scaled so that no entry exceeds 1."""
+    """Equations: sum of the impulses 1, real and imaginary part of every mode's residual 0; scaled so that no entry
+    exceeds 1."""
     poles = np.array([mode.pole for mode in modes])
     terms = np.exp(np.outer(poles, (steps[-1] - steps) * period_s))
     matrix = np.vstack([terms.real, terms.imag, np.ones(len(steps))])

@@ -13,10 +13,11 @@ _BUCKETS = 4000
 
 
 class MotionEnvelope:
-    """Least and largest value of several curves over equal stretches of samples, each as short as room allows."""
+    """Minimum and maximum of several curves over equal intervals of samples, as short as the number of intervals
+    allows."""
 
     def __init__(self, most: int = _BUCKETS) -> None:
-        """At most *most* stretches, 2 or more."""
+        """At most *most* intervals, 2 or more."""
         self._most = most
         self._low: FloatArray | None = None
         self._high: FloatArray | None = None
@@ -36,7 +37,7 @@ class MotionEnvelope:
             self._merge()
 
     def _merge(self) -> None:
-        """Pairs of stretches become one; an odd last one goes back to the samples that wait."""
+        """Join pairs of intervals; an odd last one goes back to the waiting samples."""
         assert self._low is not None and self._high is not None and self._rest is not None
         pairs = len(self._low) // 2
         if len(self._low) % 2:
@@ -49,7 +50,7 @@ class MotionEnvelope:
         self.samples_per_bucket *= 2
 
     def result(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Middle of each stretch in samples since the first, (n,); least and largest values, (n, curves)."""
+        """Middle of each interval in samples since the first, (n,); minimum and maximum, (n, curves)."""
         if self._low is None or self._high is None or self._rest is None:
             raise ValueError("no sample: an envelope needs one or more")
         low, high = self._low, self._high

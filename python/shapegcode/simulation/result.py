@@ -183,7 +183,7 @@ class Simulation(Result):
 
     @property
     def ok(self) -> bool:
-        """Without `against` nothing is held against a tolerance; with it every cut keeps its limits."""
+        """Whether every cut keeps its limits; without `against` always true."""
         return self.verdict is None or self.verdict.within_tolerance
 
     @property

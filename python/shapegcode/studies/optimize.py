@@ -1,4 +1,5 @@
-"""The shortest program that stays within tolerance as likely as asked: block period, family, tolerance, feed on arcs.
+"""The shortest program that stays within tolerance with a given probability: block period, family, tolerance, feed on
+arcs.
 
 All choices are converted where they are not too many; else SciPy's differential evolution says which ones.
 """
@@ -130,7 +131,7 @@ def _check_values(machine: Machine, choices: Choices) -> None:
 
 
 class _Choosing:
-    """A search under way."""
+    """A running search."""
 
     def __init__(
         self, program: Program | str, machine: Machine, choices: Choices,

@@ -97,7 +97,7 @@ def plot_choices(found: Optimum, ax: Axes | None = None) -> Axes:
 
 
 def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
-    """What is measured over the value that decides: median, and the band that holds 90 % of the draws.
+    """Plot a measure over the most important value: median, and the band that holds 90 % of the samples.
 
     Args:
         study: what was found.

@@ -39,7 +39,7 @@ MEASURES: Mapping[str, str] = {
     "original_contour_um": "contour error of the original's table",
     SHARE: "largest share of a limit",
 }
-"""What can be measured of each draw, in words."""
+"""Measures of each sample, with their meaning."""
 DEFAULT_MEASURES = ("residual_um", "contour_um", "time_s")
 
 CONTOURS = frozenset({"contour_um", "command_um", "response_um"})
@@ -222,7 +222,7 @@ class SamplesJob:
 def simulate_all(
     replay: Replay, job: SamplesJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
 ) -> list[list[float]]:
-    """Simulate the draws of one text."""
+    """Simulate the samples of one emitted program."""
     parts = list(job.parts(replay.time_s))
     found: list[list[float]] = []
     threads = ThreadPoolExecutor(cores())
@@ -248,7 +248,7 @@ def _replay(
     limits: tuple[tuple[tuple[float, ...], float, Any], ...],
     time_s: float,
 ) -> Replay:
-    """A replay that was pickled: on a worker a text is read once for all its draws."""
+    """A replay that was pickled: a worker reads an emitted program once for all its samples."""
     machine = Machine.from_toml(toml)
     read = Program.from_text(original, machine, source=source)
     shaped = Program.from_text(emitted, machine, source=source, emitted=True)

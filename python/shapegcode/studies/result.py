@@ -38,7 +38,7 @@ class VariedKey:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A measure over all draws."""
+    """A measure over all samples."""
 
     name: str  # of the measure, with its unit
     nominal: float  # on the machine as the file has it
@@ -78,7 +78,7 @@ def _with_error(value: float | None, error: float | None) -> str:
 
 @dataclass(frozen=True)
 class RefusedDraws:
-    """Draws that could not be simulated, because there is no text for them."""
+    """Samples that could not be simulated, because there is no emitted program for them."""
 
     values: str  # that the converter was given, in words
     draws: int  # how many
@@ -87,7 +87,7 @@ class RefusedDraws:
 
 @dataclass(frozen=True)
 class BinQuantiles:
-    """A measure over the draws in one bin of a value."""
+    """A measure over the samples in one bin of a value."""
 
     at: float  # median of the value; of a list the rank
     name: str  # of the bin
@@ -152,7 +152,7 @@ class MachineStudy(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether as many draws as should stay within tolerance."""
+        """Whether enough samples stay within tolerance."""
         return self.within >= self.at_least
 
     @property
@@ -168,15 +168,17 @@ class MachineStudy(Result):
     def next_step(self) -> str:
         """To measure what decides, or to convert."""
         if self.ok:
-            return f"convert {self.program} for {self.machine}: its tolerance bears what is not known."
+            return (
+                f"convert {self.program} for {self.machine}: it stays within tolerance in spite of the uncertainties."
+            )
         if not self.decides:
-            return "look at why draws were refused."
+            return "see why samples were refused."
         key = self.decides[0].key
         known = next(each.known for each in self.varied if each.key == key)
         if known:
             least = f"choose {key} where the share of the limit is least ({self.decides[0].low_at})"
             return f"{least}, or by shapegcode optimize with the same file."
-        return f"measure {key} more closely, or let shapegcode optimize choose a shaper that bears it."
+        return f"measure {key} more closely, or let shapegcode optimize choose a more robust shaper."
 
     def quantity(self, name: str) -> Quantity:
         """A measure.
@@ -337,7 +339,7 @@ class Candidate:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Optimum(Result):
-    """The shortest program that stays within tolerance as likely as was asked for.
+    """The shortest program that stays within tolerance with the requested probability.
 
     Attributes:
         program: its name.

@@ -131,7 +131,7 @@ def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> 
 
 @dataclass(frozen=True)
 class _Text:
-    """A text and its draws; without one the reason."""
+    """An emitted program and its samples; without a program the reason."""
 
     draws: tuple[int, ...]
     values: Mapping[str, object]
@@ -140,7 +140,7 @@ class _Text:
 
 
 class _StudyRun:
-    """A study under way."""
+    """A running study."""
 
     def __init__(
         self, program: Program | str, machine: Machine, varied: Sequence[Varied], columns: Columns,
@@ -204,7 +204,7 @@ class _StudyRun:
         self.measured[list(text.draws)] = simulate_all(text.replay, job, self.pool, tell)
 
     def _simulate_nominal(self, texts: Sequence[_Text]) -> None:
-        """The text for the machine file on that machine."""
+        """Simulate the program that is converted for the machine file, on that machine."""
         try:
             held = next((text.replay for text in texts if not text.values), None)
             replay = held or Replay.of(self.program, self.machine, shape_all=self.shape_all)
@@ -269,7 +269,7 @@ _CONFIDENCE = 0.95
 
 
 def check_probability(name: str, value: object) -> None:
-    """Refuse what is no probability that can be asked for."""
+    """Refuse an invalid probability."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value <= 1.0:
         raise ArgumentError(f"{name} = {value!r}: must be a probability, above 0 and at most 1")
 
@@ -281,7 +281,7 @@ def quantity(name: str, values: FloatArray, nominal: float) -> Quantity:
 
 
 def within(shares: FloatArray) -> npt.NDArray[np.bool_]:
-    """Which draws are within every limit; of the largest share of a limit of each."""
+    """Mask of the samples within every limit, from the largest ratio to a limit of each."""
     return shares <= _WITHIN
 
 
@@ -296,7 +296,7 @@ def interval_of(good: int, count: int) -> tuple[float, float]:
 
 
 def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple[BinQuantiles, ...]:
-    """Quantiles of a measure where a value is low, ..., high: in ten bins of as many draws, or by choice."""
+    """Quantiles of a measure over a varied value: in ten bins with equal numbers of samples, or by choice."""
     if isinstance(each.distribution, Listed):
         places = [(str(choice), [index for index, value in enumerate(column) if value == choice])
                   for choice in each.distribution.values]  # fmt: skip

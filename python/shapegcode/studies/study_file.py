@@ -169,12 +169,12 @@ class StudyFile(TomlTable):
         return self
 
     def options(self) -> dict[str, Any]:
-        """What `study` takes beside program and machine."""
+        """Arguments of `study` in addition to program and machine."""
         names = ("sampling", "measure", "seed", "indices", "at_least", "shape_all")
         return self._draws() | {name: getattr(self, name) for name in names}
 
     def choice_options(self) -> dict[str, Any]:
-        """What `optimize` takes beside program and machine."""
+        """Arguments of `optimize` in addition to program and machine."""
         names = ("seed", "shape_all", "most", "choose")
         return self._draws() | {name: getattr(self, name) for name in names} | {"probability": self.at_least}
 

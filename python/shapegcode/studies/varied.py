@@ -251,7 +251,7 @@ Columns = list[list[object]]
 
 
 def sampled_columns(varied: Sequence[Varied], n: int, sampling: str, seed: int, *, indices: bool) -> Columns:
-    """The values of all draws."""
+    """The values of all samples."""
     if sampling not in SAMPLINGS:
         raise ArgumentError(f"sampling = {sampling!r}: must be one of {', '.join(SAMPLINGS)}")
     if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MAX_DRAWS:

@@ -41,7 +41,7 @@ class CuttingLaw:
 
     @classmethod
     def of(cls, law: _core.CuttingCoefficients) -> CuttingLaw:
-        """The core's coefficients."""
+        """Convert to the coefficients of the core."""
         values = {name: getattr(law, name) for name in COEFFICIENTS}
         return cls(**values, chip_thickness="local" if law.thickness == _core.ChipThickness.local else "mean")
 
@@ -99,7 +99,7 @@ class MeasuringPass:
 
     @property
     def consistent(self) -> bool:
-        """Whether the edge ascends in X, the blocks do, and the pass begins and ends beyond the edge."""
+        """Whether edge and blocks ascend in X, and the pass starts and ends beyond the edge."""
         x, ends = np.array(self.edge_x_mm), [end for end, _ in self.feeds]
         ascending = len(x) == len(self.edge_height_mm) and bool(np.all(np.diff(x) > 0.0)) and ends == sorted(ends)
         return ascending and bool(self.start_mm < x[0] and x[-1] < self.end_mm)
@@ -151,7 +151,7 @@ class CornerDetails:
 
 @dataclass(frozen=True)
 class IntervalDetails:
-    """What is special about an interval test."""
+    """Parameters of an interval test."""
 
     radial_depth_mm: float  # everywhere
     intervals_mm: tuple[_Positive, ...]  # length of the blocks of each pass

@@ -1,4 +1,5 @@
-"""What the records of a test cut tell: coefficients of a taper, resultant of a corner, interval that is followed."""
+"""Evaluate the records of a test cut: coefficients of a taper, resultant in a corner, interval that the control
+follows."""
 
 from __future__ import annotations
 
@@ -162,7 +163,8 @@ def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
 def _reduced(
     cut: TestCut, measured: Mapping[int, ForceRecord], law: CuttingLaw
 ) -> tuple[list[MeanForces], list[TaperPass], list[LeftOut], list[str]]:
-    """The records as mean forces (as they are, or of the revolutions in full engagement without chatter), warnings."""
+    """Reduce the records to mean forces (as recorded, or of the revolutions in full engagement without chatter); and
+    warnings."""
     rows: list[MeanForces] = []
     passes: list[TaperPass] = []
     left_out: list[LeftOut] = []
@@ -204,8 +206,7 @@ def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> Me
     else:
         if record.position_mm is None:
             raise ArgumentError(
-                f"{record.file}: means over time do not tell where they were taken: needed is position_mm or "
-                "radial_depth_mm"
+                f"{record.file}: means over time have no position: needed is position_mm or radial_depth_mm"
             )
         row = fully_engaged(cut, measuring, record.position_mm)
         met = engagement(cut.tool, measuring, record.position_mm[row], up=cut.up)

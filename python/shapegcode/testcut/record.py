@@ -51,7 +51,7 @@ class ForceRecord:
 
 
 def _names(name: str) -> Meaning | None:
-    """What a name stands for; None: another column."""
+    """The meaning of a column name; None: another column."""
     plain = name.strip(" _").lower()
     return next((Meaning(what, kind) for what, kind, pattern in _NAMES if re.fullmatch(pattern, plain)), None)
 
@@ -218,7 +218,7 @@ def _spindle_speed(force_n: FloatArray, period_s: float, commanded: float, flute
 
 
 def turned(force: FloatArray, samples: float) -> FloatArray:
-    """Moving mean of each column over a stretch of a number of samples that need not be whole, centred."""
+    """Centred moving mean of each column over a number of samples that need not be whole."""
     middle = np.arange(len(force)) + 0.5
     low, high = np.clip(middle - 0.5 * samples, 0, len(force)), np.clip(middle + 0.5 * samples, 0, len(force))
     return np.asarray(_sums(force, low, high) / (high - low)[:, None])
@@ -381,7 +381,7 @@ def revolutions(record: PlacedRecord) -> Revolutions:
 
 
 def _swings(x: FloatArray, uneven: FloatArray, resultant: FloatArray) -> npt.NDArray[np.bool_]:
-    """Where the force within a revolution oscillates more, for its mean, than in the rest of the pass."""
+    """Mask where the force oscillates more within a revolution, relative to its mean, than in the rest of the pass."""
     if len(uneven) < _MIN_REVOLUTIONS:
         return np.zeros(len(uneven), dtype=bool)
     share = uneven / np.maximum(resultant, 1e-300)

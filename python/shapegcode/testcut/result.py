@@ -362,7 +362,7 @@ class IntervalResult(Result):
 
     @property
     def next_step(self) -> str:
-        """To set the interval, or to try longer ones."""
+        """Set the interval, or test longer ones."""
         if self.interval_mm is None:
             return "shapegcode testcut interval --intervals with longer ones"
         return f"set feed_control.interval_mm = {self.interval_mm} in the machine file"

@@ -69,7 +69,7 @@ class TimeInterval:
         return _half(self.steps.values(), self.scatters.values())
 
     def parts(self) -> tuple[OpenPart, ...]:
-        """What it is made of, the largest first."""
+        """Its components, the largest first."""
         found: dict[str, float] = defaultdict(float)
         for name, value in (*self.steps.items(), *self.scatters.items()):
             found[_KINDS if name.startswith(_KINDS) else name] += value**2
@@ -78,9 +78,9 @@ class TimeInterval:
         return tuple(sorted(parts, key=lambda part: -part.share))
 
     def narrowed_by(self) -> str:
-        """What a program must hold that would narrow it, in words; no log narrows what scatters between runs."""
+        """Text: what a logged program must contain to narrow it; scatter between runs cannot be narrowed."""
         name = next((part.name for part in self.parts() if part.name not in (BETWEEN, RUNS)), CUTS)
-        text = next((text for word, text in _TELLS.items() if word in name), f"a program in which {name} stands alone")
+        text = next((text for word, text in _TELLS.items() if word in name), f"a program in which {name} occurs alone")
         return text.format(move=self.mean_move_mm)
 
     def after_logging(self, other: TimeInterval) -> float:

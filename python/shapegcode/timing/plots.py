@@ -60,7 +60,7 @@ def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
 
 
 def _bars(panel: Axes, names: Sequence[str], rows: Sequence[Mapping[str, float]], parts: Sequence[str]) -> None:
-    """One lying bar per row, longest part first in the order of the parts; its length stands behind it."""
+    """One horizontal bar per row, divided into parts, the longest row first, with its length next to it."""
     positions = range(len(names))
     ends = [0.0] * len(names)
     for part in parts:

@@ -1,4 +1,4 @@
-"""How long a program takes: figures, tables, the file of its blocks, the next step."""
+"""The cycle time of a program: figures, tables, the file of its blocks, the next step."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class CycleTime(TimeParts, Result):
         machine: name of the machine.
         total_low_s: lower end of the 95 % interval of the whole; None: the machine was not calibrated with run logs.
         total_high_s: upper end; None: likewise.
-        interval_parts: what the interval is made of, the largest first; empty: likewise.
+        interval_parts: components of the interval, the largest first; empty: likewise.
         narrowed_by: what a program must hold whose log would narrow the interval most, in words; None: likewise.
         log_next: programs that could be logged next, the most useful first; empty unless asked for.
         full_interpolation_s: the whole time by giving every set-point; None: not asked for.
@@ -251,9 +251,9 @@ class CycleTime(TimeParts, Result):
         if self.regions or self.blocks:
             found.append(self._slowest_table())
         if self.interval_parts:
-            found.append(Table("what the interval is made of", _INTERVAL, self.interval_parts[:_SLOWEST]))
+            found.append(Table("components of the interval", _INTERVAL, self.interval_parts[:_SLOWEST]))
         if self.log_next:
-            found.append(Table("what is left of the interval, logged next", _LOG_NEXT, self.log_next))
+            found.append(Table("remaining interval if logged next", _LOG_NEXT, self.log_next))
         return found
 
     def _parts_table(self) -> Table:

@@ -103,7 +103,7 @@ class LimitCheck:
 
 
 def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]]]]:
-    """Key of every mode that states an uncertainty, with the words and the shift of its cases."""
+    """Key of every mode that states an uncertainty, with the names and shifts of its cases."""
     found = []
     for axis, table in zip("XYZ", machine.axes.as_tuple(), strict=True):
         for number, mode in enumerate(table.modes, start=1):
@@ -269,7 +269,8 @@ class CaseSimulation:
     increment_mm: float  # least increment of the text
 
     def nominal(self, rule: _core.BlockEnd) -> _core.SimulationFigures:
-        """Blocks at 100 %; under the controller's own rule also with an empty buffer where a stop excites most."""
+        """Simulate the blocks at 100 %; with the control's own block timing also a buffer underrun where a stop excites
+        most."""
         own = rule == self.model.own_rule
         return self.model.simulate_emitted(
             self.blocks, self.path, rule, offset=self.offset,
@@ -279,14 +280,14 @@ class CaseSimulation:
         )  # fmt: skip
 
     def planned(self) -> _core.SimulationFigures | None:
-        """The look-ahead left on; None where no case asks."""
+        """Simulate with the look-ahead left on; None if no case needs it."""
         wanted = any(case.look_ahead for case in self.cases)
         if not wanted:
             return None
         return self.model.simulate_planned(self.blocks, self.path, offset=self.offset, tracker=self.tracker)
 
     def _beside(self, case: Case) -> bool:
-        """Whether the contour of a case is measured beside the nominal run."""
+        """Whether the contour of a case is computed in addition to the nominal case."""
         return case.override != 1.0 and case.mode is None and self.model.bounds_deviations
 
     def _whole(self, case: Case) -> bool:
@@ -373,7 +374,8 @@ def case_figures(run: _core.SimulationFigures, *, contour: bool = True, response
 
 
 def _starved(run: _core.SimulationFigures, waited_s: float) -> CaseFigures:
-    """The worst of all places; at the end of the region the vibration is that without a wait, but for a wait nearby."""
+    """The worst of all positions of the underrun; at the end of the region the vibration is that without one, unless it
+    is nearby."""
     runs: list[_core.SimulationFigures | _core.StarvedFigures] = [run, *run.starved]
     return CaseFigures(
         np.max([each.residual_mm for each in runs], axis=0),

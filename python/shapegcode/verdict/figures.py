@@ -15,7 +15,7 @@ from shapegcode.results.result import Pair, Xyz
 
 @dataclass(frozen=True)
 class Placed:
-    """A region and where its shaped blocks stand in the emitted text."""
+    """A region and the lines of its shaped blocks in the emitted program."""
 
     region: _core.Region  # of the original program
     first_line: int  # first emitted line, from 1
@@ -108,7 +108,7 @@ class FrequencyResidual:
 
 @dataclass(frozen=True)
 class CaseVerdict:
-    """The emitted program in one case: what it leaves, beside the limit that it comes nearest to."""
+    """The emitted program in one case: residual and the figure nearest to its limit."""
 
     name: str  # in words, unique
     block_end: str | None  # "ceil" or "carry"; null where look-ahead plans the blocks anew

@@ -1,4 +1,4 @@
-"""The verdict on an emitted text: regions simulated in every condition, held against limits, summed up."""
+"""The verdict on an emitted program: simulate its regions in every condition, compare them with the limits, sum up."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class RegionFigures:
 
 @dataclass(frozen=True)
 class PendingSimulations:
-    """The simulations of one emitted region under way."""
+    """The running simulations of one emitted region."""
 
     simulation: CaseSimulation  # whose tasks they are
     nominal: Sequence[Future[_core.SimulationFigures]]  # under both rules of block end
@@ -246,7 +246,7 @@ class Judge:
         return None if worst is None else worst.lines
 
     def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
-        """What a region is judged by: its residual beside that of the original as programmed, in whatever case."""
+        """Limit of a region: its residual compared with that of the original as programmed, in every case."""
         tolerance, floor_um = self._machine.tolerance, residual_floor_um(place.region, self._machine)
         before_um = figures.original.residual_mm * 1e3
         return RegionLimits(

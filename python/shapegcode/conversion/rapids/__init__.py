@@ -1,1 +1,1 @@
-"""Rapids written as shaped moves where that settles the table sooner."""
+"""Rapids written as shaped moves where the vibration then settles sooner."""

@@ -69,7 +69,7 @@ class OpenGap:
                 self._at.append(at)
 
     def _ready_s(self, shaped: Sequence[bool]) -> float:
-        """Time from the last cut until the next one finds the table settled, s."""
+        """Time from the end of the last cut until the vibration has settled for the next one, s."""
         steps = list(self._steps)
         for at, choice, is_shaped in zip(self._at, self.choices, shaped, strict=True):
             if is_shaped and choice.after is not None:
@@ -131,7 +131,7 @@ class Timing:
 
     @property
     def settled_s(self) -> float:
-        """Until the axes have arrived and the table has settled."""
+        """Time until the axes have arrived and the vibration has settled."""
         return self.motion_s + max(self.arrival_s, self.settling_s)
 
 
@@ -183,7 +183,7 @@ class RapidPlant:
         return self._known[key]
 
     def simulate_original(self, rapid: Rapid) -> _core.SimulationFigures:
-        """The rapid's figures beside which those of the replacement stand."""
+        """The rapid's figures, with which those of the replacement are compared."""
         return self._machine_model.simulate_rapid(rapid.start_mm, rapid.end_mm, self._options(rapid.region))
 
     def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:

@@ -1,1 +1,1 @@
-"""A log of commands and actual positions held against the models of the position loop."""
+"""Fit models of the position loop to a log of commands and actual positions."""

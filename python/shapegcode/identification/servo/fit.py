@@ -138,14 +138,14 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
 
 
 def _unlike(trace: ServoTrace) -> str:
-    """Says where the actual position goes another way than the command: other units, another axis, another sign."""
+    """Raise an error if the actual position does not follow the command: other units, another axis, another sign."""
     way = [r - r.mean() for r in trace.command]
     power = sum(float(r @ r) for r in way)
     slope = sum(float(r @ (x - x.mean())) for r, x in zip(way, trace.actual, strict=True)) / power
     low, high = _SLOPE
     if low <= slope <= high:
         return ""
-    return f"the actual position goes {slope:.3g} times the way of the command: not the same unit, sign or axis"
+    return f"the actual position moves {slope:.3g} times as far as the command: not the same unit, sign or axis"
 
 
 def _two_lags(trace: ServoTrace, speeds: Sequence[FloatArray], top: float) -> str:
@@ -269,7 +269,7 @@ def _machine_axes(record: ServoRecord, axes: str | Mapping[str, str] | None) -> 
 def _machine_with(
     machine: Machine, axes: Sequence[ServoAxis], places: Mapping[str, int]
 ) -> tuple[Machine, dict[str, float], list[str]]:
-    """The machine with gain and feed-forward of the axes that tell them."""
+    """The machine with gain and feed-forward of the axes whose log determines them."""
     written: dict[str, float] = {}
     remarks: dict[str, list[str]] = {}
     warnings: list[str] = []

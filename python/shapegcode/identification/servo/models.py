@@ -57,12 +57,12 @@ def rms(values: FloatArray) -> float:
 
 
 def counted(values: Sequence[FloatArray], use: Masks) -> FloatArray:
-    """The samples that count, of all stretches."""
+    """The samples that count, of all sections."""
     return np.concatenate([each[keep] for each, keep in zip(values, use, strict=True)])
 
 
 def delayed(way: FloatArray, samples: float) -> FloatArray:
-    """A command some samples later: joined by straight lines, at constant speed before its first sample."""
+    """A command delayed by a number of samples: interpolated linearly, at constant speed before its first sample."""
     at = np.arange(len(way)) - samples
     found: FloatArray = np.interp(at, np.arange(len(way)), way)
     return np.where(at < 0.0, way[0] + at * (way[1] - way[0]), found)
@@ -179,7 +179,7 @@ def lag_estimates(
         half(name, *row) for name, row in zip(("dead_s", "gain_per_s", "rest"), np.eye(4), strict=False)
     )
     ends = max(0.0, 1.0 - rest - forward), min(1.0, 1.0 - rest + forward)
-    why = "the feed-forward leaves no lag that tells it"
+    why = "the feed-forward leaves no lag that determines it"
     loop = (
         ServoEstimate("position gain", None, None, None, "1/s", why),
         ServoEstimate("feed-forward", None, *ends, "1", why),
@@ -256,7 +256,7 @@ def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, te
 
 
 def _drive_ways(trace: ServoTrace, values: FloatArray, period_s: float, top_speed: float) -> list[FloatArray]:
-    """Position of the drive in each stretch; before it the axis has its first speed for long."""
+    """Position of the drive in each section; before it the axis is assumed to have its first speed."""
     dead_ms, gain, rest, bandwidth, integral, coulomb = values
     friction, smoothing = math.exp(coulomb), _SIGN_RATIO * top_speed * _MM
     parameters = _core.FeedDriveParameters(

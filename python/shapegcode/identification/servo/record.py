@@ -26,7 +26,7 @@ _LARGEST_ACCELERATION = 5e5  # mm/s² or degrees/s²; a command beyond it is no 
 
 @dataclass(frozen=True, eq=False)
 class ServoTrace:
-    """One axis; a stretch is a range of samples without a gap.
+    """One axis; a section is a range of samples without a gap.
 
     Attributes:
         name: of the axis, as the file has it.
@@ -48,7 +48,7 @@ class ServoTrace:
 
     @property
     def samples(self) -> int:
-        """Of all stretches."""
+        """Of all sections."""
         return sum(map(len, self.command))
 
     @cached_property
@@ -82,7 +82,7 @@ class ServoTrace:
         return self._parts([(rank, slice(start, end)) for rank, start, end in kept])
 
     def _parts(self, kept: Sequence[tuple[int, slice]]) -> ServoTrace:
-        """Parts of stretches, as stretches of their own."""
+        """Parts of sections, as separate sections."""
         names = ("time_s", "command", "actual", "deviation", "torque")
         columns = {name: values for name in names if (values := getattr(self, name)) is not None}
         cut: dict[str, Any] = {n: tuple(values[rank][part] for rank, part in kept) for n, values in columns.items()}
@@ -147,7 +147,7 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
         ranges = _ranges(command, capture.stretches, capture.cycle_s)
         if len(ranges) > len(capture.stretches):
             where = f"{capture.time_s[ranges[1].start]:.3f} s"
-            notes.append(f"{label}: its command jumps, first at {where}: divided there")
+            notes.append(f"{label}: its command has a step, first at {where}: divided there")
         ranges = tuple(each for each in ranges if each.stop - each.start >= _FEWEST)
         if not ranges:
             notes.append(f"{label}: left out: no {_FEWEST} samples without gap or jump")
@@ -164,7 +164,7 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
 
 
 def _ranges(command: FloatArray, stretches: tuple[slice, ...], period_s: float) -> tuple[slice, ...]:
-    """The stretches, divided where the command jumps in one sample: other coordinates, no motion."""
+    """The sections, divided where the command has a step within one sample: other coordinates, no motion."""
     out = []
     for each in stretches:
         steps = np.diff(command[each])

@@ -28,7 +28,7 @@ class ServoEstimate:
 
 @dataclass(frozen=True)
 class ServoModel:
-    """A model of the loop, held against the record."""
+    """A model of the loop, compared with the record."""
 
     name: str  # "servo lag", "dead time and servo lag", "drive"
     # root mean square of what it leaves of the following error in samples that it was not fitted to, in mm or degrees
@@ -41,7 +41,7 @@ class ServoModel:
 
 @dataclass(frozen=True, eq=False)
 class ServoCurves:
-    """What the picture shows of an axis, one array for each stretch without a gap."""
+    """Data of the picture of an axis, one array for each section without a gap."""
 
     time_s: tuple[FloatArray, ...]  # (n,)
     speed: tuple[FloatArray, ...]  # of the command, (n,)
@@ -136,12 +136,12 @@ class ServoFit(Result):
 
     @property
     def ok(self) -> bool:
-        """At least one axis tells its loop."""
+        """Whether the loop of at least one axis is determined."""
         return any(axis.models for axis in self.axes)
 
     @property
     def answer(self) -> str:
-        """How much of the following error is explained, in the axis that lags most."""
+        """Ratio of the following error that the model explains, for the axis with the largest one."""
         fitted = [axis for axis in self.axes if axis.models]
         if not fitted:
             return f"{self.source}: no axis changes its speed: nothing follows but the lag at constant speed"
@@ -150,10 +150,10 @@ class ServoFit(Result):
             for axis in fitted
             if (best := axis.best) is not None
         )
-        return f"following error, rms, and what our model leaves of it where it was not fitted: {said}"
+        return f"following error, rms, and the model's residual in data to which it was not fitted: {said}"
 
     def to_toml(self) -> str:
-        """The machine file with gain and feed-forward that are known; a remark stands behind each.
+        """The machine file with the gain and feed-forward that are known, each with a remark.
 
         Returns:
             The text of the file.
@@ -173,7 +173,7 @@ class ServoFit(Result):
         """To write the machine file, or to look at the pictures."""
         if self.written:
             return "-o FILE writes the machine file with " + ", ".join(self.written)
-        return "--plots DIR draws what is left; -m and -o write gain and feed-forward into a machine file"
+        return "--plots DIR plots the residual; -m and -o write gain and feed-forward into a machine file"
 
     def next_step_after(self, file: str) -> str:
         """To look at the machine file that was written.
@@ -247,7 +247,7 @@ def _columns(parameters: Sequence[tuple[str, str, str]]) -> tuple[Column, ...]:
 
 
 def _cell(name: str, axis: ServoAxis) -> str:
-    """Value and interval; a question mark where the record does not tell the value."""
+    """Value and interval; a question mark if the record does not determine the value."""
     found = axis.parameter(name)
     if found is None:
         return ""

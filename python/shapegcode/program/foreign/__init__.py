@@ -1,1 +1,1 @@
-"""Programs in the words of controls other than FANUC's, read into plain programs in FANUC's words."""
+"""Programs for controls other than FANUC's, translated into expanded programs in FANUC's dialect."""

@@ -1,4 +1,4 @@
-"""Programs in a Haas mill's words: FANUC's, but for a few that are written anew, line by line.
+"""Translate programs for a Haas mill: as FANUC's, except for a few words that are replaced, line by line.
 
 Sources, by topic: docs/reference/input_dialects.md. A code for which no text was found is refused, not guessed.
 """
@@ -26,7 +26,7 @@ _REFUSED: Mapping[str, str] = {
     "12": "circular pocket milling", "13": "circular pocket milling", "47": "engraving of a text",
     "70": "a bolt hole circle", "71": "a bolt hole arc", "72": "bolt holes along an angle",
     "76": "fine boring, whose shift a setting gives", "77": "back boring", "87": "boring with a manual retract (FANUC: "
-    "back boring)", "88": "boring with a manual retract", "93": "inverse time, of which no text says how F counts in "
+    "back boring)", "88": "boring with a manual retract", "93": "inverse time; no documentation was found on F in "
     "arcs", "96": "constant surface speed", "150": "general pocket milling",
 }  # fmt: skip
 _CYCLES = frozenset(("73", "74", "81", "82", "83", "84", "85", "86", "89"))
@@ -61,7 +61,7 @@ _MACRO = re.compile(r"[ \t]*(?:N[ \t]*\d+[ \t]*)?(?:#|IF|WHILE|END|GOTO|DPRNT|PO
 
 
 def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
-    """The program in FANUC's words: what means another thing on a Haas is written anew, everything else stays."""
+    """The program as one for FANUC: words with another meaning on a Haas are replaced, everything else is unchanged."""
     notes: dict[str, Note] = {}
     lines, called = _lines(source, file, notes)
     numbers = [*range(1, max(len(lines), 1) + 1)]
@@ -172,7 +172,7 @@ def _refuse(codes: list[str], code: str) -> None:
         if name in _REFUSED:
             raise ValueError(f"G{name} is {_REFUSED[name]} on a Haas: it is not read")
         if name not in _AS_FANUC and not re.fullmatch(r"103|154|187|1[12]\d", name):
-            raise ValueError(f"G{name}: no text was found that says what it is on a Haas: it is not read")
+            raise ValueError(f"G{name}: no documentation was found for it on a Haas: it is not supported")
     if (feed := _INTEGER_F.search(code)) is not None:
         value = int(feed[1])
         raise ValueError(
@@ -180,10 +180,11 @@ def _refuse(codes: list[str], code: str) -> None:
             f"{value / 10000:g} inch), FANUC F{value}.: write the point"
         )
     if re.search(r"M[ \t]*96(?!\d)", code, re.IGNORECASE):
-        raise ValueError("M96 jumps where an input is not set, which only the machine knows: it is not read")
+        raise ValueError("M96 jumps if an input is not set, which is known only at the machine: it is not supported")
     if "10" in codes and (word := re.search(r"L[ \t]*(1[23])(?!\d)", code, re.IGNORECASE)):
         raise ValueError(
-            f"G10 L{word[1]}: a diameter or a radius, as setting 40 of a Haas says; FANUC's is a radius: write the "
+            f"G10 L{word[1]}: a diameter or a radius, depending on setting 40 of a Haas; FANUC's is a "
+            "radius: write the "
             "radius into input.tool_radius_mm"
         )
     if "10" in codes and re.search(r"L[ \t]*2(?!\d)", code, re.IGNORECASE) and re.search(r"P[ \t]*0+(?!\d)", code):
@@ -197,7 +198,9 @@ def _with_dwell(words: str, codes: list[str], note: Callable[[str, str], None]) 
     if match is None or (others and "4" not in codes):
         return words
     if "4" in codes and match[1] in {"#", "["}:
-        raise ValueError("a dwell by a variable is seconds or milliseconds, as the point of its value says")
+        raise ValueError(
+            "a dwell by a variable is in seconds or milliseconds, depending on the decimal point of its value"
+        )
     if "." not in match[1]:
         return words  # milliseconds, as FANUC's, or a variable
     seconds = float(match[1])

@@ -1,4 +1,4 @@
-"""Programs in LinuxCNC's words: executed as its interpreter does, and written as plain programs in FANUC's words.
+"""LinuxCNC programs: executed as its interpreter does, and written as expanded programs in FANUC's dialect.
 
 What is read and what is refused: docs/reference/input_dialects.md. Its control flow, parameters and modes are those of
 LinuxCNC 2.9's documentation; tests hold the moves against its own interpreter rs274.
@@ -53,7 +53,7 @@ _N_WORD = re.compile(r"^[ \t]*/?[ \t]*N[ \t]*0*([1-9]\d{0,4})(?![\d.])", re.IGNO
 
 
 def read_linuxcnc(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
-    """The plain program that a program in LinuxCNC's words comes to."""
+    """The expanded program of a LinuxCNC program."""
     return _Interpreter(source, file, machine, folder).run()
 
 
@@ -220,20 +220,20 @@ class _Interpreter:
         return block
 
     def _skipping(self, block: Block) -> Block | None:
-        """A line with `/`: as the switch stands."""
+        """Whether a line with `/` is executed, by the state of the block-skip switch."""
         switch = self._machine.input.block_skip
         if switch == "on":
             return None
         if switch == "unknown":
             self._plain.note(
                 self._runner.line,
-                "`/` lines run here as with the switch off; input.block_skip says how it stands",
+                "`/` lines are executed, as with the block-skip switch off; input.block_skip states its position",
                 "block skip",
             )
         return block
 
     def _set(self, block: Block) -> None:
-        """The settings of a line take effect together, when all values of it are known."""
+        """Assign the parameters of a line together, after all its values are evaluated."""
         worked_out = [
             (setting.name if isinstance(setting.name, str) else evaluate(setting.name, self._parameters),
              evaluate(setting.value, self._parameters))
@@ -456,8 +456,8 @@ class _Interpreter:
             )
         if self._plain.size - len(self._main.text) > controller.max_expansion_bytes:
             raise ValueError(
-                f"up to here the plain program is more than {controller.max_expansion_bytes} bytes longer than the "
-                "text (controller.max_expansion_bytes)"
+                f"up to here the expanded program is more than {controller.max_expansion_bytes} bytes larger than the "
+                "program (controller.max_expansion_bytes)"
             )
 
     def _call_stack(self) -> str:

@@ -25,7 +25,7 @@ _KEPT_OUTPUTS = {
 
 
 class BlockRunner:
-    """Executes blocks and writes what they come to."""
+    """Executes blocks and writes the lines that they become."""
 
     def __init__(self, state: State, plain: PlainProgram) -> None:
         """Begin in this state."""
@@ -47,7 +47,7 @@ class BlockRunner:
         self.plain.put(text, self.line, self.file)
 
     def note(self, text: str, key: str) -> None:
-        """Tell something once."""
+        """Add a note, if it is not there yet."""
         where = f"{self.plain.names[self.file - 1]}:{self.line}: " if self.file else ""
         self.plain.note(self.line if not self.file else 1, where + text, key)
 
@@ -112,7 +112,7 @@ class BlockRunner:
             line.append("M06")
         if 61 in functions:
             state.tool = int(values.get("q", 0.0))
-            self.note(f"M61 Q{state.tool} says which tool is in the spindle: nothing moves", "M61")
+            self.note(f"M61 Q{state.tool} states the tool in the spindle: no motion", "M61")
         if line:
             self.put("".join(line))
         line = [f"S{round(values['s'])}"] if "s" in values else []

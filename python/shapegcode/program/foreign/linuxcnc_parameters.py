@@ -1,4 +1,4 @@
-"""LinuxCNC's parameters: numbered and named, of a subroutine or of all, and those that its interpreter keeps itself."""
+"""LinuxCNC's parameters: numbered and named, local and global, and those that its interpreter defines."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ParameterTable:
         return value
 
     def named(self, name: str) -> float:
-        """The value of `#<name>`; those that begin with _ are known everywhere."""
+        """The value of `#<name>`; those that begin with _ are global."""
         own = self._global if name.startswith("_") else self._frames[-1].names
         if name in own:
             return own[name]

@@ -1,4 +1,4 @@
-"""The plain program that a program in another control's words comes to, and what must be known to read it as such."""
+"""The expanded program of a program for another control, and what is needed to read it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MAX_DIGITS = 8
 
 @dataclass(frozen=True)
 class Note:
-    """Something to tell about a line of the source."""
+    """A note about a line of the source."""
 
     line: int  # of the source, from 1
     text: str  # one sentence, with both meanings where a word means another thing on FANUC
@@ -43,7 +43,7 @@ class ForeignSettings:
 
 @dataclass(frozen=True)
 class ForeignProgram:
-    """A program in another control's words, as a plain program in FANUC's.
+    """A program for another control, translated into an expanded program for FANUC.
 
     Its numbers have a point where a unit hangs on it (`X10.`), I J K are distances from the start, dwells are
     `G04 X` in seconds; it begins and ends with a line `%`. One that calls programs of its own may keep these calls.

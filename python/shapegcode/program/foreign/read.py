@@ -1,4 +1,4 @@
-"""A program in whatever control's words as a plain program in FANUC's: which dialect it is, and its reader."""
+"""Translate a program of any dialect into an expanded program for FANUC: choose the dialect and its reader."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def doubtful_word(text: bytes) -> tuple[int, str] | None:
         if dwells
         else f"P{value} of an arc is not read, as FANUC knows none; on LinuxCNC the arc has {value} turns"
     )
-    return code.count(b"\n", 0, match.start()) + 1, f"{sentence}: controller.dialect says which"
+    return code.count(b"\n", 0, match.start()) + 1, f"{sentence}: state which with controller.dialect"
 
 
 def words_behind_semicolon(text: bytes) -> int | None:
@@ -159,7 +159,7 @@ def words_behind_semicolon(text: bytes) -> int | None:
 
 
 def _end(code: bytes) -> int:
-    """Where a program ends: no control reads what stands behind its second line `%`."""
+    """End of a program: no control reads beyond its second `%` line."""
     ends = [match.end() for match in _PERCENT.finditer(code)] if b"%" in code else []
     return ends[1] if len(ends) > 1 else len(code)
 
@@ -168,7 +168,7 @@ Reader = Callable[..., ForeignProgram]
 
 
 def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | None) -> ForeignProgram | None:
-    """The plain program of a text in another control's words; None: it is in FANUC's.
+    """The expanded program of a program for another control; None: it is one for FANUC.
 
     The dialect is that of `controller.dialect`; "auto": as words tell that only one control knows, and where none
     does, that of a control whose planner is LinuxCNC's (`controller.kind`).
@@ -192,12 +192,12 @@ def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
             source,
             line,
             "words behind `;`: FANUC begins a block there, LinuxCNC, a Haas and a Sinumerik have a comment; write a "
-            "line end or ( ), or say whose program it is: --set controller.dialect=linuxcnc, haas or siemens",
+            "line end or ( ), or state the control: --set controller.dialect=linuxcnc, haas or siemens",
         )
 
 
 def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]:
-    """In whose words a program is."""
+    """The dialect of a program."""
     stated = machine.controller.dialect
     # A machine of FANUC's kind and a program without foreign words: the usual case takes one look.
     expected = stated if stated != "auto" else machine.controller.kind
@@ -219,8 +219,8 @@ def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]
             source,
             second.line,
             f"{second.words} is a word of {CONTROLS[second.dialect]} ({second.meaning}), and {first.words} in line "
-            f"{first.line} one of {CONTROLS[first.dialect]} ({first.meaning}): the program mixes them; "
-            "controller.dialect says which control reads it",
+            f"{first.line} one of {CONTROLS[first.dialect]} ({first.meaning}): the program mixes them; state the "
+            "control with controller.dialect",
         )
     if signs:
         return signs[0].dialect, signs[0].reason

@@ -1,8 +1,8 @@
-"""SINUMERIK programs (DIN mode) as plain programs in FANUC's words: executed as the control would.
+"""SINUMERIK programs (DIN mode): executed as the control would, and written as expanded programs for FANUC.
 
 Sources: subprograms easymanua.ls 1265481 pp. 491 to 494; work offsets and SUPA 679150 p. 100; jumps and loops as
 nc-gcode-interpreter 0.2 has them (SINUMERIK ONE manual 4.1.5, 4.1.7); tool and D number i5cnc.com 126; what no page
-was found for is *assumed* and stands so in docs/reference/input_siemens.md.
+was found for is *assumed* and marked so in docs/reference/input_siemens.md.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class _Run:
             return variable.read(name, index, column)
         parameter = self._r_number(name, index, column)
         if parameter is None:
-            raise WordError(f"{name} is no variable of this program: DEF would have to define it before", column)
+            raise WordError(f"{name} is no variable of this program: DEF must define it before", column)
         if parameter not in self._r:
             raise WordError(f"R{parameter} is read before the program sets it: its value is in the control", column)
         return self._r[parameter]
@@ -115,9 +115,7 @@ class _Run:
             return
         parameter = self._r_number(word.name, index, word.column)
         if parameter is None:
-            raise word.error(
-                f"{word.name} alone: its number would have to follow (R1= or R[1]=); the radius of an arc is CR="
-            )
+            raise word.error(f"{word.name} alone: its number must follow (R1= or R[1]=); the radius of an arc is CR=")
         self._r[parameter] = float(number(value, word.column))
 
     def _r_number(self, name: str, index: tuple[Value, ...], column: int) -> int | None:
@@ -166,10 +164,10 @@ class _Run:
         limits = self.machine.controller
         if self._steps_left < 0:
             number = f"controller.max_program_steps = {limits.max_program_steps}"
-            raise WordError(f"more blocks are executed than {number}: an endless loop would have to end", 1)
+            raise WordError(f"more blocks are executed than {number}: an endless loop must end", 1)
         if self.path.moves > self._moves_left:
             number = f"controller.max_expansion_moves = {limits.max_expansion_moves}"
-            raise WordError(f"loops and calls come to more moves than {number}", 1)
+            raise WordError(f"loops and calls make more moves than {number}", 1)
 
     def _error(self, program: ProgramLines, index: int, column: int, message: str) -> ProgramError:
         line = program.first + index
@@ -181,7 +179,7 @@ class _Run:
             return False
         switch = self.machine.input.block_skip
         if switch == "unknown":
-            raise WordError('/: whether the block runs would have to be known: input.block_skip = "on" or "off"', 1)
+            raise WordError('/: whether the block runs must be known: input.block_skip = "on" or "off"', 1)
         return switch == "on"
 
     def _words(self, block: SiemensBlock) -> str:
@@ -196,7 +194,7 @@ class _Run:
         others = [word for word in block.words[1:] if word.name != "P"]
         if others:
             raise others[0].error(
-                f"{others[0].name} beside the call of {call.name}: the call would have to be a block of its own"
+                f"{others[0].name} beside the call of {call.name}: the call must be in a separate block"
             )
         count = next((whole(word.value(self), "P", word.column) for word in block.words[1:] if word.value), 1)
         for _ in range(count):
@@ -218,7 +216,7 @@ class _Run:
         head = self._heading(program)
         variables, references = self._parameters(head, word) if head else ({}, {})
         if head is None and word.given:
-            raise word.error(f"{word.name}( ) with values: PROC with parameters would have to begin {program.file}")
+            raise word.error(f"{word.name}( ) with values: PROC with parameters must begin {program.file}")
         line, file, modes = self.path.line, self.path.file, replace(self.path.modes)
         self._calls.append(f"line {line}")
         self._run(program, variables)
@@ -261,7 +259,7 @@ class _Run:
         probe = _Probe()
         value(probe)
         if len(probe.found) != 1 or not self.knows(probe.found[0][0]):
-            raise word.error(f"{word.name}: a value for a parameter with VAR would have to be a variable")
+            raise word.error(f"{word.name}: a value for a parameter with VAR must be a variable")
         name, index = probe.found[0]
         return Word(name, word.column, None, "", tuple(constant(each) for each in index))
 
@@ -312,7 +310,7 @@ class _Run:
 
     def _set_counter(self, block: SiemensBlock, value: Value) -> None:
         if not self.knows(block.name):
-            raise block.error(f"{block.name} of FOR is no variable of this program: DEF would have to define it before")
+            raise block.error(f"{block.name} of FOR is no variable of this program: DEF must define it before")
         self.assign(Word(block.name, block.column, None, "", block.index), value)
 
     def _counter(self, block: SiemensBlock) -> float | int:
@@ -381,7 +379,7 @@ class _Flow:
         for line in range(index - 1, -1, -1):
             if self._is_at(line, block.name):
                 return line
-        raise block.error(f"REPEAT {block.name}: no such label stands before it")
+        raise block.error(f"REPEAT {block.name}: there is no such label before it")
 
     def _is_at(self, line: int, target: str) -> bool:
         text = self.program.lines[line].upper()

@@ -133,7 +133,7 @@ def block_of(line: str) -> SiemensBlock:
     if found is None:
         return replace(block, words=_words(scan))
     if not scan.is_done:
-        raise scan.error(f"{scan.rest} behind {name[0] if name else ''}: the block would have to end here")
+        raise scan.error(f"{scan.rest} behind {name[0] if name else ''}: the block must end here")
     return found
 
 
@@ -181,19 +181,17 @@ def _jump(scan: SiemensScanner, condition: Expression | None) -> Jump:
     column = _begin(scan) + 1
     command = scan.take(_JUMP)
     if not command:
-        raise scan.error(
-            f"{scan.rest} behind the condition: GOTOF, GOTOB, GOTO or GOTOC would have to follow, or nothing"
-        )
+        raise scan.error(f"{scan.rest} behind the condition: GOTOF, GOTOB, GOTO or GOTOC must follow, or nothing")
     target = scan.take(_TARGET)
     if not target:
-        raise scan.error(f"{command} without a label: one would have to follow, or N and the number of a block")
+        raise scan.error(f"{command} without a label: one must follow, or N and the number of a block")
     return Jump(condition, command, f"N{int(target)}" if target.isdigit() else target, column)
 
 
 def _case(scan: SiemensScanner, block: SiemensBlock) -> SiemensBlock:
     chosen = expression(scan)
     if not scan.take(_WORD["OF"]):
-        raise scan.error(f"{scan.rest or 'the end of the block'} where OF would have to follow")
+        raise scan.error(f"{scan.rest or 'the end of the block'} where OF is expected")
     jumps = []
     while not scan.is_done:
         jumps.append(_jump(scan, None if scan.take(_WORD["DEFAULT"]) else expression(scan)))
@@ -206,7 +204,7 @@ def _for(scan: SiemensScanner, block: SiemensBlock) -> SiemensBlock:
     scan.require("=", "= and the first value of FOR")
     start = expression(scan)
     if not scan.take(_WORD["TO"]):
-        raise scan.error(f"{scan.rest or 'the end of the block'} where TO would have to follow")
+        raise scan.error(f"{scan.rest or 'the end of the block'} where TO is expected")
     return replace(block, kind="FOR", name=name, index=index, start=start, condition=expression(scan))
 
 
@@ -216,9 +214,7 @@ def _repeat(scan: SiemensScanner, block: SiemensBlock) -> SiemensBlock:
         return replace(block, kind="REPEAT")
     label = scan.take(NAME)
     if not scan.is_done and not re.match(r"\s*P\s*=?\s*\d|\s*P\s*=", scan.text[scan.at :]):
-        raise scan.error(
-            f"{scan.rest} behind REPEAT {label}: P= and a number would have to follow; an end label is not read"
-        )
+        raise scan.error(f"{scan.rest} behind REPEAT {label}: P= and a number must follow; an end label is not read")
     words = _words(scan)
     return replace(block, kind="AGAIN", name=label, condition=words[0].value if words else None)
 
@@ -230,12 +226,12 @@ def _definitions(scan: SiemensScanner) -> tuple[Definition, ...]:
         column = _begin(scan) + 1
         name = scan.take(NAME)
         if not name or name.startswith("$"):
-            raise scan.error(f"{scan.rest or 'the end of the block'} where the name of a variable would have to stand")
+            raise scan.error(f"{scan.rest or 'the end of the block'} where the name of a variable is expected")
         shape = indices(scan)
         start = None
         if scan.takes("="):
             if shape:
-                raise scan.error(f"values of the array {name}: they would have to be set one by one")
+                raise scan.error(f"values of the array {name}: they must be set one by one")
             start = expression(scan)
         found.append(Definition(kind, name, column, shape, start))
         if not scan.takes(","):
@@ -245,9 +241,7 @@ def _definitions(scan: SiemensScanner) -> tuple[Definition, ...]:
 def _type(scan: SiemensScanner, what: str) -> str:
     kind = scan.take(_TYPE)
     if kind in ("", "CHAR", "AXIS", "FRAME"):
-        raise scan.error(
-            f"{kind or scan.rest or 'nothing'} behind {what}: REAL, INT, BOOL or STRING would have to stand there"
-        )
+        raise scan.error(f"{kind or scan.rest or 'nothing'} behind {what}: REAL, INT, BOOL or STRING is expected")
     if kind == "STRING":
         indices(scan)
     return kind
@@ -287,29 +281,27 @@ def _word(scan: SiemensScanner) -> Word:
     begin = scan.at
     name = NAME.match(scan.text, begin)
     if name is None:
-        raise scan.error(f"{scan.rest} where a word would have to begin: an address, a name or a code")
+        raise scan.error(f"{scan.rest} where a word must begin: an address, a name or a code")
     scan.at = name.end()
     index = indices(scan) if scan.text[scan.at : scan.at + 1] == "[" else ()
     address = _ADDRESS.match(scan.text, begin)
     if _ASSIGNED.match(scan.text, scan.at) and not (address and _ends_before_a_word(address, name, scan.at)):
         return _assigned(scan, name[0], index, begin)
     if index:
-        raise scan.error(f"{name[0]}[...] without a value: = and a value would have to follow")
+        raise scan.error(f"{name[0]}[...] without a value: = and a value must follow")
     if address is not None and (address.end() >= name.end() or not _is_name(name[0])):
         scan.at = address.end()
         letter, digits = address[1], address[2]
         if letter == "G":
             if not digits.isdigit():
-                raise scan.error(f"G{digits}: a G code would have to be a whole number", begin)
+                raise scan.error(f"G{digits}: a G code must be a whole number", begin)
             return Word(f"G{int(digits)}", begin + 1)
         if letter == "L":
             return Word(f"L{digits}", begin + 1)  # zeros at the begin of it count: L1 is not L01
         constant: float | int = int(digits) if re.fullmatch(r"[-+]?\d+", digits) else float(digits.replace("EX", "e"))
         return Word(letter, begin + 1, lambda _scope: constant)
     if len(name[0]) == 1:
-        raise scan.error(
-            f"{name[0]} without a value: a number would have to stand right behind it, or = and a value", begin
-        )
+        raise scan.error(f"{name[0]} without a value: a number must follow it directly, or = and a value", begin)
     scan.skip()
     if scan.text[scan.at : scan.at + 1] == "(":
         return Word(name[0], begin + 1, given=tuple(arguments(scan, name[0])))
@@ -334,7 +326,7 @@ def _assigned(scan: SiemensScanner, name: str, index: tuple[Expression, ...], be
     if mode is None:
         return Word(name, begin + 1, expression(scan), "", index)
     if mode[1] not in ("AC", "IC"):
-        raise scan.error(f"{name}={mode[1]}( ) is one of a rotary axis: AC( ) or IC( ) would have to stand there")
+        raise scan.error(f"{name}={mode[1]}( ) is one of a rotary axis: AC( ) or IC( ) is expected")
     scan.at = mode.end()
     value = expression(scan)
     scan.require(")", "a closing bracket )")
@@ -373,9 +365,7 @@ class ProgramLines:
             elif block.kind in _ENDS_OF:
                 wanted = _ENDS_OF[block.kind]
                 if not open_ones or open_ones[-1][0] != wanted:
-                    raise StructureError(
-                        index, f"{block.kind} without {wanted}: {wanted} would have to stand before it"
-                    )
+                    raise StructureError(index, f"{block.kind} without {wanted}: {wanted} must come before it")
                 _, first, last = open_ones.pop()
                 self.partners[last] = index
                 self.starts[index] = first
@@ -384,7 +374,7 @@ class ProgramLines:
         if open_ones:
             word, first, _ = open_ones[-1]
             end = next(end for end, begin in reversed(_ENDS_OF.items()) if begin == word)
-            raise StructureError(first, f"{word} is never closed: {end} would have to follow")
+            raise StructureError(first, f"{word} is never closed: {end} must follow")
         self.partners.setdefault(-1, -1)
 
     def depth_path(self, index: int) -> tuple[int, ...]:

@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 Value = float | int | bool | str
-"""What an expression comes to: REAL, INT, BOOL or STRING."""
+"""Value of an expression: REAL, INT, BOOL or STRING."""
 
 
 class WordError(ValueError):
-    """A word that is not read; `column` counts from 1."""
+    """A word that is not supported; `column` counts from 1."""
 
     def __init__(self, message: str, column: int) -> None:
         super().__init__(message)
@@ -25,7 +25,7 @@ class WordError(ValueError):
 
 
 class AtColumn:
-    """Something that stands at a column of its line."""
+    """A token with its column in the line."""
 
     column: int
 
@@ -42,7 +42,7 @@ class Scope(Protocol):
 
 
 Expression = Callable[[Scope], Value]
-"""Gives its value in a scope."""
+"""Function that returns its value in a scope."""
 
 _SPACE = re.compile(r"[ \t]*")
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?")
@@ -71,7 +71,7 @@ class SiemensScanner:
         return WordError(message, (self.at if at is None else at) + 1)
 
     def take(self, pattern: re.Pattern[str]) -> str:
-        """What matches here behind blanks, which is left behind; empty: nothing."""
+        """Skip blanks and read what matches here; empty: nothing."""
         begin = _SPACE.match(self.text, self.at)
         found = pattern.match(self.text, begin.end() if begin else self.at)
         if found is None:
@@ -80,7 +80,7 @@ class SiemensScanner:
         return found[0]
 
     def takes(self, sign: str) -> bool:
-        """Whether this sign comes next, which is then left behind."""
+        """Read this sign if it comes next; whether it did."""
         self.skip()
         if not self.text.startswith(sign, self.at):
             return False
@@ -88,7 +88,7 @@ class SiemensScanner:
         return True
 
     def skip(self) -> None:
-        """Leave blanks behind."""
+        """Skip blanks."""
         begin = _SPACE.match(self.text, self.at)
         self.at = begin.end() if begin else self.at
 
@@ -104,9 +104,9 @@ class SiemensScanner:
         return self.text[self.at :].strip()[:30]
 
     def require(self, sign: str, what: str) -> None:
-        """Leave a sign behind that must be there."""
+        """Read a sign that must be here."""
         if not self.takes(sign):
-            raise self.error(f"{self.rest or 'the end of the block'} where {what} would have to follow")
+            raise self.error(f"{self.rest or 'the end of the block'} where {what} is expected")
 
 
 def expression(scan: SiemensScanner) -> Expression:
@@ -134,7 +134,7 @@ def _binary(operator: str, left: Expression, right: Expression, column: int) -> 
     def value(scope: Scope) -> Value:
         a, b = left(scope), right(scope)
         if isinstance(a, str) != isinstance(b, str) and operator != "<<":
-            raise WordError(f"{operator} of a number and a string: both would have to be of one kind", column)
+            raise WordError(f"{operator} of a number and a string: both must be of one kind", column)
         return work(a, b, column)
 
     return value
@@ -169,7 +169,7 @@ def _primary(scan: SiemensScanner) -> Expression:
         return constant(int(text[2:-1], 16 if text[1] == "H" else 2))
     name = scan.take(NAME)
     if not name:
-        raise scan.error(f"{scan.rest or 'the end of the block'} where a number, a variable or ( would have to stand")
+        raise scan.error(f"{scan.rest or 'the end of the block'} where a number, a variable or ( is expected")
     if name in ("TRUE", "FALSE"):
         return constant(name == "TRUE")
     if name == "$PI":
@@ -222,7 +222,7 @@ def constant(value: Value) -> Expression:
 def number(value: Value, column: int) -> float | int:
     """A value as a number; a string is none."""
     if isinstance(value, str):
-        raise WordError(f'"{value}" where a number would have to stand', column)
+        raise WordError(f'"{value}" where a number is expected', column)
     if not math.isfinite(value):
         raise WordError("a value is too large to be computed", column)
     return int(value) if isinstance(value, bool) else value
@@ -232,7 +232,7 @@ def whole(value: Value, what: str, column: int) -> int:
     """A value as a whole number."""
     given = number(value, column)
     if given != int(given):
-        raise WordError(f"{what} of {given:g}: it would have to be a whole number", column)
+        raise WordError(f"{what} of {given:g}: it must be a whole number", column)
     return int(given)
 
 
@@ -249,7 +249,7 @@ def convert(value: Value, kind: str, column: int) -> Value:
     """A value as the control keeps it in a variable of this kind."""
     if kind == "STRING":
         if not isinstance(value, str):
-            raise WordError(f"{value} where a string would have to stand", column)
+            raise WordError(f"{value} where a string is expected", column)
         return value
     given = number(value, column)
     if kind == "BOOL":
@@ -277,14 +277,14 @@ def _worked(name: str, function: Callable[..., float], given: list[float], colum
 def _divide(a: Value, b: Value, column: int) -> Value:
     divisor = number(b, column)
     if divisor == 0:
-        raise WordError("division by 0: the divisor would have to be another number", column)
+        raise WordError("division by 0: the divisor must be another number", column)
     return number(a, column) / divisor
 
 
 def _modulo(a: Value, b: Value, column: int) -> Value:
     left, right = whole(a, "MOD", column), whole(b, "MOD", column)
     if left < 0 or right <= 0:
-        raise WordError(f"{left} MOD {right}: the first would have to be 0 or more and the second more than 0", column)
+        raise WordError(f"{left} MOD {right}: the first must be 0 or more and the second more than 0", column)
     return left % right
 
 
@@ -362,7 +362,7 @@ class Variable:
         found = tuple(whole(each, f"index of {name}", column) for each in index)
         for each, size in zip(found, self.shape, strict=True):
             if not 0 <= each < size:
-                raise WordError(f"{name}[{each}]: the index would have to be 0 to {size - 1}", column)
+                raise WordError(f"{name}[{each}]: the index must be 0 to {size - 1}", column)
         return found
 
     def read(self, name: str, index: tuple[Value, ...], column: int) -> Value:

@@ -1,4 +1,4 @@
-"""Where a SINUMERIK program is: modes, frames, positions, and the moves of the plain program that they come to.
+"""State of a SINUMERIK program: modes, frames, positions, and the moves that it writes.
 
 Sources: frames easymanua.ls 662598 p. 56 and 1265481 p. 309; incremental moves behind them 32519 p. 729; inch 592300
 p. 139; polar coordinates 1265481 pp. 174, 175; FLIN 662833 p. 458; chamfers 679150 pp. 193, 194.
@@ -45,7 +45,7 @@ class SiemensFrame:
         return self.offset + _product(self.linear, point)
 
     def undo(self, point: Vector) -> Vector:
-        """The other way round."""
+        """The inverse."""
         return _product(np.asarray(np.linalg.inv(self.linear), dtype=np.float64), point - self.offset)
 
 
@@ -102,7 +102,7 @@ class _HeldCorner:
 
 
 class SiemensPath:
-    """Follows the moves of a program and writes them in FANUC's words."""
+    """Follows the moves of a program and writes them for FANUC."""
 
     def __init__(self, machine: Machine, out: PlainProgram) -> None:
         """Begin where nothing is known."""
@@ -181,15 +181,15 @@ class SiemensPath:
         first, second, _ = PLANES[self.modes.plane]
         if given.polar:
             if set(given.polar) != {"AP", "RP"}:
-                raise given.error(f"G{code} with {' and '.join(given.polar)} alone: AP= and RP= would have to be given")
+                raise given.error(f"G{code} with {' and '.join(given.polar)} alone: AP= and RP= must be given")
             step = cmath.rect(given.polar["RP"][0], math.radians(given.polar["AP"][0]))
         elif {first, second} <= given.axes.keys():
             step = complex(given.axes[first][0], given.axes[second][0])
         else:
-            raise given.error(f"G{code}: both axes of the plane would have to be given, or AP= and RP=")
+            raise given.error(f"G{code}: both axes of the plane must be given, or AP= and RP=")
         origin = {110: self.modes.frame.undo(self.at), 111: np.zeros(3), 112: self.pole}[code]
         if not np.all(np.isfinite(origin[[first, second]])):
-            raise given.error(f"G{code}: the position is not known here: the axes would have to be programmed before")
+            raise given.error(f"G{code}: the position is not known here: the axes must be programmed before")
         self.pole = arcs.moved_to(origin, self.modes.plane, flat(origin, self.modes.plane) + step)
         self.polar.pop("AP", None)
 
@@ -240,8 +240,8 @@ class SiemensPath:
         target = here.copy()
         for axis, (value, incremental, column) in given.axes.items():
             if incremental and self.shifted[axis]:
-                setting = "a setting (SD42440, SD42442) says whether the control adds that"
-                wanted = "it would have to be programmed absolutely before"
+                setting = "whether the control adds that depends on a setting (SD42440, SD42442)"
+                wanted = "it must be programmed absolutely before"
                 name = "XYZ"[axis]
                 raise WordError(f"{name} incrementally behind a change of its offset: {setting}; {wanted}", column)
             target[axis] = here[axis] + value if incremental else value
@@ -252,22 +252,20 @@ class SiemensPath:
         elif modes.motion in ("G2", "G3", "CIP", "CT"):
             self._round(given, here, target)
         else:
-            raise given.error(
-                "which of G0, G1 ... is in force at the start is set in MD20150: one would have to be given"
-            )
+            raise given.error("which of G0, G1 ... is in force at the start is set in MD20150: one must be given")
 
     def _polar_end(self, given: Given) -> None:
         first, second, _ = PLANES[self.modes.plane]
         if {first, second} & given.axes.keys():
-            raise given.error("AP=, RP= beside an axis of the plane: one of both would have to be left out")
+            raise given.error("AP=, RP= beside an axis of the plane: leave one of them out")
         for name, (value, mode, column) in given.polar.items():
             if name == "AP" and mode == "" and self.modes.incremental:
-                raise WordError("AP= in G91: it would have to be AP=AC( ) or AP=IC( )", column)
+                raise WordError("AP= in G91: it must be AP=AC( ) or AP=IC( )", column)
             if mode == "IC" and (name == "RP" or name not in self.polar):
-                raise WordError(f"{name}=IC( ) without a value before it: it would have to be absolute", column)
+                raise WordError(f"{name}=IC( ) without a value before it: it must be absolute", column)
             self.polar[name] = self.polar[name] + value if mode == "IC" else value
         if len(self.polar) < 2:
-            raise given.error("AP= and RP=: both would have to be given, here or before")
+            raise given.error("AP= and RP=: both must be given, here or before")
         angle = math.radians(self.polar["AP"])
         for axis, share in ((first, math.cos(angle)), (second, math.sin(angle))):
             given.axes[axis] = (self.pole[axis] + self.polar["RP"] * share, False, given.column)
@@ -293,9 +291,7 @@ class SiemensPath:
             if math.isnan(end[k]):
                 axis = sources[0]
                 if len(sources) != 1 or axis not in given.axes:
-                    raise given.error(
-                        f"the position of {'XYZ'[k]} is not known here: it would have to be programmed before"
-                    )
+                    raise given.error(f"the position of {'XYZ'[k]} is not known here: it must be programmed before")
                 step = float(linear[k, axis]) * given.axes[axis][0]
             elif math.isnan(self.at[k]):
                 raise given.error(
@@ -317,7 +313,7 @@ class SiemensPath:
         first, second, across = PLANES[modes.plane]
         needed = [0, 1, 2] if modes.motion == "CIP" else [first, second, *([across] if across in given.axes else [])]
         if not np.all(np.isfinite(here[needed])):
-            raise WordError("an arc whose start is not known: its axes would have to be programmed before", column)
+            raise WordError("an arc whose start is not known: its axes must be programmed before", column)
         here, target = (np.where(np.isnan(each), 0.0, each) for each in (here, target))
         try:
             element = self._arc(given, here, target)
@@ -325,7 +321,7 @@ class SiemensPath:
             raise error if isinstance(error, WordError) else WordError(str(error), column) from None
         turns = given.turns * math.tau * math.copysign(1.0, element.sweep_rad)
         if given.turns and element.centre is None:
-            raise WordError("TURN= of a line: it would have to be an arc", column)
+            raise WordError("TURN= of a line: it must be an arc", column)
         element = Element(element.start, element.end, element.centre, element.plane, element.sweep_rad + turns)
         moved = [k in PLANES[element.plane][:2] or k in given.axes for k in range(3)]
         self._write_element(self._in_offset(element, column), given, moved)
@@ -344,23 +340,21 @@ class SiemensPath:
         about = here.copy()
         for axis, (value, incremental, column) in given.centre.items():
             if axis not in (first, second):
-                raise WordError(
-                    f"{'IJK'[axis]} lies across the plane G{modes.plane}: it would have to be left out", column
-                )
+                raise WordError(f"{'IJK'[axis]} lies across the plane G{modes.plane}: it must be left out", column)
             about[axis] = here[axis] + value if incremental else value
         start, centre = flat(here, modes.plane), flat(about, modes.plane)
         if given.radius is not None:
             return arcs.by_radius(here, target, given.radius, modes.plane, turn, tolerance)
         if given.angle is not None:
             if not 0.0 < given.angle < 360.0:
-                raise ValueError(f"AR={given.angle:g}: it would have to lie between 0 and 360 degrees")
+                raise ValueError(f"AR={given.angle:g}: it must lie between 0 and 360 degrees")
             if given.centre:
                 end = centre + (start - centre) * cmath.rect(1.0, turn * math.radians(given.angle))
                 target = arcs.moved_to(target, modes.plane, end)
                 return arcs.by_centre(here, target, centre, modes.plane, turn, tolerance)
             return arcs.by_angle(here, target, given.angle, modes.plane, turn)
         if not given.centre:
-            raise ValueError(f"{modes.motion} without I, J, K, CR= or AR=: one of them would have to be given")
+            raise ValueError(f"{modes.motion} without I, J, K, CR= or AR=: one of them must be given")
         return arcs.by_centre(here, target, centre, modes.plane, turn, tolerance)
 
     def _middle(self, given: Given, here: Vector) -> Vector:
@@ -368,7 +362,7 @@ class SiemensPath:
         for axis, (value, incremental, _) in given.middle.items():
             middle[axis] = here[axis] + value if incremental else value
         if len(given.middle) < 2:
-            raise ValueError("CIP: the intermediate point would have to be given by two or three of I1=, J1=, K1=")
+            raise ValueError("CIP: the intermediate point must be given by two or three of I1=, J1=, K1=")
         return middle
 
     def _in_offset(self, element: Element, column: int) -> Element:
@@ -446,7 +440,7 @@ class SiemensPath:
             self.put(f"{exact}{code}{self._axes(piece.end, moved)}{words}{self._feed_word(feed)}")
 
     def _pieces(self, element: Element, given: Given, known: bool) -> list[tuple[float, float, float, float]]:
-        """Shares of the length, minutes (0: as the feed says) and feed of the blocks that a block comes to."""
+        """Fraction of the length, duration in minutes (0: by the feed) and feed of the blocks that a block becomes."""
         modes = self.modes
         feed = self._constant_feed(given, element.length_mm if known else math.nan)
         start = given.start_feed
@@ -454,9 +448,7 @@ class SiemensPath:
             return [(0.0, 1.0, 0.0, feed)]
         length = element.length_mm
         if start <= 0.0 or not known or length <= 0.0:
-            raise given.error(
-                f"FLIN from F{start:g}: the feed before it would have to be more than 0, and the start known"
-            )
+            raise given.error(f"FLIN from F{start:g}: the feed before it must be more than 0, and the start known")
         slope = (feed - start) / length  # 1/min
         total = math.log(feed / start) / slope
         acceleration = max(feed, start) * abs(slope)  # mm/min²
@@ -472,13 +464,13 @@ class SiemensPath:
     def _constant_feed(self, given: Given, length_mm: float) -> float:
         feed = self.modes.feed
         if feed is None or feed <= 0.0:
-            raise given.error(f"{self.modes.motion} without a feed: F would have to be programmed before, more than 0")
+            raise given.error(f"{self.modes.motion} without a feed: F must be programmed before, more than 0")
         if self.modes.feed_mode != 93:
             return feed
         if not given.has_feed:
-            raise given.error("G93 without F: every block with a feed would have to hold one")
+            raise given.error("G93 without F: every block with a feed must hold one")
         if math.isnan(length_mm):
-            raise given.error("G93 and a start that is not known: its axes would have to be programmed before")
+            raise given.error("G93 and a start that is not known: its axes must be programmed before")
         return max(feed * length_mm, 1e-4)
 
     def _feed_word(self, feed: float) -> str:
@@ -507,9 +499,7 @@ class SiemensPath:
         if size == 0.0 or (given.corner is None and size > 0.0 and not is_possible):
             return None
         if not is_possible:
-            raise given.error(
-                f"{kind}={size:g}: it would have to be more than 0, in a block with a feed whose start is known"
-            )
+            raise given.error(f"{kind}={size:g}: it must be more than 0, in a block with a feed whose start is known")
         return _HeldCorner(element, kind, size, given.corner is None, given.column)
 
     def _end_corner(self, element: Element, ahead: Vector, motion: str, moved: list[bool]) -> None:
@@ -528,7 +518,7 @@ class SiemensPath:
         if motion == "G0" or not in_plane or len(self._held) != 1:
             if not corner.is_modal:
                 where = f"{corner.kind}={corner.size:g} in line {self._held[0][1]}"
-                raise WordError(f"{where}: a move with a feed in the same plane would have to follow", 1)
+                raise WordError(f"{where}: a move with a feed in the same plane must follow", 1)
             self.release()
             return
         word = ""

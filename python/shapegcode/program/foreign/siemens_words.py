@@ -1,4 +1,4 @@
-"""Words of SINUMERIK blocks: what each does, which are left out because they change no path, which are refused.
+"""Words of SINUMERIK blocks: their effect, those that are left out because they change no path, those that are refused.
 
 Sources: codes and their groups as PyPI nc-gcode-interpreter lists them; G70 to G710 easymanua.ls 592300 p. 139; G53,
 G153, SUPA, G500 679150 p. 100; G450 and G451 1265481 p. 268; D number i5cnc.com 126; FRC 1918352 p. 282.
@@ -37,12 +37,12 @@ _GROUPS = (
     {"G0", "G1", "G2", "G3", "CIP", "CT"}, {"G17", "G18", "G19"}, {"G90", "G91"}, {"G70", "G71", "G700", "G710"},
     {"G93", "G94", "G95"}, {"FLIN", "FNORM"}, {"G60", "G64", "G641", "G642", "G643", "G644", "G645"},
 )  # fmt: skip
-"""Of each only one may stand in a block."""
+"""Groups of which only one word is allowed in a block."""
 
 
 @cache
 def _tables() -> tuple[dict[str, str], dict[str, str], dict[re.Pattern[str], str]]:
-    """Words and addresses that are left out with what is told of them, and words that are refused."""
+    """Words and addresses that are left out, with their notes, and words that are refused."""
     file = resources.files("shapegcode") / "data" / "control" / "siemens_input.toml"
     tables = tomllib.loads(file.read_text(encoding="utf-8"))
     words, addresses = (
@@ -120,7 +120,7 @@ class BlockWords:
         for group in _GROUPS:
             if len(group & names) > 1:
                 one, other = sorted(group & names)[:2]
-                raise block.error(f"{one} and {other} in one block: one of them would have to be left out")
+                raise block.error(f"{one} and {other} in one block: leave one of them out")
         for word in words:
             if word.value is None and word.name not in _OF_THE_MACHINE:
                 self._code(word, given)
@@ -147,10 +147,10 @@ class BlockWords:
             for other in same:
                 if other in seen:
                     what = f"{other} twice" if other == word.name else f"{other}= and {word.name}="
-                    raise word.error(f"{what} in one block: one of them would have to be left out")
+                    raise word.error(f"{what} in one block: leave one of them out")
             seen.add(word.name)
         if "CR" in seen and (other := next((name for name in ("I", "J", "K") if name in seen), "")):
-            raise words[0].error(f"CR= and {other} in one block: one of them would have to be left out")
+            raise words[0].error(f"CR= and {other} in one block: leave one of them out")
 
     def _ended(self, functions: list[Word]) -> str:
         codes = {f"M{self._whole(word)}" for word in functions if word.name == "M"}
@@ -219,12 +219,10 @@ class BlockWords:
             if pattern.fullmatch(word.name):
                 return word.error(f"{word.name}: {reason}")
         if re.fullmatch(r"G\d+", word.name):
-            return word.error(f"{word.name} is no code that is read: another one would have to stand there")
+            return word.error(f"{word.name} is not a supported code")
         if word.value is not None:
-            return word.error(
-                f"{word.name}= is neither an address that is read nor a variable: DEF would have to stand before"
-            )
-        wanted = f"{word.name}.SPF would have to be beside this one"
+            return word.error(f"{word.name}= is neither an address that is read nor a variable: DEF must come before")
+        wanted = f"{word.name}.SPF must be in the same folder as this one"
         return word.error(f"{word.name} is neither a word that is read nor a program: {wanted}")
 
     # ---- addresses ---------------------------------------------------------------------------------------------------
@@ -245,7 +243,7 @@ class BlockWords:
             given.has_feed = True
             modes.feed = self._number(word) * (modes.feed_unit if modes.feed_mode != 93 else 1.0)
             if modes.feed <= 0.0:
-                raise word.error(f"F{modes.feed:g}: it would have to be more than 0")
+                raise word.error(f"F{modes.feed:g}: it must be more than 0")
         elif name in ("RND", "CHR", "CHF"):
             given.corner = (name, self._length(word))
         elif name == "RNDM":
@@ -264,7 +262,7 @@ class BlockWords:
         is_middle = word.name in _MIDDLES
         if motion != "CIP" if is_middle else motion not in ("G2", "G3"):
             wanted = "CIP" if is_middle else "G2 or G3"
-            raise word.error(f"{word.name} with {motion or 'no G code'}: {wanted} would have to be in force")
+            raise word.error(f"{word.name} with {motion or 'no G code'}: {wanted} must be in force")
         if is_middle:
             given.middle[_MIDDLES[word.name]] = (self._length(word), self._is_incremental(word), word.column)
         else:
@@ -279,16 +277,14 @@ class BlockWords:
         elif name == "TURN":
             given.turns = self._whole(word)
             if not 0 <= given.turns <= 999:
-                raise word.error(f"TURN={given.turns}: it would have to be 0 to 999")
+                raise word.error(f"TURN={given.turns}: it must be 0 to 999")
         else:
             value = self._length(word) if name == "RP" else self._number(word)
             if name == "RP" and value < 0.0:
-                raise word.error(f"RP={value:g}: a polar radius would have to be 0 or more")
+                raise word.error(f"RP={value:g}: a polar radius must be 0 or more")
             given.polar[name] = (value, word.mode, word.column)
         if name in ("CR", "AR", "TURN") and self.path.modes.motion not in ("G2", "G3"):
-            raise word.error(
-                f"{name}= with {self.path.modes.motion or 'no G code'}: G2 or G3 would have to be in force"
-            )
+            raise word.error(f"{name}= with {self.path.modes.motion or 'no G code'}: G2 or G3 must be in force")
 
     def _go(self, given: Given, rotary: dict[str, float], own_frame: str) -> None:
         """The motion of a block."""
@@ -302,7 +298,7 @@ class BlockWords:
         elif given.axes or given.polar or (given.centre and self.path.modes.motion in ("G2", "G3")):
             self.path.move(given)
         elif given.corner is not None or given.radius is not None or given.middle:
-            raise given.error("a word of a contour without an axis: the end of the block would have to be programmed")
+            raise given.error("a word of a contour without an axis: the end of the block must be programmed")
 
     def _in_machine(self, given: Given, code: str) -> None:
         """G53, G153 or SUPA: a rapid in machine coordinates."""
@@ -313,7 +309,7 @@ class BlockWords:
         to: dict[str, float] = {}
         for axis, (value, is_incremental, column) in given.axes.items():
             if is_incremental:
-                raise WordError(f"{code} incrementally: the axis would have to be programmed absolutely", column)
+                raise WordError(f"{code} incrementally: the axis must be programmed absolutely", column)
             to["XYZ"[axis]] = round(value, 5)
         self.path.put(f"G53G00{words_of(to, 'XYZ')}")
         self.path.forget("".join(to))
@@ -347,7 +343,7 @@ class BlockWords:
             if word.name == "D":
                 edge = self._whole(word)
                 if not 0 <= edge <= 9:
-                    raise word.error(f"D{edge}: it would have to be 0 to 9")
+                    raise word.error(f"D{edge}: it must be 0 to 9")
                 if changes or not (self._uses_m6 and self._next_tool):
                     self._offset(edge, word.column)
                 else:
@@ -374,7 +370,7 @@ class BlockWords:
         self._next_tool, self._next_edge = tool, -1
         if not self._uses_m6:
             self._change_tool()
-            self.path.note("T changes the tool: no M6 stands in the program", "T")
+            self.path.note("T changes the tool: the program has no M6", "T")
             self._offset(1, word.column)
 
     def _change_tool(self) -> None:
@@ -389,9 +385,7 @@ class BlockWords:
         if edge == self._edge:
             return
         if self.path.modes.plane != 17 and edge:
-            raise WordError(
-                f"D{edge} in G{self.path.modes.plane}: G17 would have to be in force, a length along Z", column
-            )
+            raise WordError(f"D{edge} in G{self.path.modes.plane}: G17 must be in force, a length along Z", column)
         self._edge = edge
         offset = self._offset_number(edge)
         self.path.put("G49" if edge == 0 else f"G43H{offset}")
@@ -415,13 +409,13 @@ class BlockWords:
         values: dict[str, float] = {}
         for word in words[1:]:
             if word.value is None or word.name not in (*_AXES, "RPL"):
-                raise word.error(f"{word.name} in a block of {name}: it would have to stand in a block of its own")
+                raise word.error(f"{word.name} in a block of {name}: it must be in a separate block")
             if word.mode:
-                raise word.error(f"{word.name}={word.mode}( ) in a block of {name}: a value would have to stand there")
+                raise word.error(f"{word.name}={word.mode}( ) in a block of {name}: a value is expected")
             values[word.name] = self._length(word) if name.endswith("TRANS") else self._number(word)
         kind = name.removeprefix("A")
         if "RPL" in values and kind != "ROT":
-            raise words[0].error(f"RPL= is an angle: ROT or AROT would have to stand before it, not {name}")
+            raise words[0].error(f"RPL= is an angle: ROT or AROT must come before it, not {name}")
         frame = _frame_of(kind, values, path.modes.plane, words[0].column) if values else SiemensFrame()
         path.set_frame(path.modes.frame.then(frame) if name != kind else frame)
 
@@ -444,9 +438,7 @@ class BlockWords:
                     value = self._length(word) if word.name == "RP" else self._number(word)
                     given.polar[word.name] = (value, "", word.column)
                 elif word.name not in ("G17", "G18", "G19", "G90", "G91"):
-                    raise word.error(
-                        f"{word.name} beside {name}: axes of the plane or AP= and RP= would have to stand there"
-                    )
+                    raise word.error(f"{word.name} beside {name}: axes of the plane or AP= and RP= is expected")
             self.path.define_pole(int(name[1:]), given)
 
     def _dwell(self, others: list[Word]) -> None:
@@ -455,15 +447,15 @@ class BlockWords:
                 seconds = self._number(word)
             elif word.name in ("S", "S1") and word.value is not None:
                 if not self._spindle > 0.0:
-                    raise word.error("G4 S counts turns of the spindle: S would have to be programmed before")
+                    raise word.error("G4 S counts turns of the spindle: S must be programmed before")
                 seconds = self._number(word) * 60.0 / self._spindle
             else:
-                raise word.error(f"{word.name} beside G4: F in seconds or S in turns would have to stand there, alone")
+                raise word.error(f"{word.name} beside G4: F in seconds or S in turns is expected, alone")
             if seconds < 0.0:
-                raise word.error(f"G4 {word.name}{seconds:g}: it would have to be 0 or more")
+                raise word.error(f"G4 {word.name}{seconds:g}: it must be 0 or more")
             self.path.put(f"G04X{number_text(round(seconds, 4))}")
         if not others:
-            raise WordError("G4 without F or S: one of them would have to be given", 1)
+            raise WordError("G4 without F or S: one of them must be given", 1)
 
     def _reference(self, name: str, others: list[Word]) -> None:
         """G74 to the reference point, G75 to a fixed one: where the axes are then only the control knows."""
@@ -473,9 +465,7 @@ class BlockWords:
             if axis in _AXES and word.value is not None:
                 axes += axis
             elif word.name not in ("FP", "G0", "G90", "G91", "G53", "G153", "SUPA"):
-                raise word.error(
-                    f"{word.name} beside {name}: the axes that go there would have to stand in this block alone"
-                )
+                raise word.error(f"{word.name} beside {name}: the axes that go there must be alone in this block")
         words = "".join(f"{axis}0." for axis in sorted(axes))
         for line in ("G91", f"G{28 if name == 'G74' else 30}{words}", "G90"):
             self.path.put(line)
@@ -489,9 +479,7 @@ class BlockWords:
             if isinstance(name, str):
                 self._run.call_named(name, word)
                 return
-        raise word.error(
-            f'{word.name}: the name of a program in quotes and brackets would have to follow: {word.name}("NAME")'
-        )
+        raise word.error(f'{word.name}: the name of a program in quotes and brackets must follow: {word.name}("NAME")')
 
 
 def _frame_of(kind: str, values: dict[str, float], plane: int, column: int) -> SiemensFrame:
@@ -503,10 +491,10 @@ def _frame_of(kind: str, values: dict[str, float], plane: int, column: int) -> S
         return SiemensFrame(np.diag([-1.0 if axis in values else 1.0 for axis in "XYZ"]))
     if kind == "SCALE":
         if any(value <= 0.0 for value in values.values()):
-            raise WordError("SCALE: factors would have to be more than 0", column)
+            raise WordError("SCALE: factors must be more than 0", column)
         return SiemensFrame(np.diag([values.get(axis, 1.0) for axis in "XYZ"]))
     if len(values) != 1:
-        raise WordError("ROT about several axes is not read: RPL= or one axis would have to stand there", column)
+        raise WordError("ROT about several axes is not read: RPL= or one axis is expected", column)
     name, angle = next(iter(values.items()))
     axis = {17: 2, 18: 1, 19: 0}[plane] if name == "RPL" else _AXES[name]
     cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))

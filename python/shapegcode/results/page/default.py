@@ -1,4 +1,4 @@
-"""The page of any result: answer, tables, pictures, warnings, the next step, and what it was made of."""
+"""The page of any result: answer, tables, pictures, warnings, the next step, provenance."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ def raw_page(report: Mapping[str, Any], why: str) -> Page:
 
 
 def _json(report: Mapping[str, Any]) -> Section:
-    """What the JSON says, where nothing better can be shown."""
+    """The JSON itself, if no page can be made of it."""
     rows = [(key, _short(value)) for key, value in report.items()]
     columns = (Column("key", value=lambda row: row[0], left=True), Column("value", value=lambda row: row[1], text=True))
     return Section("json", "The JSON", (Table("", columns, rows),), how="Key by key; long values are cut.")
@@ -218,7 +218,7 @@ HOW: Mapping[str, str] = {
     "time": "Each bar is a tool or a region; its colours are where its time goes.",
     "measure-part": "Where on the part each program leaves the contour: further from its line is worse.",
     "measure-walls": "Each wall as a probe would see it, one line for each program; zero is the drawing.",
-    "feed-along-path": "Feed and force along the path: where the force touches its limit, the feed gives way.",
+    "feed-along-path": "Feed and force along the path: where the force reaches its limit, the feed is reduced.",
     "feed-path": "The tool path from above, coloured by force: bright is where the cutter works hardest.",
     "feed-surface": "What bending of the tool leaves on the wall: blue too little cut, red too much.",
     "shaper-pareto": "Each point is a shaper: further left is faster, further down leaves less vibration.",
@@ -226,7 +226,7 @@ HOW: Mapping[str, str] = {
     "shaper-impulses": "The taps of each shaper: a move is split into so many parts, so far apart.",
     "shaper-steps": "Response of the machine table to a step through each shaper: what oscillates after the "
     "last impulse is the residual vibration.",
-    "shaper-branches": "Duration of the shortest shaper over the ratio of two modes: each branch is a way to build it.",
+    "shaper-branches": "Duration of the shortest shaper over the ratio of two modes: each branch is one construction.",
     "identify-sweep": "Each column is a place of the axis: where its peak moves, the mode moves with the position.",
     "identify-response": "Peaks of the measured response are modes; the model should lie on the measurement.",
     "identify-stabilisation": "A mode is where the marks stand one above the other, whatever the order of the model.",
@@ -255,6 +255,6 @@ HOW: Mapping[str, str] = {
     "paper002-figure8-stage-short": "The stage of the paper, a short move: oscillation after it is residual vibration.",
     "paper002-figure9-stage-long": "The stage of the paper, a long move: oscillation after it is residual vibration.",
     "paper003-figures2-3-acceleration": "Acceleration after a tap, measured and of the fitted modes.",
-    "paper003-deflection": "The displacement that belongs to the acceleration: what the tool's tip does.",
+    "paper003-deflection": "Displacement, computed from the acceleration: the motion of the tool tip.",
 }
 """By the names that `plots()` has."""

@@ -1,4 +1,4 @@
-"""What stands on the page of a result, as data; `html` makes one file of it.
+"""Contents of the page of a result, as data; `html` makes one file of it.
 
 The module `page` beside a result makes its page; every number comes from the fields of the JSON, or from the scene.
 """
@@ -148,7 +148,8 @@ class CutTotals:
 
 @dataclass(frozen=True)
 class CutPicker:
-    """A table of cuts to sort and to tick; cost and gain of the ticked ones, and the command that shapes only them."""
+    """A table of cuts to sort and to select; cost and gain of the selected ones, and the command that shapes only
+    them."""
 
     rows: tuple[CutRow, ...]  # of the table, in the order of the program
     command: str  # to type, with `{lines}` where the lines of the ticked cuts stand, such as `12-80,95-240`

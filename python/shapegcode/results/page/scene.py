@@ -36,7 +36,7 @@ CHANNELS: Mapping[str, Channel] = {
     "vibration": Channel("vibration", "µm", "Distance of the table from where the control wants it at that instant."),
     "speed": Channel("speed", "mm/min", "Speed of the command; corners and short blocks are slow."),
     "acceleration": Channel("acceleration", "m/s²", "Acceleration of the command: what excites the vibration modes."),
-    "block_s": Channel("time per block", "s", "How long the block under the tool takes: what is slow shows bright."),
+    "block_s": Channel("time per block", "s", "Duration of the block at the tool: slow blocks are bright."),
     "force": Channel("force", "N", "Cutting force, or force of the motors where the plant has drives."),
 }
 """Values along the path that a scene may hold, by name."""

@@ -314,7 +314,7 @@ _READING_S = 0.35  # what two readings may hide
 
 
 def _predicted_starts(run: ObservedRun, model: _core.FanucModel) -> FloatArray:
-    """(line_count + 2,) When each line begins at the overrides of the run, s; the last entry is the end."""
+    """(line_count + 2,) Start time of each line at the overrides of the run, s; the last entry is the end."""
     starts_at = starts_of(model)
     starts = starts_at(run, 1.0).copy()
     for cut_section in sorted(run.cut_sections, key=lambda each: each.feed_override):
@@ -328,7 +328,7 @@ def _predicted_starts(run: ObservedRun, model: _core.FanucModel) -> FloatArray:
 
 
 def _holds_of(run: ObservedRun, starts: FloatArray) -> list[_Hold]:
-    """Where a run stood still though no program asks for it."""
+    """Times at which a run stood still without a programmed stop."""
     found = [(begin, length, "hold") for begin, length in run.log.holds]
     found = [_not_covered(run, starts, hold) for hold in (*found, *_held_rapids(run))]
     found = [hold for hold in found if hold[1] > _READING_S]
@@ -454,7 +454,7 @@ def learned_machine(
         if not number.told
     ]
     if not math.isfinite(motion.rapid_mm_per_s):
-        not_told.append("rapid rate: no log shows a rapid that runs steadily; the file keeps what it had")
+        not_told.append("rapid rate: no log shows a rapid at constant speed; the value of the file is kept")
     values["times.scatter"] = {
         "cuts_percent": round(100.0 * open_times.cut_scatter(runs, motion, machine), 3),
         "between_cuts_s": round(scatters[0], 3),
@@ -515,7 +515,7 @@ _FUNCTIONS = {
 
 
 def _meaning(name: str) -> tuple[str, str, str]:
-    """Key, meaning and unit of a time beside the motion."""
+    """Key, meaning and unit of a time in addition to the motion."""
     return _FUNCTIONS.get(name) or ("times.m_codes", f"M{int(name[1:]):02d}", "s")
 
 

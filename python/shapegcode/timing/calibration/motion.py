@@ -254,7 +254,8 @@ def section_residuals(sections: Sequence[SeenSection], model: _core.FanucModel) 
 
 
 def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
-    """How badly a model keeps the time of sections: every program counts alike, outliers (holds) count to a limit."""
+    """Error of a model in the times of sections: every program has the same weight, outliers (holds) a limited
+    influence."""
     square: dict[int, FloatArray] = defaultdict(lambda: np.zeros(len(_SCALES) + 1))
     count: dict[int, FloatArray] = defaultdict(lambda: np.zeros(len(_SCALES) + 1))
     for section, residual in zip(sections, section_residuals(sections, model), strict=True):
@@ -432,7 +433,7 @@ _TABLE_KRPM = 30.0  # a spindle's table is written up to so far above where its 
 
 @dataclass(frozen=True)
 class FunctionFit:
-    """Times beside the motion."""
+    """Times in addition to the motion."""
 
     # by name: "start", "tool change", "M8", "move xy", "move z" in s; "spindle start from" and "spindle stop from" in
     # 1000/min, "spindle start" and "spindle stop" in s per 1000/min above
@@ -477,7 +478,7 @@ def m_codes(values: dict[str, float]) -> dict[int, float]:
 
 
 def spindle_rows(values: dict[str, float], name: str) -> list[tuple[float, float]]:
-    """The table of a spindle's time: none up to a speed, in proportion above."""
+    """Table of a spindle's time: zero up to a speed, in proportion above."""
     slope, begin = values.get(name, 0.0), values.get(f"{name} from", 0.0)
     if slope <= 1e-6:
         return []

@@ -1,4 +1,4 @@
-"""A program as its cycle time needs it, and a log laid beside it: when each line began, at which overrides."""
+"""A program with the data for its cycle time, aligned with a log: start of each line, overrides."""
 
 from __future__ import annotations
 
@@ -280,7 +280,7 @@ class ObservedRun:
 
 
 def observe(entry: RunEntry, log: RunLog, timed: TimedProgram, machine: Machine) -> ObservedRun:
-    """Lay a log beside its program."""
+    """Align a log with its program."""
     notes = list(log.notes)
     time_s, line = _lines(entry, log, timed, notes)
     _compare_tools(entry, log, timed, notes)
@@ -347,7 +347,7 @@ def _compare_tools(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: lis
     value, at, here = wrong[0]
     said = f"tool {value} in the spindle at line {at}, where the program has T{min(here)}"
     if len(wrong) > 1 and all(each[0] in called for each in wrong):
-        raise RecordError(f"{log.source}: {said}: it is not the log of {entry.program.name} as it stands")
+        raise RecordError(f"{log.source}: {said}: it is not the log of this version of {entry.program.name}")
     notes.append(f"{said}: numbers of another kind, or of a tool that was there before the start")
 
 
@@ -461,7 +461,7 @@ def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
 
 
 def with_override(run: ObservedRun, rate_mm_per_s: float) -> ObservedRun:
-    """A run with the override of its rapids: as stated, else as its rapids show it, else 1."""
+    """A run with its rapid override: as stated, else as measured from its rapids, else 1."""
     if math.isfinite(run.rapid_override):
         return run
     ratio = _shown_rate(run)[0] / rate_mm_per_s

@@ -81,7 +81,7 @@ def _unnoticed_block_time(fit: MotionFit, runs: Sequence[ObservedRun], machine: 
 def function_rows(
     functions: FunctionFit, file_values: Callable[[FunctionFit], Mapping[str, object]], meaning: Callable[[str], str]
 ) -> list[_Row]:
-    """A row for each time beside the motion."""
+    """A row for each time in addition to the motion."""
     names, base = list(functions.values), file_values(functions)
     value = np.array(list(functions.values.values()))
     rows = []

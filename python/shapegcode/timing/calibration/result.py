@@ -180,7 +180,7 @@ class LearnedClock(Result):
 
     @property
     def ok(self) -> bool:
-        """Every run is within 2 %."""
+        """Whether the error of every run is within 2 %."""
         largest = self.largest_error_percent
         return largest is not None and largest <= TOLERANCE_PERCENT
 
@@ -191,7 +191,7 @@ class LearnedClock(Result):
         learned = sum(number.told for number in self.numbers)
         head = f"{self.machine}: {learned} parameters calibrated with {sum(run.use == 'fit' for run in self.runs)} runs"
         if largest is None:
-            return f"{head}; no log holds a whole run to judge them by"
+            return f"{head}; no log has a complete run to check them"
         kind = "left out" if any(run.left_out_s is not None or run.use == "test" for run in self.runs) else "fitted"
         within = "within" if self.ok else "NOT within"
         return f"{head}; runs {kind} are {within} {TOLERANCE_PERCENT:g} % (at most {largest:.1f} %)"
@@ -219,7 +219,7 @@ class LearnedClock(Result):
         return self._drawn_beside()
 
     def to_toml(self) -> str:
-        """The machine file with the calibrated parameters; a remark stands behind each key."""
+        """The machine file with the calibrated parameters, each with a remark."""
         return self.fitted.to_toml(self.remarks)
 
     def tables(self) -> list[Table]:
