@@ -377,7 +377,7 @@ def test_dump_of_which_nothing_is_read_fails(tmp_path: Path, capsys: pytest.Capt
     (dump,) = written(tmp_path, {"D.TXT": "%\nN09999Q1P1\n%\n"})
     for more in (["--from", "vx500"], []):
         assert main(["machine", "import", str(dump), "-o", str(output), *more]) == 1
-        assert "nothing in it" in capsys.readouterr().out
+        assert "no parameter of motion or programs" in capsys.readouterr().out
         assert not output.exists()
 
 

@@ -85,7 +85,7 @@ def test_directions_and_scatters_add_by_their_squares() -> None:
     assert time.interval_parts[0].half_width_s == pytest.approx(1.96 * 2.0)
     assert time.interval_parts[0].share == pytest.approx(4.0 / sum(variances))
     assert sum(part.share for part in time.interval_parts) == pytest.approx(1.0)
-    assert "tool change stands alone" in (time.narrowed_by or "")
+    assert "tool change occurs alone" in (time.narrowed_by or "")
 
 
 @pytest.mark.parametrize("value", [(5.0, 2.0), (5.0, 0.05), (0.1, 2.0)])
@@ -181,7 +181,7 @@ def test_the_command_says_it_first_and_in_its_json(shop: Path, capsys: pytest.Ca
     assert main(words) == 0
     out = capsys.readouterr().out
     assert "± 2.9 s" in out.splitlines()[0]  # 1.96 * 3 * 0.5
-    assert "to narrow the interval most, log a program in which M08 stands alone" in out
+    assert "to narrow the interval most, log a program in which M08 occurs alone" in out
     found = json.loads((shop / "t.json").read_text())
     assert found["total_high_s"] - found["cycle_time_s"] == pytest.approx(1.96 * 1.5)
     assert found["cycle_time_s"] - found["total_low_s"] == pytest.approx(1.96 * 1.5)

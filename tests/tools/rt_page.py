@@ -273,6 +273,7 @@ SYMBOLS = {
     ],
     "memory that is allocated already": ["memchr", "memcpy", "memmove", "memset", "strcmp", "strlen"],
     "mathematics": [
+        "acos",
         "asin",
         "atan2",
         "cbrt",

@@ -238,7 +238,7 @@ def _warnings(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> 
     if plan.spending is not None and (sentence := plan.spending.warning(plan.grid)):
         warnings.append(sentence)
     elif not program.regions:
-        warnings.append(f"{program.source}: no cutting moves that can be shaped")
+        warnings.append(f"{program.source}: no cutting moves that can be shaped: its motion is unchanged")
     if not written.placed:
         # Where something was shaped, the sensitivity to unverified parameters names them.
         warnings += open_axes(program, machine)
