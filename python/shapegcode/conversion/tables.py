@@ -81,7 +81,7 @@ def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
         "sensitivity to unverified parameters: assumed values, changed one at a time",
         columns,
         rows,
-        caption=f"{tried} values moved, one at a time, in the region that comes nearest to a limit",
+        caption=f"{tried} values changed, one at a time, in the cut that comes nearest to a limit",
         row_style=lambda row: "red" if row.moved_um > row.limit_um else "",
     )
 
