@@ -13,6 +13,16 @@ import functools
 import importlib
 from typing import Any
 
+# Names of the version before, which this one still reads.
+_RENAMED = {
+    "LearnedClock": "CycleTimeCalibration",
+    "LearnedNumber": "CalibratedParameter",
+    "LearnedRun": "CalibrationRun",
+    "LearnedShare": "CycleTimePart",
+    "learn_clock": "calibrate_cycle_time",
+    "plot_clock": "plot_cycle_time_calibration",
+}
+
 
 @functools.cache
 def _home() -> dict[str, str]:
@@ -29,6 +39,12 @@ def __getattr__(name: str) -> Any:
     """Load a public name on first use."""
     if name == "__all__":
         return sorted(_home())
+    if name in _RENAMED:
+        import warnings
+
+        new = _RENAMED[name]
+        warnings.warn(f"shapegcode.{name} is shapegcode.{new} now", FutureWarning, stacklevel=2)
+        return __getattr__(new)
     # Python itself asks for names such as __path__ and _core, before anybody uses a public one.
     if (name != "__version__" and name.startswith("_")) or name not in _home():
         raise AttributeError(f"module 'shapegcode' has no attribute {name!r}{_near(name)}")

@@ -268,14 +268,14 @@ from shapegcode.testcut.result import (
     IntervalResult as IntervalResult,
     TaperResult as TaperResult,
 )
-from shapegcode.timing.calibration.calibrate import learn_clock as learn_clock
-from shapegcode.timing.calibration.plots import plot_clock as plot_clock
+from shapegcode.timing.calibration.calibrate import calibrate_cycle_time as calibrate_cycle_time
+from shapegcode.timing.calibration.plots import plot_cycle_time_calibration as plot_cycle_time_calibration
 from shapegcode.timing.calibration.result import (
+    CalibratedParameter as CalibratedParameter,
+    CalibrationRun as CalibrationRun,
+    CycleTimeCalibration as CycleTimeCalibration,
+    CycleTimePart as CycleTimePart,
     FamilyScore as FamilyScore,
-    LearnedClock as LearnedClock,
-    LearnedNumber as LearnedNumber,
-    LearnedRun as LearnedRun,
-    LearnedShare as LearnedShare,
 )
 from shapegcode.timing.calibration.runs_file import (
     RunEntry as RunEntry,

@@ -85,28 +85,28 @@ def nist_runs(learned: Mapping[str, Sequence[int]], left_out: str) -> sg.RunsFil
     return sg.RunsFile(NIST, (*entries, entry(left_out, (), "test")))
 
 
-def learned_machines() -> dict[str, sg.LearnedClock]:
+def learned_machines() -> dict[str, sg.CycleTimeCalibration]:
     """The machines of the studies, by title."""
     machine = sg.Machine.load("vx500")
     return {
-        title: sg.learn_clock(nist_runs(dict.fromkeys(learned, ()), left_out), machine)
+        title: sg.calibrate_cycle_time(nist_runs(dict.fromkeys(learned, ()), left_out), machine)
         for title, (learned, left_out) in STUDIES.items()
     }
 
 
-def left_out(found: sg.LearnedClock) -> list[sg.LearnedRun]:
+def left_out(found: sg.CycleTimeCalibration) -> list[sg.CalibrationRun]:
     """Runs of the program that was not learned from, whole and without holds."""
     return [run for run in found.runs if run.use == "test" and run.measured_s is not None and not run.held_s]
 
 
-def log_name(run: sg.LearnedRun) -> str:
+def log_name(run: sg.CalibrationRun) -> str:
     """BOX_OP2-run1."""
     return Path(run.log).name.split(".")[0]
 
 
-def worst_shares(found: sg.LearnedClock) -> dict[str, tuple[sg.LearnedShare, str]]:
+def worst_shares(found: sg.CycleTimeCalibration) -> dict[str, tuple[sg.CycleTimePart, str]]:
     """Of each tool and kind of motion the share that is furthest off, and the run that it is of."""
-    worst: dict[str, tuple[sg.LearnedShare, str]] = {}
+    worst: dict[str, tuple[sg.CycleTimePart, str]] = {}
     for run in left_out(found):
         for share in (*run.tools, *run.kinds):
             if share.name not in worst or abs(share.error_percent) > abs(worst[share.name][0].error_percent):
@@ -114,7 +114,7 @@ def worst_shares(found: sg.LearnedClock) -> dict[str, tuple[sg.LearnedShare, str
     return worst
 
 
-def prediction_rows(title: str, found: sg.LearnedClock) -> Iterator[tuple[tuple[str, ...], bool]]:
+def prediction_rows(title: str, found: sg.CycleTimeCalibration) -> Iterator[tuple[tuple[str, ...], bool]]:
     """Predicted beside measured, and whether it is within its limit: whole runs, then tools and kinds of motion."""
     for run in left_out(found):
         error = run.error_percent or 0.0
@@ -152,7 +152,7 @@ def published() -> dict[str, list[float]]:
     return found
 
 
-def judge_all_runs(title: str, found: sg.LearnedClock) -> None:
+def judge_all_runs(title: str, found: sg.CycleTimeCalibration) -> None:
     """Print what the learned machine says of all published runs, at its usual overrides."""
     machine, builtin, times = found.fitted, sg.Machine.load("vx500"), published()
     usual = f"{machine.times.feed_override_percent:g} %, rapids {machine.times.rapid_override_percent:g} %"
@@ -197,7 +197,7 @@ def curve() -> list[Point]:
     machine, points = sg.Machine.load("vx500"), []
     for title, (_, program) in STUDIES.items():
         for subset in SUBSETS[title]:
-            found = sg.learn_clock(nist_runs(subset, program), machine)
+            found = sg.calibrate_cycle_time(nist_runs(subset, program), machine)
             runs = left_out(found)
             blocks = sum(len(numbers) * program_of(name, machine).core.line_count for name, numbers in subset.items())
             whole = [abs(run.error_percent or 0.0) for run in runs]
@@ -210,7 +210,7 @@ def curve() -> list[Point]:
     return points
 
 
-def plot_evidence(machines: Mapping[str, sg.LearnedClock], ax: Axes | None = None) -> Axes:
+def plot_evidence(machines: Mapping[str, sg.CycleTimeCalibration], ax: Axes | None = None) -> Axes:
     """How far are the learned machines off? One row for each run, below the programs that were learned from.
 
     How to read this: 0 is what the machine took; the bands are 2 % for a run and 5 % for a tool's share; a bar is the

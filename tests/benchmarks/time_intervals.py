@@ -48,7 +48,7 @@ class Held:
         return float(np.mean(np.abs(self.errors_percent) <= self.half_width_percent))
 
 
-def held(learned: str, found: sg.LearnedClock) -> Held:
+def held(learned: str, found: sg.CycleTimeCalibration) -> Held:
     """The runs of the program that was left out."""
     runs = left_out(found)
     errors = tuple(100.0 * (run.predicted_s / (run.measured_s or np.nan) - 1.0) for run in runs)
@@ -62,7 +62,7 @@ def nist() -> Iterator[Held]:
     for programs in MACHINES:
         for name in programs:
             others = [each for each in programs if each != name]
-            found = sg.learn_clock(nist_runs(dict.fromkeys(others, ()), name), sg.Machine.load("vx500"))
+            found = sg.calibrate_cycle_time(nist_runs(dict.fromkeys(others, ()), name), sg.Machine.load("vx500"))
             yield held(", ".join(others), found)
 
 
@@ -82,7 +82,7 @@ def simulated(seed: int, families: tuple[str, ...] = KINDS) -> Held:
             use = '"test"\noverride_percent = 100.0\nrapid_override_percent = 100.0' if title == test else '"fit"'
             rows.append(f'[[runs]]\nprogram = "{title}.nc"\nlog = "{title}-*.txt"\nuse = {use}\n')
         (folder / "RUNS.toml").write_text("\n".join(rows))
-        found = sg.learn_clock(folder / "RUNS.toml", sg.Machine.load("vx500"), families=families)
+        found = sg.calibrate_cycle_time(folder / "RUNS.toml", sg.Machine.load("vx500"), families=families)
     return held(f"control {seed}", found)
 
 

@@ -125,3 +125,11 @@ def test_errors_say_what_to_do() -> None:
         sg.conver  # noqa: B018
     with pytest.raises(AttributeError, match="with_values"):
         sg.Machine.load("vx500").name = "other"  # type: ignore[misc]
+
+
+def test_names_of_the_version_before_are_read_with_a_warning() -> None:
+    with pytest.warns(FutureWarning, match="shapegcode.learn_clock is shapegcode.calibrate_cycle_time now"):
+        assert sg.learn_clock is sg.calibrate_cycle_time  # type: ignore[attr-defined]
+    with pytest.warns(FutureWarning, match="CycleTimeCalibration"):
+        assert sg.LearnedClock is sg.CycleTimeCalibration  # type: ignore[attr-defined]
+    assert "LearnedClock" not in dir(sg)

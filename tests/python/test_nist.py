@@ -23,10 +23,10 @@ from shapegcode.results import plot
 
 
 @pytest.fixture(scope="module")
-def learned() -> sg.LearnedClock:
+def learned() -> sg.CycleTimeCalibration:
     """One kind of look-ahead, one run of BOX OP3; OP2 left out."""
     runs = nist_runs({"BOX_OP3": (3,)}, "BOX_OP2")
-    return sg.learn_clock(runs, sg.Machine.load("vx500"), families=["speed difference"])
+    return sg.calibrate_cycle_time(runs, sg.Machine.load("vx500"), families=["speed difference"])
 
 
 def test_the_data_come_with_the_package() -> None:
@@ -34,7 +34,7 @@ def test_the_data_come_with_the_package() -> None:
     assert sum(file.stat().st_size for file in NIST.parent.rglob("*") if file.is_file()) < 1e6
 
 
-def test_op2_from_one_run_of_op3_is_within_2_percent_of_what_was_published(learned: sg.LearnedClock) -> None:
+def test_op2_from_one_run_of_op3_is_within_2_percent_of_what_was_published(learned: sg.CycleTimeCalibration) -> None:
     times = published()["BOX_OP2"]
     assert len(left_out(learned)) == 4  # of five runs one was held
     for run in left_out(learned):
@@ -49,7 +49,7 @@ def test_op2_from_one_run_of_op3_is_within_2_percent_of_what_was_published(learn
     assert max(times) / min(times) > 1.04
 
 
-def test_the_written_machine_says_the_same_at_the_dial_that_was_set(learned: sg.LearnedClock) -> None:
+def test_the_written_machine_says_the_same_at_the_dial_that_was_set(learned: sg.CycleTimeCalibration) -> None:
     program = sg.Program.read(NIST / "programs" / "BOX_OP2.NC", learned.fitted)
     said = sg.cycle_time(program, learned.fitted, feed_override=1.01, full=False).cycle_time_s
     usual = statistics.median(published()["BOX_OP2"])  # most were run at about 101 %
@@ -59,7 +59,7 @@ def test_the_written_machine_says_the_same_at_the_dial_that_was_set(learned: sg.
     assert before.cycle_time_s < 0.7 * usual
 
 
-def test_a_prediction_that_is_wrong_is_out_of_its_limit(learned: sg.LearnedClock) -> None:
+def test_a_prediction_that_is_wrong_is_out_of_its_limit(learned: sg.CycleTimeCalibration) -> None:
     rows = list(prediction_rows("OP3", learned))
     assert [within for cells, within in rows if cells[1].startswith("BOX_OP2")] == [True] * 4
     assert {"T3", "T21", "cuts", "between cuts"} <= {cells[1] for cells, _ in rows}
@@ -68,13 +68,13 @@ def test_a_prediction_that_is_wrong_is_out_of_its_limit(learned: sg.LearnedClock
     assert [within for cells, within in wrong if cells[1].startswith("BOX_OP2")] == [False] * 4
 
 
-def test_a_held_run_is_not_counted(learned: sg.LearnedClock) -> None:
+def test_a_held_run_is_not_counted(learned: sg.CycleTimeCalibration) -> None:
     held = [log_name(run) for run in learned.runs if run.held_s]
     assert held == ["BOX_OP2-run2"]
     assert not {*held} & {log_name(run) for run in left_out(learned)}
 
 
-def test_picture_has_a_row_for_each_run(learned: sg.LearnedClock) -> None:
+def test_picture_has_a_row_for_each_run(learned: sg.CycleTimeCalibration) -> None:
     panel = plot_evidence({"OP3": learned}, plot.axes(None))
     assert len(panel.get_yticks()) == len(learned.runs)
 

@@ -82,14 +82,14 @@ def _check_options(args: argparse.Namespace) -> None:
 
 
 def _runs(args: argparse.Namespace, machine: Machine) -> int:
-    from shapegcode.timing.calibration.calibrate import learn_clock
+    from shapegcode.timing.calibration.calibrate import calibrate_cycle_time
     from shapegcode.timing.calibration.runs_file import load_runs
 
     file = load_runs(args.runs)
     read = [str(path) for entry in file.entries for path in (entry.program, *entry.logs)]
     runner.check_files(args, also_read=read)
     with runner.progress(f"learning from {args.runs}", args) as bar:
-        found = learn_clock(file, machine, families=args.look_ahead, on_progress=bar.update)
+        found = calibrate_cycle_time(file, machine, families=args.look_ahead, on_progress=bar.update)
     return runner.finish(
         found, args, output=_machine_file(args, found), notes=[f"not told: {each}" for each in found.not_told]
     )

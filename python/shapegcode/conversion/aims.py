@@ -381,7 +381,9 @@ def curve_table(curve: ToleranceCurve) -> Table:
         Column("increase %", value="time_increase_percent", digits=1),
         Column("", value=lambda each: ", ".join(_remarks(each)), text=True),
     )
-    return Table("tolerance against time", columns, curve.points, caption=f"of the cuts that can be shaped: {curve.cuts}")
+    return Table(
+        "tolerance against time", columns, curve.points, caption=f"of the cuts that can be shaped: {curve.cuts}"
+    )
 
 
 def _remarks(point: TolerancePoint) -> list[str]:

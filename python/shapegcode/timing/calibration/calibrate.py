@@ -43,11 +43,11 @@ from shapegcode.timing.calibration.observed import (
 )
 from shapegcode.timing.calibration.result import (
     TOLERANCE_PERCENT,
+    CalibratedParameter,
+    CalibrationRun,
+    CycleTimeCalibration,
+    CycleTimePart,
     FamilyScore,
-    LearnedClock,
-    LearnedNumber,
-    LearnedRun,
-    LearnedShare,
 )
 from shapegcode.timing.calibration.runs_file import RunsFile, load_runs
 from shapegcode.timing.interval import time_interval
@@ -61,7 +61,7 @@ _CALLS = 2500  # of the misfit that one fit takes, about; for the bar
 
 
 @dataclass(frozen=True, eq=False)
-class _Learned:
+class _Calibration:
     """Motion and function times, calibrated from some of the runs."""
 
     motion: MotionFit
@@ -69,7 +69,7 @@ class _Learned:
     machine: Machine
 
     @classmethod
-    def of(cls, runs: Sequence[ObservedRun], motion: MotionFit, machine: Machine) -> _Learned:
+    def of(cls, runs: Sequence[ObservedRun], motion: MotionFit, machine: Machine) -> _Calibration:
         return cls(motion, fit_functions(runs, motion, machine), machine)
 
     def starts(self, run: ObservedRun) -> FloatArray:
@@ -78,13 +78,13 @@ class _Learned:
         return _predicted_starts(run, model)
 
 
-def learn_clock(
+def calibrate_cycle_time(
     runs: RunsFile | str | Path,
     machine: Machine,
     *,
     families: Sequence[str] | None = None,
     on_progress: Callable[[float], None] | None = None,
-) -> LearnedClock:
+) -> CycleTimeCalibration:
     """Calibrate the cycle-time model of a machine from what it did.
 
     Logs are laid beside their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted
@@ -125,10 +125,10 @@ def learn_clock(
         if order[index] < _BETTER * order[best]:
             best = index
     motion = fits[best]
-    learned = _Learned.of(fitted, motion, machine)
+    learned = _Calibration.of(fitted, motion, machine)
     weighted = zip(fits, open_times.kind_weights(order, best), strict=True)
     rivals = [
-        (_Learned.of(fitted, fit, machine), weight)
+        (_Calibration.of(fitted, fit, machine), weight)
         for fit, weight in weighted
         if fit is not motion and weight >= open_times.MIN_WEIGHT
     ]
@@ -136,7 +136,7 @@ def learn_clock(
     rows, warnings = _rows(observed, learned, others)
     with_it, remarks, numbers, not_told = learned_machine(learned, fitted, rivals, _scatters(rows, observed, learned))
     rows = [_with_interval(row, run, with_it) for row, run in zip(rows, observed, strict=True)]
-    return LearnedClock(
+    return CycleTimeCalibration(
         machine=machine.name,
         family=motion.family.name,
         families=tuple(scores),
@@ -234,19 +234,19 @@ def _left_out(
     motion: MotionFit,
     machine: Machine,
     rate: float,
-) -> dict[int, _Learned]:
+) -> dict[int, _Calibration]:
     """For each run what the others teach."""
     found = {}
     for fold in folds:
         rest = [run for run in runs if run not in fold]
-        other = _Learned.of(rest, fit_motion(rest, motion.family, machine, rate), machine)
+        other = _Calibration.of(rest, fit_motion(rest, motion.family, machine, rate), machine)
         found.update({id(run): other for run in fold})
     return found
 
 
 def _rows(
-    observed: Sequence[ObservedRun], learned: _Learned, others: dict[int, _Learned]
-) -> tuple[list[LearnedRun], list[str]]:
+    observed: Sequence[ObservedRun], learned: _Calibration, others: dict[int, _Calibration]
+) -> tuple[list[CalibrationRun], list[str]]:
     rows = [_row(run, learned, others.get(id(run))) for run in observed]
     warnings = []
     for row in rows:
@@ -263,11 +263,11 @@ def _rows(
     return rows, warnings
 
 
-def _row(run: ObservedRun, learned: _Learned, other: _Learned | None) -> LearnedRun:
+def _row(run: ObservedRun, learned: _Calibration, other: _Calibration | None) -> CalibrationRun:
     starts = learned.starts(run)
     holds = _holds_of(run, starts)
     tools, kinds = _shares(run, starts, holds)
-    return LearnedRun(
+    return CalibrationRun(
         program=str(run.entry.program),
         log=run.log.source,
         use=run.entry.use,
@@ -286,7 +286,9 @@ def _row(run: ObservedRun, learned: _Learned, other: _Learned | None) -> Learned
     )
 
 
-def _scatters(rows: Sequence[LearnedRun], observed: Sequence[ObservedRun], learned: _Learned) -> tuple[float, float]:
+def _scatters(
+    rows: Sequence[CalibrationRun], observed: Sequence[ObservedRun], learned: _Calibration
+) -> tuple[float, float]:
     """What the time between two cuts scatters by, s, and relatively what repeated runs of a program do."""
     ratios: dict[str, list[float]] = defaultdict(list)
     late: dict[str, list[float]] = defaultdict(list)
@@ -300,7 +302,7 @@ def _scatters(rows: Sequence[LearnedRun], observed: Sequence[ObservedRun], learn
     return max(learned.functions.scatter_s, together), open_times.run_scatter(ratios)
 
 
-def _with_interval(row: LearnedRun, run: ObservedRun, machine: Machine) -> LearnedRun:
+def _with_interval(row: CalibrationRun, run: ObservedRun, machine: Machine) -> CalibrationRun:
     """A run with the interval that `time` gives its program on the calibrated machine at the overrides of the run."""
     interval = time_interval(run.timed.program, machine, row.feed_override, row.rapid_override)
     half = interval.half_width_s * row.predicted_s / interval.total_s if interval and interval.total_s > 0.0 else 0.0
@@ -381,7 +383,7 @@ def _not_covered(run: ObservedRun, starts: FloatArray, hold: _Hold) -> _Hold:
 
 def _shares(
     run: ObservedRun, starts: FloatArray, holds: list[_Hold]
-) -> tuple[tuple[LearnedShare, ...], tuple[LearnedShare, ...]]:
+) -> tuple[tuple[CycleTimePart, ...], tuple[CycleTimePart, ...]]:
     """A run by tool, and by kind of motion."""
     end_s = run.duration_s
     if end_s is None:
@@ -406,8 +408,8 @@ def _shares(
             cut_measured += until_s - begin_s - _held(holds, begin_s, until_s)
             cut_predicted += float(np.diff(starts[run.line[ends]])[0])
     between = end_s - _held(holds, 0.0, end_s) - cut_measured, float(starts[-1]) - cut_predicted
-    kinds = LearnedShare("cuts", cut_measured, cut_predicted), LearnedShare("between cuts", *between)
-    return tuple(LearnedShare(name, *both) for name, both in shares.items()), kinds
+    kinds = CycleTimePart("cuts", cut_measured, cut_predicted), CycleTimePart("between cuts", *between)
+    return tuple(CycleTimePart(name, *both) for name, both in shares.items()), kinds
 
 
 def _began(run: ObservedRun, line: int) -> float:
@@ -432,11 +434,11 @@ def _feed_override(run: ObservedRun) -> float:
 
 
 def learned_machine(
-    learned: _Learned,
+    learned: _Calibration,
     runs: Sequence[ObservedRun],
-    rivals: Sequence[tuple[_Learned, float]],
+    rivals: Sequence[tuple[_Calibration, float]],
     scatters: tuple[float, float],
-) -> tuple[Machine, dict[str, str], list[LearnedNumber], list[str]]:
+) -> tuple[Machine, dict[str, str], list[CalibratedParameter], list[str]]:
     """The machine with the calibrated parameters, and what the logs leave open of them."""
     motion, functions, machine = learned.motion, learned.functions, learned.machine
     source = f"logs of {len(runs)} runs"
@@ -475,7 +477,7 @@ def learned_machine(
 
 def _motion_numbers(
     machine: Machine, motion: MotionFit, variances: FloatArray, source: str
-) -> tuple[list[LearnedNumber], dict[str, str]]:
+) -> tuple[list[CalibratedParameter], dict[str, str]]:
     numbers, remarks = [], {}
     for parameter, variance in zip(motion.family.parameters, variances, strict=True):
         fitted, ratio = motion.values[parameter.name], math.exp(min(1.96 * math.sqrt(variance), 5.0))
@@ -495,10 +497,10 @@ def _motion_numbers(
 
 def _number(
     key: str, meaning: str, values: tuple[float, float, float], unit: str, told: bool, had: float | None = None
-) -> LearnedNumber:
+) -> CalibratedParameter:
     """A number and its interval, to what a person reads."""
     value, low, high = (float(f"{each:.4g}") for each in values)
-    return LearnedNumber(key, meaning, value, low, high, unit, told, had)
+    return CalibratedParameter(key, meaning, value, low, high, unit, told, had)
 
 
 # Key, meaning and unit of what takes time beside the motion, by its name in the fit; else it is an M code.
@@ -519,7 +521,7 @@ def _meaning(name: str) -> tuple[str, str, str]:
     return _FUNCTIONS.get(name) or ("times.m_codes", f"M{int(name[1:]):02d}", "s")
 
 
-def _function_numbers(functions: FunctionFit) -> list[LearnedNumber]:
+def _function_numbers(functions: FunctionFit) -> list[CalibratedParameter]:
     numbers = []
     for name, value in functions.values.items():
         key, meaning, unit = _meaning(name)

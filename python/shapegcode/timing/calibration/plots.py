@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
-from shapegcode.timing.calibration.result import TOLERANCE_PERCENT, LearnedClock
+from shapegcode.timing.calibration.result import TOLERANCE_PERCENT, CycleTimeCalibration
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,12 +16,12 @@ _TOOL_PERCENT = 5.0
 _MAX_RUNS = 20
 
 
-def plots_of(found: LearnedClock) -> dict[str, Plot]:
+def plots_of(found: CycleTimeCalibration) -> dict[str, Plot]:
     """Its pictures by name."""
-    return {"clock": partial(plot_clock, found)} if any(run.measured_s for run in found.runs) else {}
+    return {"clock": partial(plot_cycle_time_calibration, found)} if any(run.measured_s for run in found.runs) else {}
 
 
-def plot_clock(found: LearnedClock, ax: Axes | None = None) -> Axes:
+def plot_cycle_time_calibration(found: CycleTimeCalibration, ax: Axes | None = None) -> Axes:
     """How far is the calibrated model off? One row for each run: whole run, tools, kinds of motion.
 
     How to read this: 0 is what the machine took; the bands are 2 % for a run and 5 % for a tool's share; a bar is the

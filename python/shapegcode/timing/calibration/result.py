@@ -33,7 +33,7 @@ class FamilyScore:
 
 
 @dataclass(frozen=True)
-class LearnedNumber:
+class CalibratedParameter:
     """One number of the machine file.
 
     Attributes:
@@ -58,7 +58,7 @@ class LearnedNumber:
 
 
 @dataclass(frozen=True)
-class LearnedShare:
+class CycleTimePart:
     """A part of a run: a tool, or a kind of motion.
 
     Attributes:
@@ -78,7 +78,7 @@ class LearnedShare:
 
 
 @dataclass(frozen=True)
-class LearnedRun:
+class CalibrationRun:
     """One run.
 
     Attributes:
@@ -110,8 +110,8 @@ class LearnedRun:
     left_out_s: float | None
     feed_override: float
     rapid_override: float
-    tools: tuple[LearnedShare, ...]
-    kinds: tuple[LearnedShare, ...]
+    tools: tuple[CycleTimePart, ...]
+    kinds: tuple[CycleTimePart, ...]
     holds: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -144,7 +144,7 @@ def _error(predicted_s: float | None, measured_s: float | None, held_s: float) -
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class LearnedClock(Result):
+class CycleTimeCalibration(Result):
     """A cycle-time model of a machine, calibrated with logs of its runs.
 
     Attributes:
@@ -163,8 +163,8 @@ class LearnedClock(Result):
     machine: str
     family: str
     families: tuple[FamilyScore, ...]
-    numbers: tuple[LearnedNumber, ...]
-    runs: tuple[LearnedRun, ...]
+    numbers: tuple[CalibratedParameter, ...]
+    runs: tuple[CalibrationRun, ...]
     fitted: Machine = field(metadata=hidden())
     remarks: Mapping[str, str] = field(metadata=hidden())
     not_told: tuple[str, ...]
@@ -233,7 +233,7 @@ class LearnedClock(Result):
         ]
 
 
-def _interval(number: LearnedNumber) -> str:
+def _interval(number: CalibratedParameter) -> str:
     return f"{number.low:.4g} ... {number.high:.4g}" if number.told else "not determined"
 
 

@@ -29,15 +29,15 @@ def shop(folder: Path, control: HiddenControl, fit: list[int], test: list[int], 
 
 
 @pytest.fixture(scope="module")
-def learned(tmp_path_factory: pytest.TempPathFactory) -> tuple[sg.LearnedClock, HiddenControl]:
+def learned(tmp_path_factory: pytest.TempPathFactory) -> tuple[sg.CycleTimeCalibration, HiddenControl]:
     """Learned from two programs; a third one is predicted."""
     control = HiddenControl()
     file = shop(tmp_path_factory.mktemp("shop"), control, [1, 2], [3])
-    return sg.learn_clock(file, sg.Machine.load("vx500"), families=ONE), control
+    return sg.calibrate_cycle_time(file, sg.Machine.load("vx500"), families=ONE), control
 
 
 def test_a_program_that_it_was_not_fitted_to_takes_what_it_says(
-    learned: tuple[sg.LearnedClock, HiddenControl],
+    learned: tuple[sg.CycleTimeCalibration, HiddenControl],
 ) -> None:
     clock, _ = learned
     run = next(run for run in clock.runs if run.use == "test")
@@ -51,7 +51,7 @@ def test_a_program_that_it_was_not_fitted_to_takes_what_it_says(
     assert sum(share.measured_s for share in run.tools) == pytest.approx(run.measured_s, abs=1e-6)
 
 
-def test_what_the_runs_tell_is_what_the_control_does(learned: tuple[sg.LearnedClock, HiddenControl]) -> None:
+def test_what_the_runs_tell_is_what_the_control_does(learned: tuple[sg.CycleTimeCalibration, HiddenControl]) -> None:
     clock, control = learned
     machine = clock.fitted
     numbers = {(number.key, number.meaning): number for number in clock.numbers}
@@ -69,7 +69,7 @@ def test_what_the_runs_tell_is_what_the_control_does(learned: tuple[sg.LearnedCl
 
 
 def test_the_machine_file_times_as_the_result_says(
-    learned: tuple[sg.LearnedClock, HiddenControl], tmp_path: Path
+    learned: tuple[sg.CycleTimeCalibration, HiddenControl], tmp_path: Path
 ) -> None:
     """What is written is what was judged: `time` on the file, a path of its own through the code."""
     clock, _ = learned
@@ -93,7 +93,7 @@ def test_the_machine_file_times_as_the_result_says(
 @pytest.mark.slow
 def test_overrides_and_units_are_read_off_the_feed(tmp_path: Path) -> None:
     control = HiddenControl(override=0.8, feed_factor=60.0 / 25.4)
-    clock = sg.learn_clock(shop(tmp_path, control, [1, 2], [3]), sg.Machine.load("vx500"), families=ONE)
+    clock = sg.calibrate_cycle_time(shop(tmp_path, control, [1, 2], [3]), sg.Machine.load("vx500"), families=ONE)
     for run in clock.runs:
         assert run.feed_override == pytest.approx(0.8, abs=0.005)
     assert clock.fitted.times.feed_override_percent == pytest.approx(80.0, abs=0.5)
@@ -110,7 +110,7 @@ def test_a_hold_is_found_and_left_out(tmp_path: Path) -> None:
     at = len(rows) // 3
     held = [row if index < at else later(row, 17.0) for index, row in enumerate(rows)]
     log.write_text("\n".join(held) + "\n")
-    clock = sg.learn_clock(file, sg.Machine.load("vx500"), families=ONE)
+    clock = sg.calibrate_cycle_time(file, sg.Machine.load("vx500"), families=ONE)
     run = next(run for run in clock.runs if run.log.endswith("p2-0.txt"))
     assert run.held_s == pytest.approx(17.0, abs=1.0)
     assert abs(run.error_percent or 99.0) < 2.0
@@ -173,7 +173,7 @@ def test_what_does_not_belong_together_is_refused(spoil: Callable[[Path], None],
     file = shop(tmp_path, HiddenControl(), [1], [])
     spoil(tmp_path)
     with pytest.raises(sg.ShapegcodeError, match=said):
-        sg.learn_clock(file, sg.Machine.load("vx500"), families=ONE)
+        sg.calibrate_cycle_time(file, sg.Machine.load("vx500"), families=ONE)
 
 
 @pytest.mark.slow
@@ -183,7 +183,7 @@ def test_a_log_that_begins_in_the_middle_is_no_whole_run(tmp_path: Path) -> None
     rows = log.read_text().splitlines()
     stamp = rows[len(rows) // 2].partition("|")[0]
     log.write_text("\n".join([f"{stamp}|Program_Status|ACTIVE", *rows[len(rows) // 2 :]]) + "\n")
-    clock = sg.learn_clock(file, sg.Machine.load("vx500"), families=ONE)
+    clock = sg.calibrate_cycle_time(file, sg.Machine.load("vx500"), families=ONE)
     run = next(run for run in clock.runs if run.log.endswith("p2-0.txt"))
     assert run.measured_s is None
     assert any("in the middle of the program" in note for note in run.notes)
@@ -196,7 +196,7 @@ def test_the_kind_of_look_ahead_is_chosen_by_runs_left_out(tmp_path: Path) -> No
     control = HiddenControl()
     file = shop(tmp_path, control, [1, 2], [])
     kinds = ["speed difference", "after interpolation"]
-    clock = sg.learn_clock(file, sg.Machine.load("vx500"), families=kinds)
+    clock = sg.calibrate_cycle_time(file, sg.Machine.load("vx500"), families=kinds)
     scores = {family.name: family.left_out_s for family in clock.families}
     assert set(scores) == set(kinds)
     assert None not in scores.values()
@@ -208,6 +208,6 @@ def test_unknown_kinds_and_nothing_to_fit_are_refused(tmp_path: Path) -> None:
     file = shop(tmp_path, dataclasses.replace(HiddenControl()), [], [1])
     machine = sg.Machine.load("vx500")
     with pytest.raises(sg.ArgumentError, match="nothing to calibrate with"):
-        sg.learn_clock(file, machine, families=ONE)
+        sg.calibrate_cycle_time(file, machine, families=ONE)
     with pytest.raises(sg.ArgumentError, match="must be one of speed difference"):
-        sg.learn_clock(file, machine, families=["trapezium"])
+        sg.calibrate_cycle_time(file, machine, families=["trapezium"])
