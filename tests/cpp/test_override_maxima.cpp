@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "random_blocks.hpp"
+#include "sanitized.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/simulation.hpp"
 
@@ -106,7 +107,7 @@ void check_alike(double found, double full) {
 TEST_CASE("largest deviations at other overrides are those of runs in full") {
   Random random(20241);
   const std::vector<double> overrides{0.5, 0.63, 0.8, 0.9, 1.1, 1.2};
-  for (int trial = 0; trial < 150; ++trial) {
+  for (int trial = 0; trial < static_cast<int>(shapegcode::tests::trials(150)); ++trial) {
     CAPTURE(trial);
     SimulationOptions options = random_options(random);
     const std::vector<Segment> segments = random_path(random, uniform(random, 5.0, 150.0));

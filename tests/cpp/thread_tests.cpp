@@ -37,7 +37,7 @@ ControllerSettings settings_of(std::uint32_t session) {
   settings.limits.max_acceleration_mm_per_s2.setConstant(2000.0);
   settings.limits.max_jerk_mm_per_s3.setConstant(100'000.0);
   settings.limits.feed_override = session % 3 == 0 ? 0.25 : 1.0;
-  settings.following.resize(session % 4 == 1 ? 2 : 0);
+  settings.following.resize(session % 4 == 1 ? 2 : 0, {90.0, 1'000.0, 50'000.0});
   settings.shaper = Fir({0, 11}, {0.516, 0.484});
   settings.window = session % 2 == 0 ? 8 : 64;
   settings.plans_in_step = session % 4 == 0;
