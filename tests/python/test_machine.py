@@ -14,7 +14,7 @@ import pytest
 
 from shapegcode.cli import COMMANDS, main
 from shapegcode.cli.runner import write_json
-from shapegcode.errors import MachineError
+from shapegcode.errors import FileError, MachineError, Problem
 from shapegcode.io.atomic import write_text
 from shapegcode.machine import AxisMode, Machine
 from shapegcode.machine.description_result import MachineDescription
@@ -595,3 +595,10 @@ def test_json_refuses_nan(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="JSON compliant"):
         write_json({"a": math.nan}, tmp_path / "x.json")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_message_lists_fifty_problems_and_counts_the_rest() -> None:
+    problems = tuple(Problem(f"key_{n}", str(n), "unknown key") for n in range(57))
+    lines = str(FileError("many.toml", problems)).splitlines()
+    assert len(lines) == 51 and lines[-1] == "many.toml: 7 further problems"
+    assert "further" not in str(FileError("few.toml", problems[:50]))
