@@ -35,9 +35,6 @@ def located_error(source: str, line: int, column: int, message: str, alarm: int 
     return error
 
 
-_MAX_LISTED = 50  # problems of one file in a message
-
-
 @dataclass(frozen=True)
 class Problem:
     """One thing wrong in a file of settings.
@@ -61,7 +58,7 @@ class Problem:
 
 
 class FileError(ShapegcodeError, ValueError):
-    """A file of settings that cannot be used; the message lists its first 50 problems, one line each.
+    """A file of settings that cannot be used; the message lists every problem, one line each.
 
     Attributes:
         file: name of the file (or of what is built in).
@@ -72,13 +69,12 @@ class FileError(ShapegcodeError, ValueError):
         """Build the message ``file[:line]: key = value: limit``, one line per problem."""
         self.file = file
         self.problems = problems
-        lines = [
-            f"{file}:{problem.line}: {problem}" if problem.line is not None else f"{file}: {problem}"
-            for problem in problems[:_MAX_LISTED]
-        ]
-        if len(problems) > _MAX_LISTED:
-            lines.append(f"{file}: {len(problems) - _MAX_LISTED} further problems")
-        super().__init__("\n".join(lines))
+        super().__init__(
+            "\n".join(
+                f"{file}:{problem.line}: {problem}" if problem.line is not None else f"{file}: {problem}"
+                for problem in problems
+            )
+        )
 
 
 class MachineError(FileError):

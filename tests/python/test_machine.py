@@ -14,7 +14,7 @@ import pytest
 
 from shapegcode.cli import COMMANDS, main
 from shapegcode.cli.runner import write_json
-from shapegcode.errors import FileError, MachineError, Problem
+from shapegcode.errors import MachineError
 from shapegcode.io.atomic import write_text
 from shapegcode.machine import AxisMode, Machine
 from shapegcode.machine.description_result import MachineDescription
@@ -597,8 +597,10 @@ def test_json_refuses_nan(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_message_lists_fifty_problems_and_counts_the_rest() -> None:
-    problems = tuple(Problem(f"key_{n}", str(n), "unknown key") for n in range(57))
-    lines = str(FileError("many.toml", problems)).splitlines()
-    assert len(lines) == 51 and lines[-1] == "many.toml: 7 further problems"
-    assert "further" not in str(FileError("few.toml", problems[:50]))
+def test_known_keys_are_listed_with_the_first_unknown_one_of_a_table() -> None:
+    text = Machine.load("vx500").to_toml().replace("[verdict]", "[verdict]\nqqqq = 1\nzzzzz = 2 ", 1)
+    with pytest.raises(MachineError) as refused:
+        Machine.from_toml(text, "m.toml")
+    first, second = str(refused.value).splitlines()
+    assert "verdict.qqqq = 1: unknown key; known here: " in first
+    assert second.endswith("verdict.zzzzz = 2: unknown key")

@@ -19,6 +19,7 @@ from shapegcode.settings.remarks import lines_of
 
 MAX_PROBLEMS = 100
 _LONGEST_NAME = 200  # that is compared with known ones
+_KNOWN = "; known here: "
 
 
 class KeyProblem(ValueError):
@@ -43,6 +44,7 @@ def syntax_problem(message: str, text: str) -> Problem:
 def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, Any], text: str) -> tuple[Problem, ...]:
     """Pydantic's errors as problems of the file: dotted keys, TOML values, limits with units."""
     problems: list[Problem] = []
+    listed: set[str] = set()  # keys of a table, with the first unknown one
     details = error.errors(include_url=False)
     for detail in details[:MAX_PROBLEMS]:
         location, value = _locate(detail["loc"], data, detail["type"])
@@ -56,7 +58,9 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
             name = f"{key}.{cause.key}" if key else cause.key
             problem = Problem(name, _short(cause.value), cause.limit)
         elif detail["type"] == "extra_forbidden":
-            problem = Problem(key, _short(value), "unknown key" + _suggestion(model, location))
+            suggestion = _suggestion(model, location)
+            problem = Problem(key, _short(value), "unknown key" + (suggestion if suggestion not in listed else ""))
+            listed |= {suggestion} if suggestion.startswith(_KNOWN) else set()
         elif detail["type"] == "missing":
             problem = Problem(key, "", limit + _unit_remark(model, location))
         elif detail["type"] == "value_error" and isinstance(value, dict):
@@ -158,7 +162,7 @@ def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
     close = difflib.get_close_matches(name, model.model_fields, n=1, cutoff=0.5)
     if close:
         return f"; did you mean {close[0]}?"
-    return f"; known here: {', '.join(model.model_fields)}"
+    return f"{_KNOWN}{', '.join(model.model_fields)}"
 
 
 @lru_cache(maxsize=1)  # every problem of a file asks
