@@ -13,7 +13,7 @@ from shapegcode.characterization import moves
 from shapegcode.characterization.air_tests import AXES, AirTest, whole_periods
 from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, ControllerFact, Facts, mean
 from shapegcode.identification.servo.models import GAINS, lag_way
-from shapegcode.io.record import FloatArray
+from shapegcode.io.arrays import FloatArray
 from shapegcode.io.servo_log import ServoLog
 
 _Interval = tuple[float, float]  # a value and its half-width

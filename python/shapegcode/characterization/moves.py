@@ -14,7 +14,7 @@ import numpy as np
 
 from shapegcode.characterization.air_tests import AXES, AirTest, Part
 from shapegcode.errors import ArgumentError
-from shapegcode.io.record import FloatArray
+from shapegcode.io.arrays import FloatArray
 from shapegcode.io.servo_log import ServoLog
 
 _HOLD_SHARE = 0.9

@@ -29,7 +29,7 @@ class ControllerFact:
     unit: str  # of value, low and high
     key: str  # dotted key of the machine file that it goes into; empty: none
     source: str  # how it was measured, "log" or "stopwatch"; empty: not at all
-    note: str = ""  # what it rests on; for an unknown value, why it is not known
+    note: str = ""  # its basis; for an unknown value, why it is not known
     assumed: float | str | None = None  # what the machine file had; None where it has no such key
 
     @property

@@ -321,7 +321,7 @@ class _PointLines:
         return begin, begin + len(self._text[begin:end].rstrip(b"\r\n"))
 
     def write(self, block: int, position: str) -> bytes | None:
-        """A block with all that it rests on, G40 and G64 where there is room; None: it cannot be a restart point."""
+        """A block with all that it depends on, G40 and G64 where there is room; None: it cannot be a restart point."""
         if block >= len(self._begins):
             return None
         begin, end = self.extent(block)

@@ -20,6 +20,7 @@ from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.linear_feed import joints_of, largest_difference_mm, linear_blocks, linear_lines
 from shapegcode.conversion.result import Conversion, DialectNotes
 from shapegcode.errors import RoundTripError
+from shapegcode.io.units import MM_PER_INCH
 from shapegcode.machine import Machine
 from shapegcode.machine.dialects import CODE, Dialect, code_name, dialect_of, fanuc_meaning
 from shapegcode.program import Program, located_error, written_increment_mm
@@ -103,7 +104,7 @@ def require_dialect(program: Program, machine: Machine, budget: Budget | None) -
         if decimals is None:
             break
         inch = region.exit.units == 20
-        limit_mm = (10.0 ** (7 - decimals) * 25.4) if inch else 10.0 ** (8 - decimals)
+        limit_mm = (10.0 ** (7 - decimals) * MM_PER_INCH) if inch else 10.0 ** (8 - decimals)
         reach_mm = float(np.abs(region.path.polyline(1.0)).max())
         if reach_mm >= limit_mm and not region.incremental:
             raise program.region_error(
@@ -492,7 +493,9 @@ class _Translator:
         return ""
 
     def _filled(self, text: str) -> str:
-        return text.replace("{blend}", f"{_BLEND_MM / 25.4:.5f}" if self.state.unit == "G20" else f"{_BLEND_MM:g}")
+        return text.replace(
+            "{blend}", f"{_BLEND_MM / MM_PER_INCH:.5f}" if self.state.unit == "G20" else f"{_BLEND_MM:g}"
+        )
 
     def _split(
         self, number: int, codes: Sequence[str], words: Sequence[tuple[str, str]], out: Sequence[str]

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
+from shapegcode.io.arrays import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 TURN_DEG = 360.0

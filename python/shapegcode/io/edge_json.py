@@ -20,11 +20,11 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
+from shapegcode.io.arrays import FloatArray
 from shapegcode.io.data_file import DataFile
 from shapegcode.io.edge_capture import EdgeAxis, EdgeBlock, EdgeCall, EdgeCapture, EdgeGap, EdgeValue
 from shapegcode.io.run_tracks import RunLog, Signal
 
-FloatArray = npt.NDArray[np.float64]
 _MIN_ROWS = 2
 _MAX_VALUE = 1e12
 _NUMBERS = {int, float, type(None)}

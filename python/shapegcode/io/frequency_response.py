@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
-from shapegcode.io.record import FloatArray, Quantity, ReadOptions, stated_unit
+from shapegcode.io.arrays import FloatArray
+from shapegcode.io.record import Quantity, ReadOptions, stated_unit
 from shapegcode.io.units import Unit, find_unit
 
 ComplexArray = npt.NDArray[np.complex128]

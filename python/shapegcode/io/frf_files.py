@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from shapegcode.errors import RecordError
+from shapegcode.io.arrays import FloatArray
 from shapegcode.io.columns import Label, tap_label
 from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import (
@@ -24,7 +25,7 @@ from shapegcode.io.frequency_response import (
     scale_of,
 )
 from shapegcode.io.layout import utf8_text
-from shapegcode.io.record import FloatArray, ReadOptions
+from shapegcode.io.record import ReadOptions
 from shapegcode.io.table import TextTable
 
 _PARTS = {

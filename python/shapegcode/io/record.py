@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode.errors import RecordError
+from shapegcode.io.arrays import FloatArray
 from shapegcode.io.units import Measured, Unit, find_unit, units_of
 
-FloatArray = npt.NDArray[np.float64]
 Quantity = Literal["acceleration", "velocity", "displacement"]
 
 UNITS: dict[Quantity, str] = {"acceleration": "m/s²", "velocity": "m/s", "displacement": "m"}

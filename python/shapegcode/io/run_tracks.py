@@ -10,11 +10,9 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from shapegcode.io.arrays import FloatArray
 from shapegcode.io.run_items import FileNotes, Item, Role
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,9 +17,10 @@ from xml.parsers import expat
 import numpy as np
 
 from shapegcode.errors import RecordError
+from shapegcode.io.arrays import FloatArray
 from shapegcode.io.data_file import MAX_DEPTH, read_file
 from shapegcode.io.frequency_response import FrequencyResponse, checked_lines
-from shapegcode.io.record import FloatArray, ReadOptions
+from shapegcode.io.record import ReadOptions
 
 _MAX_BYTES = 64 << 20
 _SIEMENS = "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ!#$`()*+-/:;=?@[]^_{|}~"

@@ -7,15 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-import numpy as np
-import numpy.typing as npt
-
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.results.figures import ContourError, Tracks, largest_xyz_um
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Xyz
 
-FloatArray = npt.NDArray[np.float64]
 T = TypeVar("T")
 
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.io.arrays import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.metrology.figures import MeasuredSection, WallProfile
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
@@ -23,7 +23,6 @@ from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions
 
-FloatArray = npt.NDArray[np.float64]
 _CHUNK_SAMPLES = 65_536
 _LONGEST_REST_S = 10.0  # that a vibration is waited for behind a stop
 _MIN_REST_S = 0.25

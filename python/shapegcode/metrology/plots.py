@@ -7,8 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from shapegcode.io.arrays import FloatArray
 from shapegcode.metrology.figures import WallProfile
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
 from shapegcode.results import plot
@@ -17,7 +17,6 @@ from shapegcode.results.result import Plot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = npt.NDArray[np.float64]
 _SHARE_OF_TOOL = 0.8  # of the tool's radius that the largest deviation takes in the drawing
 _SHARE_OF_PART = 0.03
 _MIN_DRAWN_UM = 1e-3

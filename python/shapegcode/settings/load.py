@@ -59,8 +59,9 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
             problem = Problem(name, _short(cause.value), cause.limit)
         elif detail["type"] == "extra_forbidden":
             suggestion = _suggestion(model, location)
-            problem = Problem(key, _short(value), "unknown key" + (suggestion if suggestion not in listed else ""))
-            listed |= {suggestion} if suggestion.startswith(_KNOWN) else set()
+            problem = Problem(key, _short(value), "unknown key" + ("" if suggestion in listed else suggestion))
+            if suggestion.startswith(_KNOWN):
+                listed.add(suggestion)
         elif detail["type"] == "missing":
             problem = Problem(key, "", limit + _unit_remark(model, location))
         elif detail["type"] == "value_error" and isinstance(value, dict):

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
+from shapegcode.io.arrays import FloatArray
 from shapegcode.io.columns import Meaning, read_label, unit_of
-from shapegcode.io.record import FloatArray
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.table import TextTable
 from shapegcode.io.units import Measured, factor_between

@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import RecordError
-from shapegcode.io.record import FloatArray
+from shapegcode.io.arrays import FloatArray
 from shapegcode.io.run_tracks import RunLog, Signal
-from shapegcode.io.units import find_unit
+from shapegcode.io.units import MM_PER_INCH, find_unit
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import fanuc_model
 from shapegcode.program import Program
@@ -120,7 +120,7 @@ def _radius_mm(segment: _core.Segment) -> float:
 # --- what the feeds of a log tell: their unit, the overrides ----------------------------------------------------------
 
 # mm/s of the units that a feed is tried in where none is stated
-_FEED_UNITS = {"mm/s": 1.0, "mm/min": 1.0 / 60.0, "in/min": 25.4 / 60.0}
+_FEED_UNITS = {"mm/s": 1.0, "mm/min": 1.0 / 60.0, "in/min": MM_PER_INCH / 60.0}
 _MIN_READINGS = 4  # so many readings of one value are no chance
 _FEED_BIN = 0.0025  # of the programmed feed: readings of a steady feed agree better
 _MIN_SHARE = 0.06
