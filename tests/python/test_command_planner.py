@@ -149,3 +149,23 @@ def test_option_and_key_are_one() -> None:
     by_key = sg.convert(program, machine.with_values({"shaping.planner": "optimal"}), shape_all=True)
     assert by_option.text == by_key.text
     assert by_option.text != sg.convert(program, machine, shape_all=True).text
+
+
+@pytest.mark.parametrize(
+    ("kind", "planner"), [("fanuc", "look-ahead"), ("linuxcnc", "optimal"), ("klipper", "optimal")]
+)
+def test_by_default_open_planners_get_what_their_axes_can_do(kind: str, planner: str) -> None:
+    machine = machine_with({"controller.kind": kind, "controller.dialect": "fanuc"})
+    program = sg.Program.from_text(ONE_FEED.encode(), machine)
+    stated = machine.with_values({"shaping.planner": planner})
+    assert sg.convert(program, machine, shape_all=True).text == sg.convert(program, stated, shape_all=True).text
+
+
+def test_without_a_limit_of_jerk_the_acceleration_builds_up_in_the_stated_time() -> None:
+    """The same motion as with that jerk stated; a longer time is a longer cut."""
+    machine = machine_with({"controller.kind": "klipper", "controller.dialect": "fanuc"})
+    program = sg.Program.from_text(arcs_and_corners(9000.0).encode(), machine)
+    jerks = {f"axes.{axis}.max_jerk_mm_s3": getattr(machine.axes, axis).max_acceleration_mm_s2 / 0.08 for axis in "xyz"}
+    slow = sg.convert(program, machine.with_values({"shaping.jerk_time_s": 0.08}), shape_all=True)
+    assert slow.text == sg.convert(program, machine.with_values(jerks), shape_all=True).text
+    assert slow.cutting_time_s.emitted > sg.convert(program, machine, shape_all=True).cutting_time_s.emitted

@@ -67,7 +67,7 @@ def convert(
         contour_tolerance_um: largest deviation of it from the path, µm: `tolerance.contour_um`.
         shaper: family of the shaper, such as "zvd": `shaping.family`.
         per_axis: a shaper for each axis: `shaping.per_axis`.
-        planner: planner of a cut before it is shaped, "look-ahead" or "optimal": `shaping.planner`.
+        planner: planner of a cut before it is shaped, "look-ahead", "optimal" or "auto": `shaping.planner`.
         dialect: control in whose words the program is written, such as "linuxcnc": `emission.dialect`.
         rapids: rapids become shaped moves where that saves time: `shaping.rapids`.
         budget: what the emitted text may need; None: no limit.

@@ -24,7 +24,7 @@ from shapegcode.conversion.restart import (
 from shapegcode.machine import Machine
 from shapegcode.machine.dialects import dialect_of
 from shapegcode.machine.programs import Emission
-from shapegcode.model.machine_model import MachineModel, OwnFilter
+from shapegcode.model.machine_model import MachineModel, OwnFilter, command_planner, planned_jerk_mm_s3
 from shapegcode.model.modes import NO_OFFSET, Offset, excited_modes
 from shapegcode.program import MM_PER_INCH, Program, between_increments, written_increment_mm
 from shapegcode.program.stamp import REGION_MARK
@@ -123,7 +123,6 @@ _CORNER_SHARE = 0.75  # several corners of a polyline may fall into one shaper, 
 
 _FADED = 1.0 / 3.0  # of the time after which a vibration is a millionth: it is a hundredth
 
-_PLANNERS = {"look-ahead": _core.CommandPlanner.look_ahead, "optimal": _core.CommandPlanner.time_optimal}
 _TARGETS = {
     "response": _core.ContourTarget.response,
     "command": _core.ContourTarget.command,
@@ -224,7 +223,9 @@ class RegionWriter:
         options = _core.ShapingOptions()
         options.limits = limits
         options.tolerance = tolerance
-        options.planner = _PLANNERS[self._machine.shaping.planner]
+        options.planner = command_planner(self._machine)
+        if options.planner == _core.CommandPlanner.time_optimal:
+            options.limits.max_jerk_mm_per_s3 = planned_jerk_mm_s3(self._machine)
         options.block_period_s = grid.block_period_s
         options.interpolation_period_s = self._model.period_s
         options.plunge_axis_angle_rad = self._machine.shaping.plunge_angle_deg * _DEGREE

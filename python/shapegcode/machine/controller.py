@@ -31,8 +31,8 @@ class Controller(TomlTable):
     kind: ControllerKind = key(
         'control whose planner executes programs. "fanuc": by the keys below. "linuxcnc", "klipper", "grbl": by the '
         "rules of that control, with the limits of the axes and the table of its name; shaped programs too, since its "
-        "planner cannot be switched off. motion, law, corner_rule and their keys are then used only to plan the "
-        "shaped motion",
+        "planner cannot be switched off. motion, law, corner_rule and their keys are then used only with "
+        'shaping.planner = "look-ahead"',
         default="fanuc",
     )
     dialect: Literal["auto", "fanuc", "linuxcnc", "haas", "siemens"] = key(

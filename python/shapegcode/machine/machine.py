@@ -166,7 +166,7 @@ class Machine(TomlTable):
 
     @model_validator(mode="after")
     def _planner_knows_the_jerk(self) -> Machine:
-        if self.shaping.planner == "optimal":
+        if self.shaping.planner == "optimal" and self.controller.kind == "fanuc":
             missing = [f"axes.{a}.max_jerk_mm_s3" for a in "xyz" if getattr(self.axes, a).max_jerk_mm_s3 is None]
             if missing:
                 raise KeyProblem(

@@ -365,11 +365,17 @@ class Shaping(TomlTable):
         '"off": neither, the feed alone keeps the command within the tolerance',
         default="response",
     )
-    planner: Literal["look-ahead", "optimal"] = key(
-        'what plans the command of a cut before it is shaped. "look-ahead": as the control\'s own look-ahead, by its '
+    planner: Literal["auto", "look-ahead", "optimal"] = key(
+        'what plans the command of a cut before it is shaped. "look-ahead": as a FANUC control\'s look-ahead, by its '
         'law of acceleration and its rule for corners; "optimal": as fast as feed, acceleration and jerk of the axes '
-        "allow, corners and short moves rounded within tolerance.contour_um (needs axes.*.max_jerk_mm_s3)",
-        default="look-ahead",
+        "allow, corners and short moves rounded within tolerance.contour_um (needs axes.*.max_jerk_mm_s3); "
+        '"auto": "look-ahead" where controller.kind is "fanuc", else "optimal"',
+        default="auto",
+    )
+    jerk_time_s: Positive = key(
+        'time in which a cut planned by "optimal" builds up max_acceleration_mm_s2 of an axis without max_jerk_mm_s3, '
+        'where controller.kind is not "fanuc": those planners know no jerk',
+        assumed=0.05,
     )
     rapids: Bool = key(
         "write rapids (G00) as shaped cutting moves where the vibration then settles sooner for the next cut; rapid "

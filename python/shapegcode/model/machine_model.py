@@ -96,6 +96,20 @@ def planner_rules(machine: Machine) -> _core.PlannerRules:
     return rules
 
 
+def command_planner(machine: Machine) -> _core.CommandPlanner:
+    """What plans a cut before it is shaped: `shaping.planner`."""
+    planner = machine.shaping.planner
+    if planner == "optimal" or (planner == "auto" and machine.controller.kind != "fanuc"):
+        return _core.CommandPlanner.time_optimal
+    return _core.CommandPlanner.look_ahead
+
+
+def planned_jerk_mm_s3(machine: Machine) -> list[float]:
+    """Jerk of each axis of a time-optimal cut; without a limit the acceleration still takes a time to build up."""
+    rise_s = machine.shaping.jerk_time_s
+    return [axis.max_jerk_mm_s3 or axis.max_acceleration_mm_s2 / rise_s for axis in machine.axes.as_tuple()]
+
+
 def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
     """Look-ahead limits of a machine."""
     limits = _core.MotionLimits()
