@@ -111,8 +111,17 @@ void register_path(py::module_& module) {
       .def(
           "point_at", [](const Segment& self, double s) { return point_at(self, s); }, py::arg("s_mm"),
           "Position at a distance from the start, shape (3,), mm.")
-      .def("chords_within", &chords_within, py::arg("tolerance_mm"),
-           "How many equal chords of an arc lie within a tolerance of it; 1 for a line.");
+      .def(
+          "chords_within",
+          [](const Segment& self, double tolerance_mm) {
+            if (!(tolerance_mm > 0.0)) {
+              throw Error(ErrorKind::argument, "tolerance of chords " + std::to_string(tolerance_mm) + " mm: above 0");
+            }
+            return chords_within(self, tolerance_mm);
+          },
+          py::arg("tolerance_mm"),
+          "How many equal chords of an arc lie within a tolerance of it; 1 for a line.\n\n"
+          "Raises ArgumentError if the tolerance is not above 0.");
 
   py::class_<Path, std::shared_ptr<Path>>(module, "Path", "A connected run of segments.")
       .def(py::init<std::vector<Segment>>(), py::arg("segments"),

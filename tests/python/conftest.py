@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import hypothesis
 import pytest
+from slow_tests import read_list
 
 if TYPE_CHECKING:
     from browser import Browser
@@ -20,6 +21,21 @@ os.environ["MPLBACKEND"] = "Agg"
 hypothesis.settings.register_profile("gate", derandomize=True, deadline=None)
 hypothesis.settings.register_profile("search", deadline=None, max_examples=2000)
 hypothesis.settings.load_profile("gate")
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m looks at the marks
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what takes long; a name in the list that is no test any more is an error."""
+    slow = read_list()
+    found = set()
+    for item in items:
+        if (name := item.nodeid.removeprefix("tests/python/")) in slow:
+            item.add_marker(pytest.mark.slow)
+            found.add(name)
+    has_parts = any("::" in str(each) for each in config.invocation_params.args)
+    files = set() if has_parts else {item.path.name for item in items}
+    if gone := sorted(name for name in slow - found if name.split("::")[0] in files):
+        raise pytest.UsageError(f"tests/python/slow_tests.txt names what is no test: {', '.join(gone)}")
 
 
 @pytest.fixture(scope="module")

@@ -150,6 +150,9 @@ def test_chords_lie_within_their_tolerance_and_one_less_does_not() -> None:
         assert count == int(count) and off_mm(count) <= tolerance * (1.0 + 1e-6)
         assert count == 1 or off_mm(count - 1) > tolerance
     assert _core.Segment.line([0, 0, 0], [9, 0, 0], 10.0).chords_within(1e-3) == 1
+    for tolerance in (0.0, -1.0, float("nan")):
+        with pytest.raises(_core.ArgumentError, match="above 0"):
+            _core.Segment.line([0, 0, 0], [9, 0, 0], 10.0).chords_within(tolerance)
 
 
 LINUXCNC = Path(__file__).parents[1] / "golden" / "linuxcnc"

@@ -80,6 +80,7 @@ void OnlinePlanner::restart(std::uint64_t first, const AxisValues& position) noe
   plan_.forget();
   last_ = &sections_.current();
   last_number_ = 0;
+  published_ = 0;
   start_ = 0;
   length_ = shortest_section;
   has_motion_ = false;
@@ -251,9 +252,10 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const F
   // Under way on the stations of the plan before: a state that just keeps the limits there keeps them here.
   const bool goes_on =
       has_motion_ && !rests && !motion_.at_end() && plan_.station(motion_.passed()).segment == from.segment;
-  const PathStart path_start{first_, from.segment, from.offset, goes_on ? motion_.in_station() : 0.0};
+  const PathStart path_start{first_, from.segment, from.offset, goes_on ? motion_.in_station() : 0.0, published_ + 1};
   for (int n = 0; n < attempts; ++n) {
     if (makes_plan) {
+      fixed_ = plan_.release(from.segment, std::max(planned_, fixed_ + 1), last_->serial);
       planned_ = look_ahead(from, pushed, planned_ratios);
       ratios_ = planned_ratios;
       has_motion_ = false;
@@ -398,7 +400,7 @@ void OnlinePlanner::give_out(Section& section, const PathPoint& from, std::uint6
   const bool at_end = rest.point.offset >= entry.segment.length_mm - at_end_mm;
   section.done = rest.point.segment + (at_end ? 1 : 0);
   section.runs_out = motion_.at_end() && at_end && section.done == pushed && !entry.segment.stop_at_end;
-  fixed_ = std::max(fixed_, plan_.fix(from.segment, rest.point.segment, rest.point.offset));
+  fixed_ = std::max(fixed_, plan_.fix(from.segment, rest.point.segment, rest.point.offset, published_ + 1));
   const double periods = periods_share * static_cast<double>(section.whole_count - section.count);
   const std::size_t shortest =
       std::max(shortest_section, static_cast<std::size_t>(rules_.lead_periods) / sections_ahead);
@@ -438,6 +440,7 @@ void OnlinePlanner::publish(Section& section) noexcept {
   last_ = &section;
   last_number_ = sections_.next_number();
   start_ = section.count;
+  section.serial = ++published_;
   sections_.publish();
 }
 

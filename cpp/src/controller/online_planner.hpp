@@ -73,9 +73,10 @@ class OnlinePlanner {
   int settle_ = 0;                         // periods of rest that are left at a stop
   const Section* last_ = nullptr;
   std::uint32_t last_number_ = 0;
-  std::size_t start_ = 0;   // behind how many of its points the next one goes on
-  std::size_t length_ = 1;  // periods of the next one
-  bool settled_ = true;     // the filters behind
+  std::uint64_t published_ = 0;  // sections since the restart
+  std::size_t start_ = 0;        // behind how many of its points the next one goes on
+  std::size_t length_ = 1;       // periods of the next one
+  bool settled_ = true;          // the filters behind
   std::uint64_t released_ = 0;
   std::uint32_t failed_ = 0;  // the section behind which no motion was found, plus 1
   std::size_t retry_ = 0;

@@ -8,7 +8,7 @@ void Sections::restart(const PlannedPoint& point) noexcept {
   Section& rest = slots_[0];
   rest.after = 0;
   rest.start = rest.count = rest.whole_count = 0;
-  rest.first_period = 0;
+  rest.first_period = rest.serial = 0;
   rest.done = point.point.segment;
   rest.runs_out = rest.is_bound = false;
   rest.before.fill(point);

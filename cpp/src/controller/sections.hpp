@@ -30,6 +30,7 @@ struct Section {
   std::size_t count = 0;        ///< points that are run if another section follows
   std::size_t whole_count = 0;  ///< with the stop
   std::uint64_t first_period = 0;
+  std::uint64_t serial = 0;  ///< which one it is since the restart; its number comes again
   std::uint64_t done = 0;    ///< segments that have been run to their ends where it comes to rest
   bool runs_out = false;     ///< it rests there only because no segment follows
   bool is_bound = false;     ///< to the spindle: its one point is where the motion ends that somebody else runs

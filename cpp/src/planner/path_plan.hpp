@@ -33,9 +33,14 @@ class PathPlan {
 
   /// Whether it ends before the end of what is known.
   [[nodiscard]] bool is_cut() const noexcept { return is_cut_; }
-  /// Motion was planned up to a position: the roundings that it has begun stay as they are. The last one of them.
-  std::uint64_t fix(std::uint64_t from, std::uint64_t segment, double offset) noexcept {
-    return path_.fix(from, segment, offset);
+  /// Motion was planned up to a position, in a section: the roundings that it has begun stay as they are. The last one
+  /// of them.
+  std::uint64_t fix(std::uint64_t from, std::uint64_t segment, double offset, std::uint64_t section) noexcept {
+    return path_.fix(from, segment, offset, section);
+  }
+  /// What only sections behind `last` have begun, which will not be run, is free again. The last one that is not.
+  std::uint64_t release(std::uint64_t first, std::uint64_t end, std::uint64_t last) noexcept {
+    return path_.release(first, end, last);
   }
 
   /// Whether a rounding that stays reaches over a junction: no stop is possible there.

@@ -81,7 +81,7 @@ void RoundedPath::start(const PathStart& start, std::uint64_t end, const FeedRat
   x_ = start_x_ - start.in_station;
   for (std::uint64_t i = start.segment; i < end; ++i) {
     PlannedSegment& entry = (*ring_)[i];
-    entry.is_fixed = entry.is_fixed || i == start.segment;
+    if (i == start.segment) fix(entry);
     if (entry.is_fixed) continue;
     entry.is_narrow = false;
   }
@@ -169,7 +169,7 @@ void RoundedPath::choose(std::uint64_t junction) noexcept {
     // The motion is in a rounding that goes on beyond this junction: no stop is possible there.
     width = std::max(width_before, narrowest_mm);
     entry.saw_until = saw_before;
-    entry.is_fixed = true;
+    fix(entry);
   }
   entry.half_width = width;
   for (std::size_t i = 0; i < limits_.axes; ++i) {
@@ -214,14 +214,31 @@ void RoundedPath::stop_at(std::uint64_t junction) noexcept {
   }
 }
 
-std::uint64_t RoundedPath::fix(std::uint64_t from, std::uint64_t segment, double offset) noexcept {
+void RoundedPath::fix(PlannedSegment& entry) const noexcept {
+  if (!entry.is_fixed) entry.fixed_by = start_.section;
+  entry.is_fixed = true;
+}
+
+std::uint64_t RoundedPath::fix(std::uint64_t from, std::uint64_t segment, double offset,
+                               std::uint64_t section) noexcept {
+  start_.section = section;
   std::uint64_t fixed = segment;
-  for (std::uint64_t i = from; i <= segment; ++i) (*ring_)[i].is_fixed = true;
+  for (std::uint64_t i = from; i <= segment; ++i) fix((*ring_)[i]);
   const double x = (*ring_)[segment].distance + offset;
   const std::uint64_t last = std::min(end_, segment + lookback);
   for (std::uint64_t i = segment + 1; i < last && !starts_anew(i); ++i) {
     PlannedSegment& entry = (*ring_)[i];
-    entry.is_fixed = entry.is_fixed || (entry.half_width > 0.0 && entry.distance - entry.half_width < x);
+    if (entry.half_width > 0.0 && entry.distance - entry.half_width < x) fix(entry);
+    if (entry.is_fixed) fixed = i;
+  }
+  return fixed;
+}
+
+std::uint64_t RoundedPath::release(std::uint64_t first, std::uint64_t end, std::uint64_t last) noexcept {
+  std::uint64_t fixed = first;
+  for (std::uint64_t i = first; i < end; ++i) {
+    PlannedSegment& entry = (*ring_)[i];
+    entry.is_fixed = entry.is_fixed && entry.fixed_by <= last;
     if (entry.is_fixed) fixed = i;
   }
   return fixed;

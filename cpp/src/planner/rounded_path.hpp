@@ -12,7 +12,8 @@ namespace shapegcode {
 struct PathStart {
   std::uint64_t first = 0, segment = 0;
   double offset = 0.0;
-  double in_station = 0.0;  ///< mm from the begin of the first station to it
+  double in_station = 0.0;    ///< mm from the begin of the first station to it
+  std::uint64_t section = 0;  ///< which section is planned from there, counted
 };
 
 /// Every junction is rounded by itself: its jump of the direction, or of the second derivative, is spread over the path
@@ -29,8 +30,12 @@ class RoundedPath {
   /// The next interval; false at the end.
   [[nodiscard]] bool next(Station& station) noexcept;
 
-  /// Motion was planned up to a position: the roundings that it has begun stay as they are. The last one of them.
-  std::uint64_t fix(std::uint64_t from, std::uint64_t segment, double offset) noexcept;
+  /// Motion was planned up to a position, in a section: the roundings that it has begun stay as they are. The last one
+  /// of them.
+  std::uint64_t fix(std::uint64_t from, std::uint64_t segment, double offset, std::uint64_t section) noexcept;
+  /// Sections behind `last` will not be run: the roundings that only they have begun, of the segments from `first` to
+  /// before `end`, are not fixed any more. The last segment that still is, at least `first`.
+  std::uint64_t release(std::uint64_t first, std::uint64_t end, std::uint64_t last) noexcept;
   /// Whether a rounding that is fixed reaches over a junction.
   [[nodiscard]] bool is_covered(std::uint64_t junction) const noexcept;
   [[nodiscard]] const PlannedSegment& segment(std::uint64_t index) const noexcept { return (*ring_)[index]; }
@@ -42,6 +47,7 @@ class RoundedPath {
 
  private:
   void choose(std::uint64_t junction) noexcept;
+  void fix(PlannedSegment& entry) const noexcept;
   void stop_at(std::uint64_t junction) noexcept;
   [[nodiscard]] double widest(std::uint64_t junction) const noexcept;
   [[nodiscard]] double end_of(std::uint64_t segment) const noexcept;

@@ -49,6 +49,7 @@ struct PlannedSegment {
   double half_width = 0.0;      ///< over which the junction is rounded, to both sides
   double passed = 0.0;          ///< square of the speed at which that can be passed
   bool is_fixed = false;        ///< the motion has been planned into the rounding
+  std::uint64_t fixed_by = 0;   ///< which section does that, counted
   std::uint64_t saw_until = 0;  ///< segments before this one were considered when the rounding was chosen
 };
 
