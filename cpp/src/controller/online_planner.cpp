@@ -97,14 +97,14 @@ void OnlinePlanner::follow_reader() noexcept {
   const Section& current = sections_.section_of(reader);
   const bool rests = reader.index == current.whole_count;
   running_.store(rests ? current.done : current.before[0].point.segment, std::memory_order_release);
-  if (reader.section != last_number_) {
-    const bool pending = reader.next != sections_.next_number();
-    const Section* next = pending ? &sections_.section(reader.next) : nullptr;
-    if (next != nullptr && next->after == reader.section && next->start >= reader.index) return;
-    last_ = &current;
-    last_number_ = reader.section;
+  const std::uint32_t last = sections_.last_behind(reader);
+  if (last != last_number_) {
+    last_ = last == reader.section ? &current : &sections_.section(last);
+    last_number_ = last;
+    start_ = last_->count;
     has_motion_ = false;
   }
+  if (last != reader.section) return;
   const std::size_t margin = rules_.lead_periods > 0 ? margin_periods : 0;
   const std::size_t start = std::min(std::max(last_->count, reader.index + margin), last_->whole_count);
   if (start != last_->count) has_motion_ = false;

@@ -31,6 +31,18 @@ Sections::Reader Sections::reader() const noexcept {
   return reader;
 }
 
+std::uint32_t Sections::last_behind(const Reader& reader) const noexcept {
+  std::uint32_t last = reader.section;
+  std::size_t index = reader.index;
+  for (std::uint32_t number = reader.next; number != next_number(); number = (number + 1) % numbers) {
+    const Section& next = section(number);
+    if (next.after != last || next.start < index) continue;
+    last = number;
+    index = 0;
+  }
+  return last;
+}
+
 void Sections::say() noexcept {
   const std::uint64_t word = (static_cast<std::uint64_t>(index_) << (2 * number_bits + slot_bits)) |
                              (static_cast<std::uint64_t>(slot_) << (2 * number_bits)) |

@@ -68,6 +68,8 @@ class Sections {
   /// One that is not dropped yet.
   [[nodiscard]] const Section& section(std::uint32_t number) const noexcept { return slots_[slot_of(number)]; }
   [[nodiscard]] const Section& section_of(const Reader& reader) const noexcept { return slots_[reader.slot]; }
+  /// The number of the section that will be run last, as the reader goes on now.
+  [[nodiscard]] std::uint32_t last_behind(const Reader& reader) const noexcept;
   /// The number of the next section.
   [[nodiscard]] std::uint32_t next_number() const noexcept { return published_.load(std::memory_order_relaxed); }
   /// Room for another section; none while the reader may still need all of them.
