@@ -75,13 +75,6 @@ from shapegcode.checking.result import (
     Check as Check,
     Finding as Finding,
 )
-from shapegcode.comparison.compare import compare as compare
-from shapegcode.comparison.result import (
-    Allowed as Allowed,
-    Comparison as Comparison,
-    KindCount as KindCount,
-    ProgramDifference as ProgramDifference,
-)
 from shapegcode.conversion.budget import Budget as Budget
 from shapegcode.conversion.convert import convert as convert
 from shapegcode.conversion.plots import plot_tolerance as plot_tolerance
@@ -187,6 +180,13 @@ from shapegcode.metrology.result import Measurement as Measurement
 from shapegcode.model.modes import drive_parameters as drive_parameters, plant_response as plant_response
 from shapegcode.model.stream import stream as stream
 from shapegcode.program import Program as Program
+from shapegcode.program.comparison import (
+    Allowed as Allowed,
+    Comparison as Comparison,
+    KindCount as KindCount,
+    ProgramDifference as ProgramDifference,
+    compare as compare,
+)
 from shapegcode.program.expand import Expansion as Expansion, expand as expand
 from shapegcode.results.json import schema as schema
 from shapegcode.results.motion_plots import (

@@ -15,7 +15,7 @@ from table import markdown
 
 import shapegcode as sg
 from shapegcode import _core
-from shapegcode.machine.planners import PLANNER_NAMES
+from shapegcode.machine.controller import PLANNER_NAMES
 from shapegcode.model.machine_model import fanuc_model
 
 ROOT = Path(__file__).resolve().parents[2]

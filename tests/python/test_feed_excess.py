@@ -13,7 +13,7 @@ from judge import interpret, play
 from judge.in_order import Haste, Way, deviation_um, haste, places
 from judge.records import Move
 from shapegcode import _core
-from shapegcode.conversion import aims, write
+from shapegcode.conversion import plan, write
 
 #: A corner into circles of some hundredths of a millimetre at F342: bringing the contour back asks for bursts.
 SMALL_ARCS = (
@@ -80,7 +80,7 @@ def test_what_runs_too_fast_is_a_miss_that_says_where(monkeypatch: pytest.Monkey
         return found
 
     monkeypatch.setattr(write.RegionWriter, "options", unlimited)
-    monkeypatch.setattr(aims, "_LEAST_FEED_RATIO", 1.0)
+    monkeypatch.setattr(plan, "_LEAST_FEED_RATIO", 1.0)
     conversion, measured = converted(SMALL_ARCS)
     assert not conversion.ok
     (miss,) = conversion.misses()

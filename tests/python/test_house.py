@@ -200,7 +200,6 @@ PACKAGE_FOLDERS = [
     "model",
     "shaping",
     "verdict",
-    "comparison",
     "simulation",
     "timing",
     "checking",

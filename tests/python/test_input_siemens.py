@@ -19,7 +19,7 @@ from acceptance import machine_with, moves_of
 from dialect_readers import ReadMove
 from shapegcode import _core
 from shapegcode.conversion.translate import translate
-from shapegcode.program.foreign.plain import ForeignProgram
+from shapegcode.program.foreign.read import ForeignProgram
 from shapegcode.program.foreign.siemens import read_siemens
 from siemens_programs import moves_of_interpreter, random_siemens
 

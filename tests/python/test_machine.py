@@ -15,7 +15,7 @@ import pytest
 from shapegcode.cli import COMMANDS, main
 from shapegcode.cli.runner import write_json
 from shapegcode.errors import MachineError
-from shapegcode.io.atomic import write_text
+from shapegcode.io.data_file import write_text
 from shapegcode.machine import AxisMode, Machine
 from shapegcode.machine.description_result import MachineDescription
 from shapegcode.results.json import schema
@@ -572,7 +572,7 @@ def test_write_text_keeps_the_old_file_when_it_fails(tmp_path: Path, monkeypatch
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("shapegcode.io.atomic.os.fsync", full_disk)
+        patch.setattr("shapegcode.io.data_file.os.fsync", full_disk)
         with pytest.raises(OSError, match=r"No space left on device: '.*program\.nc'"):
             write_text(file, "new")
     assert file.read_bytes() == b"old"

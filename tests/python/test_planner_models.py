@@ -24,7 +24,7 @@ from planner_references import (
     smoothed,
 )
 from shapegcode import _core
-from shapegcode.machine.planners import PLANNER_NAMES
+from shapegcode.machine.controller import PLANNER_NAMES
 from shapegcode.model.machine_model import fanuc_model
 
 PROGRAMS = Path(__file__).parents[1] / "golden" / "programs"

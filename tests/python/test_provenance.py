@@ -20,7 +20,7 @@ from shapegcode.conversion.sensitivity import _Region
 from shapegcode.identification.result import Estimate, IdentifiedMode
 from shapegcode.identification.update import update_modes
 from shapegcode.settings.edit import with_remarks, without_origins
-from shapegcode.settings.remarks import origin_of, remarks_of
+from shapegcode.settings.keys import origin_of, remarks_of
 from shapegcode.shaping.grid import choose_grid
 
 DUMP = b"""%

@@ -11,7 +11,7 @@ import pytest
 
 import shapegcode as sg
 from command import run
-from shapegcode.program.several import programs_of
+from shapegcode.program.reading import programs_of
 
 HEAD = "G21 G90 G17 G54\nG00 X0 Y0 Z5.\n"
 CUT = "G01 X{x}. F3000\nY40.\nX0\n"

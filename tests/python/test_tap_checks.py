@@ -16,8 +16,8 @@ from shapegcode.identification.checks import Prepared, excited_hz, find_hits, is
 from shapegcode.identification.decay import find_decay
 from shapegcode.identification.plan import TapPlan, rapid_stop_program, recording_for, tap_plan
 from shapegcode.identification.spectra import decay_spectrum, frf, mode_envelopes
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.record import Record
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.results.json import schema, to_text

@@ -18,7 +18,7 @@ import pytest
 import shapegcode as sg
 from command import run
 from faults import command, hear_ctrl_c, sound
-from shapegcode.io.atomic import is_temporary, write_text
+from shapegcode.io.data_file import is_temporary, write_text
 from test_data_limits import PROGRAM, M, no_wait
 
 LONG = PROGRAM.replace("Y10.\n", "".join(f"Y{k}.\nX{k}.\n" for k in range(8)))

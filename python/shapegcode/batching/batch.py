@@ -17,7 +17,7 @@ from shapegcode.batching.process import Base, Cluster, Hosts, cluster_executor, 
 from shapegcode.batching.result import Batch
 from shapegcode.batching.runs import KeptRows, OnBatch, Runs, summary_lines
 from shapegcode.errors import ArgumentError
-from shapegcode.io.atomic import is_temporary, write_lines
+from shapegcode.io.data_file import is_temporary, write_lines
 from shapegcode.program.computer import cores
 
 _SCRATCH = ".batch-scratch"

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from shapegcode.errors import ArgumentError
-from shapegcode.io.atomic import named_errors, write_lines
+from shapegcode.io.data_file import named_errors, write_lines
 
 MANIFEST = "batch.jsonl"
 """Name of the file, in the output folder."""

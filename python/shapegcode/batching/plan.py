@@ -14,8 +14,7 @@ from shapegcode.batching.process import Base, BatchJob
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file
 from shapegcode.machine import Machine
-from shapegcode.program.reading import PROGRAM_SUFFIXES, program_loader
-from shapegcode.program.several import is_subprogram
+from shapegcode.program.reading import PROGRAM_SUFFIXES, is_subprogram, program_loader
 
 _NUMBERED = re.compile(r"[Oo]\d{1,8}")
 _COMMENT = re.compile(r"(?:^|\s)#.*")

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from shapegcode.errors import ArgumentError
-from shapegcode.io.atomic import named_errors
+from shapegcode.io.data_file import named_errors
 from shapegcode.program.computer import MEMORY_NEEDED
 from shapegcode.results.json import this_version
 

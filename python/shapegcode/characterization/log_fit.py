@@ -13,8 +13,8 @@ from shapegcode.characterization import moves
 from shapegcode.characterization.air_tests import AXES, AirTest, whole_periods
 from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, ControllerFact, Facts, mean
 from shapegcode.identification.servo.models import GAINS, lag_way
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.servo_log import ServoLog
+from shapegcode.io.units import FloatArray
 
 _Interval = tuple[float, float]  # a value and its half-width
 _FOLLOWED = 0.9

@@ -14,8 +14,8 @@ import numpy as np
 
 from shapegcode.characterization.air_tests import AXES, AirTest, Part
 from shapegcode.errors import ArgumentError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.servo_log import ServoLog
+from shapegcode.io.units import FloatArray
 
 _HOLD_SHARE = 0.9
 _BEND_SHARE = 0.85

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from shapegcode.characterization import air_tests
 from shapegcode.characterization.result import CharacterisationTests, WrittenTest
 from shapegcode.errors import ArgumentError, FileError, Problem
-from shapegcode.io.atomic import write_text
+from shapegcode.io.data_file import write_text
 from shapegcode.settings.keys import Count, Float, InlineTable, Positive, Text, TomlTable, key
 from shapegcode.settings.load import KeyProblem, line_of, parsed, read_text, validated
 

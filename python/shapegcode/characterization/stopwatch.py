@@ -23,7 +23,7 @@ from shapegcode.characterization.air_tests import (
 )
 from shapegcode.characterization.programs import FilledSheet
 from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, Facts
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 
 _CLEARLY = 9.0  # chi² by which an alternative must fit worse
 _WIDE = 0.5  # of the value: an interval of so much either way determines nothing

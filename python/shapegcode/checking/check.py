@@ -14,12 +14,11 @@ from shapegcode._core import ProgramError
 from shapegcode.checking.result import Check, Finding, FindingCounts, SerialLine, ShortBlocks, ShortRun, StarvedRun
 from shapegcode.checking.runs import BlockTable, CuttingRun, block_table, look_ahead_breakers
 from shapegcode.machine import Machine
-from shapegcode.model.linuxcnc_lines import ini_lines
+from shapegcode.model.machine_model import ini_lines
 from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.program import Program
 from shapegcode.program.computer import require_memory_for_lines
-from shapegcode.program.reading import given_text
-from shapegcode.program.several import index_of, programs_of
+from shapegcode.program.reading import given_text, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, no_room
 
 MOST_FINDINGS = 1000
@@ -50,7 +49,7 @@ def check(
         program: the file, or what was read of one: a program with alarms can only be checked as a file or a text.
         machine: whose controller would run it.
         program_number: which program of a file that holds several: its O number, or an address as in
-            `shapegcode.program.several`; None: the first.
+            `shapegcode.program.reading`; None: the first.
 
     Returns:
         The findings, and what short blocks and a serial line cost.
@@ -84,7 +83,7 @@ def check_text(
         machine: whose controller would run it.
         source: its name in findings.
         program_number: which program of a text that holds several: its O number, or an address as in
-            `shapegcode.program.several`; None: the first.
+            `shapegcode.program.reading`; None: the first.
         folder: where programs that it calls are looked for too.
 
     Returns:

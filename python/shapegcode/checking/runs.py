@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import fanuc_model
 from shapegcode.model.stream import cuts_of_lines

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compare two programs."""
-    from shapegcode.comparison.compare import compare
+    from shapegcode.program.comparison import compare
 
     notes = [] if args.machine else ["read as the built-in machine vx500 reads programs: -m MACHINE names another one"]
     args.machine = args.machine or "vx500"

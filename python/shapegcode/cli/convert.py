@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     """Convert one program; see the module."""
     from shapegcode._core import ArgumentError
     from shapegcode.program.compensation import read_for_conversion
-    from shapegcode.program.several import alone_with
+    from shapegcode.program.reading import alone_with
 
     output = options.output_file(args.output)
     machine = options.overridden(options.load_machine(args), args, MACHINE_KEYS)

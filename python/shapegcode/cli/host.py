@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode.batching.process import FAILED_CODES
-from shapegcode.io.atomic import write_in_passing
+from shapegcode.io.data_file import write_in_passing
 from shapegcode.results.json import this_version
 
 _LOADED = (

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.cli import arguments, options, runner
-from shapegcode.io.atomic import write_text
+from shapegcode.io.data_file import write_text
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from shapegcode.cli import runner
 from shapegcode.cli.arguments import add_options
 from shapegcode.cli.options import add_modes_arguments, add_result_arguments, decided_modes, write_new
-from shapegcode.io.atomic import write_text
+from shapegcode.io.data_file import write_text
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine

@@ -10,7 +10,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
 from shapegcode.cli.arguments import add_options, axes, micrometres, number, one_of, program_choice, seconds, share
-from shapegcode.io.atomic import write_text
+from shapegcode.io.data_file import write_text
 
 if TYPE_CHECKING:
     from shapegcode.batching.process import Cluster

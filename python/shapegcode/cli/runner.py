@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
-from shapegcode.io.atomic import write_bytes, write_lines
+from shapegcode.io.data_file import write_bytes, write_lines
 
 if TYPE_CHECKING:
     from rich.console import Console

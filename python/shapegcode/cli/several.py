@@ -17,8 +17,7 @@ from shapegcode.cli.runner import check_files, output_console, standard_output, 
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.program.foreign.read import CONTROLS, input_dialect
-from shapegcode.program.reading import program_bytes
-from shapegcode.program.several import ProgramPlace, is_subprogram, programs_of
+from shapegcode.program.reading import ProgramPlace, is_subprogram, program_bytes, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN
 
 _TABLES = ("csv", "npz", "html")

@@ -15,7 +15,7 @@ from shapegcode.cli.options import (
     cluster_of,
     load_machine,
 )
-from shapegcode.io.atomic import write_lines
+from shapegcode.io.data_file import write_lines
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine

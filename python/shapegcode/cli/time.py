@@ -7,7 +7,7 @@ import argparse
 from shapegcode.cli import runner
 from shapegcode.cli.arguments import add_options, override, ratio
 from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
-from shapegcode.io.atomic import write_lines
+from shapegcode.io.data_file import write_lines
 
 # A table of more blocks is built only where it is written.
 _MAX_BLOCKS_SHOWN = 100_000

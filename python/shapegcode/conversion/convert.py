@@ -18,7 +18,6 @@ from shapegcode.conversion.recommendation import gain_um
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.sensitivity import StartedTrials, start_trials
 from shapegcode.conversion.tables import chosen_cuts
-from shapegcode.conversion.translate import require_dialect, with_dialect
 from shapegcode.conversion.whole_text import Written
 from shapegcode.machine import Machine
 from shapegcode.program import Program
@@ -107,7 +106,11 @@ def convert(
         "price.cut_time_percent": max_cut_time_increase_percent,
     }
     program, machine = read(program, machine, stated)
-    require_dialect(program, machine, budget)
+    if is_foreign := machine.emission.dialect != "fanuc":
+        # A thousand lines that a program for FANUC does not need.
+        from shapegcode.conversion.translate import require_dialect, with_dialect
+
+        require_dialect(program, machine, budget)
     choice = CutChoice(chosen_cuts(program, only, leave), shape_all, tolerance_curve)
     pool = ThreadPoolExecutor(max_workers=cores())
     try:
@@ -118,7 +121,8 @@ def convert(
         if machine.shaping.rapids:
             shaped = shape_rapids(plan, shaped)
         shaped = _as_it_was(plan, shaped)
-        return with_dialect(result_of(plan, shaped, judge(plan, shaped)))
+        conversion = result_of(plan, shaped, judge(plan, shaped))
+        return with_dialect(conversion) if is_foreign else conversion
     finally:
         pool.shutdown(cancel_futures=True)
 

@@ -13,7 +13,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad
 from shapegcode.conversion.restart import CutRestarts, RestartPoint
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.machine.dialects import dialect_of
 from shapegcode.model.machine_model import MachineModel

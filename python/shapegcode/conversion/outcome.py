@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from functools import partial
 
-from shapegcode.comparison.compare import compare
-from shapegcode.comparison.result import Allowed
 from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.plan import ConversionPlan, Shaped
 from shapegcode.conversion.recommendation import (
@@ -24,10 +22,11 @@ from shapegcode.conversion.result import ChangeProof, Conversion
 from shapegcode.conversion.sensitivity import Sensitivity, parameter_sensitivity
 from shapegcode.conversion.tables import CutOutcome, outcome_of, tools_of_cuts
 from shapegcode.machine import Machine
-from shapegcode.model.linuxcnc_lines import ini_lines
+from shapegcode.model.machine_model import ini_lines
 from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
+from shapegcode.program.comparison import Allowed, compare
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.figures import (

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TypeVar
 
-from shapegcode.conversion.aims import curve_table
 from shapegcode.conversion.operating import restart_table
+from shapegcode.conversion.plan import curve_table
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled import ScheduledConversion
 from shapegcode.conversion.tables import CutOutcome, before_after_table, sensitivity_table

@@ -1,16 +1,17 @@
-"""The plan of a conversion: its shaper, what each cut is shaped for, and why a cut is left unchanged."""
+"""The plan of a conversion: its shaper; contour tolerance and feed of each cut and their cost; cuts left unchanged."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from concurrent.futures import Executor
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from shapegcode import _core
-from shapegcode.conversion.aims import Aims, CutCurves
 from shapegcode.conversion.budget import Budget, Spending, keepable
 from shapegcode.conversion.recommendation import benefits, most_to_gain_um
 from shapegcode.conversion.sensitivity import StartedTrials
@@ -18,12 +19,387 @@ from shapegcode.conversion.whole_text import TextWriter, Written, why_kept
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
+from shapegcode.results.table import Column, Table
 from shapegcode.shaping.grid import Grid, choose_grid
 from shapegcode.verdict.figures import Placed, RegionVerdict
 from shapegcode.verdict.judge import Judge, RegionFigures, rapid_vibration_um, simulate_unchanged
 
 if TYPE_CHECKING:
     from shapegcode.conversion.rapids.shape import ShapedRapids
+
+_SLOWER = 0.98  # than what would just be slow enough
+_LEAST_FEED_RATIO = 0.5  # of the programmed feed: what runs too fast at that is not the feed's doing
+_HELPED = 0.98  # of what was reached before: a tighter plan that brings no more is taken back
+_PRICE_MARGIN = 0.995  # of the time that a price allows, for a plan
+_LOOSER = 1.05  # least step of a plan that was still too expensive
+_LEVELS = 40  # steps of a bisection
+
+
+@dataclass
+class _Attempt:
+    """The last plan of a cut that left its tolerance."""
+
+    room_um: float
+    reached_um: float  # with it
+    overridden: bool  # it left the tolerance only at another feed override
+    helps: bool = True  # a tighter one
+
+
+class Aims:
+    """Tolerance, feed and price of every cut of one conversion."""
+
+    def __init__(
+        self, program: Program, machine: Machine, reasons: list[str], curve_of: Callable[[int], CutCurve]
+    ) -> None:
+        count = len(program.regions)
+        self._machine, self._curve_of = machine, curve_of
+        self._places = {id(region): index for index, region in enumerate(program.regions)}
+        self.reasons = reasons  # why a cut is left unchanged; empty: it is shaped; changed here
+        self._asked_um = machine.tolerance.contour_um
+        self.room_um = [machine.tolerance.contour_um * MARGIN] * count
+        """Deviation that its feed is planned for."""
+        self.feed_ratio = [1.0] * count
+        """Of the programmed feed, that it is planned with."""
+        self.original_s: dict[int, float] = {}
+        self.emitted_s: dict[int, float] = {}
+        """Of every cut that was shaped once, until the set-points rest."""
+        self._asked_s: dict[int, float] = {}  # likewise, for the tolerance that was asked for
+        self._blocks_s: dict[int, float] = {}  # time of its blocks
+        self._tried: dict[int, _Attempt] = {}
+        self._priced: set[int] = set()  # planned as closely as their price allows, whatever that reaches
+
+    def index(self, figures_place: object) -> int:
+        """Rank of a region of the original."""
+        return self._places[id(figures_place)]
+
+    def note(self, written: Written, figures: Sequence[RegionFigures]) -> None:
+        """Remember how long the cuts take as they were shaped."""
+        for place, region in zip(written.placed, figures, strict=True):
+            index = self.index(place.region)
+            self.original_s[index], self.emitted_s[index] = region.original.duration_s, region.emitted_s
+            self._blocks_s[index] = written.durations_s[index]
+            if index not in self._priced:
+                self._asked_s[index] = region.emitted_s
+
+    def slow_down(self, written: Written, figures: Sequence[RegionFigures]) -> bool:
+        """Give cuts that run faster along the path than the machine allows a lower feed. False if there are none."""
+        limit = 1.0 + self._machine.tolerance.feed_excess_ratio
+        slower = False
+        for place, region in zip(written.placed, figures, strict=True):
+            excess = region.feed_excess
+            index, ratio = self.index(place.region), 0.0 if excess is None else excess.ratio
+            if ratio > limit and self.feed_ratio[index] > _LEAST_FEED_RATIO:
+                self.feed_ratio[index] = max(_LEAST_FEED_RATIO, self.feed_ratio[index] * _SLOWER * limit / ratio)
+                slower = True
+        return slower
+
+    def tighten(self, written: Written, figures: Sequence[RegionFigures], judge: Judge) -> bool:
+        """Plan cuts that left their contour tolerance more tightly, so that they run slower. False if there is none.
+
+        The bound on feed counts corners and arcs one by one; where several fall into one shaper they add up. Where the
+        feed was searched for a target, what it was planned for counts: a looser plan than that would change nothing. A
+        cut that a tighter plan does not help gets its plan back: slower would only be slower. So does one that is
+        within the limit at 100 % feed override, and after one attempt still not at the stated others.
+        """
+        room_um = self.room_um
+        tightened = False
+        for place, region in zip(written.placed, figures, strict=True):
+            index = self.index(place.region)
+            limit, before = self._asked_um, self._tried.get(index)
+            if index in self._priced:
+                continue
+            reached = judge.contour_um(region, turned=False)
+            if overridden := reached <= limit:
+                reached = judge.contour_um(region)
+            if reached <= limit or (before is not None and not before.helps):
+                continue
+            tightened = True
+            if before is not None and (before.overridden or (not overridden and reached > _HELPED * before.reached_um)):
+                room_um[index] = before.room_um
+                before.helps = False
+                continue
+            self._tried[index] = _Attempt(room_um[index], reached, overridden)
+            room_um[index] = min(room_um[index], written.planned_um.get(index, math.inf))
+            room_um[index] *= MARGIN * limit / reached
+        return tightened
+
+    def keep_cut_price(self, written: Written, keepable: Callable[[int], bool], attempts_left: int) -> bool:
+        """Loosen cuts that take longer than the price of one cut; leave unchanged what costs more in any case."""
+        percent = self._machine.price.cut_time_percent
+        changed = False
+        for place in written.placed:
+            index = self.index(place.region)
+            allowed_s = self.original_s[index] * (1.0 + percent / 100.0)
+            if self.emitted_s[index] <= allowed_s:
+                continue
+            found_um = self._tightest_um(index, allowed_s)
+            if found_um is not None and attempts_left > 0:
+                self._loosen(index, found_um if attempts_left > 1 else self._curve_of(index).loosest_um)
+            elif keepable(index):
+                least_s = self.emitted_s[index] if found_um is not None else self._planned_s(index, math.inf)
+                cost = (least_s / self.original_s[index] - 1.0) * 100.0
+                self.reasons[index] = (
+                    f"shaping it takes {cost:+.0f} % time at any tolerance, price {percent:g} % "
+                    "(price.cut_time_percent)"
+                )
+            else:
+                continue
+            changed = True
+        return changed
+
+    def keep_program_price(
+        self, excess_s: float, gains_um: Mapping[int, float], keepable: Callable[[int], bool]
+    ) -> bool:
+        """Loosen cuts, all to one tolerance, until the program is within its price; then leave cuts unchanged."""
+        cuts = [index for index in gains_um if not self.reasons[index]]
+        wanted_s = math.fsum(self.emitted_s[index] for index in cuts) - excess_s
+
+        def total_s(level_um: float) -> float:
+            return math.fsum(self._planned_s(index, max(level_um, self.room_um[index])) for index in cuts)
+
+        if cuts and total_s(math.inf) <= wanted_s:
+            level_um = _bisect(
+                min(self.room_um), max(self._curve_of(index).loosest_um for index in cuts),
+                lambda room_um: total_s(room_um) <= wanted_s,
+            )  # fmt: skip
+            for index in cuts:
+                saved_s = self._planned_s(index, self.room_um[index]) - self._planned_s(index, level_um)
+                if level_um > self.room_um[index] and saved_s > 1e-3 * excess_s:
+                    self._loosen(index, level_um)
+            return True
+        costs = {index: self.emitted_s[index] - self.original_s[index] for index in cuts if keepable(index)}
+        order = sorted((i for i in costs if costs[i] > 0.0), key=lambda index: gains_um[index] / costs[index])
+        for index in order:
+            if excess_s <= 0.0:
+                break
+            excess_s -= costs[index]
+            percent = self._machine.price.program_time_percent
+            self.reasons[index] = (
+                f"gains least for its time ({gains_um[index]:.1f} µm for {costs[index]:.2f} s), and the program may "
+                f"take {percent:g} % more (price.program_time_percent)"
+            )
+        return bool(order)
+
+    @property
+    def priced(self) -> set[int]:
+        """Cuts that are shaped for the tightest tolerance within their price, because the requested one costs more."""
+        return {index for index in self._priced if not self.reasons[index]}
+
+    def shaped_for_um(self, index: int) -> float:
+        """Contour tolerance that a cut is shaped for: the requested one, or the tightest within its price."""
+        return max(self._asked_um, self.room_um[index] / MARGIN) if index in self._priced else self._asked_um
+
+    def time_s(self, index: int, tolerance_um: float) -> float:
+        """What a cut takes at a contour tolerance: as simulated for the one that was asked for, else as planned."""
+        if tolerance_um <= self._asked_um:
+            return self._asked_s[index]
+        return min(self._asked_s[index], self._planned_s(index, tolerance_um * MARGIN))
+
+    def tolerance_curve(self, original_s: float, original_um: float) -> ToleranceCurve | None:
+        """Tolerance against time of the program."""
+        cuts = list(self.emitted_s)
+        if not cuts:
+            return None
+        asked = self._asked_um
+        wanted = [("as asked", asked), *((f"{factor:g} times", factor * asked) for factor in FACTORS[1:])]
+        if original_um > asked:
+            wanted.append(("the original's contour error", original_um))
+        loosest = max(asked, *(self._curve_of(index).planned_um[-1] / MARGIN for index in cuts))
+        wanted.append(("no slowing", loosest))
+        points = [self._point(name, um, cuts, original_s) for name, um in sorted(wanted, key=lambda each: each[1])]
+        tolerances, times = [each.tolerance_um for each in points], [each.time_s for each in points]
+        knee = knee_of(tolerances, times)
+        if knee is not None:
+            points[knee] = replace(points[knee], is_knee=True)
+        return ToleranceCurve(tuple(points), len(cuts))
+
+    def _point(self, name: str, tolerance_um: float, cuts: Sequence[int], original_s: float) -> TolerancePoint:
+        price = self._machine.price
+        times = {index: self.time_s(index, tolerance_um) for index in cuts}
+        dearest = max(times[index] / self.original_s[index] - 1.0 for index in cuts)
+        time_s = original_s + math.fsum(times[index] - self.original_s[index] for index in cuts)
+        increase = (time_s / original_s - 1.0) * 100.0 if original_s > 0.0 else 0.0
+        within = increase <= price.program_time_percent and dearest * 100.0 <= price.cut_time_percent
+        return TolerancePoint(name, tolerance_um, time_s, increase, within)
+
+    def _planned_s(self, index: int, room_um: float) -> float:
+        """What a cut takes where its feed is planned for a deviation, slowing at the cost that it had as simulated."""
+        curve, blocks_s = self._curve_of(index), self._blocks_s[index]
+        least_s, now_s, then_s = (curve.time_s(um) for um in (math.inf, self.room_um[index], room_um))
+        ratio = max(0.0, blocks_s - least_s) / (now_s - least_s) if now_s > least_s else 1.0
+        slowest_s = least_s if now_s > least_s else max(least_s, blocks_s)
+        return self.emitted_s[index] - blocks_s + slowest_s + ratio * (then_s - least_s)
+
+    def _loosen(self, index: int, room_um: float) -> None:
+        self.room_um[index] = max(room_um, _LOOSER * self.room_um[index])  # more, where a plan was too good
+        self._priced.add(index)
+
+    def _tightest_um(self, index: int, allowed_s: float) -> float | None:
+        """Smallest deviation for which a cut can be planned within a time; None: there is none."""
+        if self._planned_s(index, math.inf) > allowed_s:
+            return None
+        now_um = self.room_um[index]
+        return _bisect(
+            now_um, max(self._curve_of(index).loosest_um, now_um),
+            lambda room_um: self._planned_s(index, room_um) <= allowed_s * _PRICE_MARGIN,
+        )  # fmt: skip
+
+
+def _bisect(low: float, high: float, is_enough: Callable[[float], bool]) -> float:
+    """Smallest value that is enough, over the logarithm; the upper end if nothing is."""
+    for _ in range(_LEVELS):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if is_enough(middle) else (middle, high)
+    return high
+
+
+MARGIN = 0.95
+"""Of the tolerance, for which a cut is planned: the rest is for rounding and for what the plan leaves out."""
+
+FACTORS = (1.0, 1.25, 1.5, 2.0)
+"""Ratios to the requested tolerance at which a cut is planned."""
+
+_BETWEEN = (2.8, 4.0, 5.6, 8.0)  # likewise, so that the curve between them is known where a price asks for it
+_FLAT = 0.002  # of the time: a curve that falls by less has no knee
+
+
+@dataclass(frozen=True)
+class CutCurve:
+    """Time of one shaped cut over the deviation that it is planned for."""
+
+    planned_um: tuple[float, ...]  # ascending; the last is what it reaches without slowing
+    times_s: tuple[float, ...]  # of the shaped command at each, descending
+
+    @property
+    def loosest_um(self) -> float:
+        """Beyond this a looser tolerance saves no time."""
+        return self.planned_um[-1] * 1.1
+
+    def time_s(self, planned_um: float) -> float:
+        """Between the planned points on straight lines over the logarithm of the deviation; constant beyond them."""
+        if len(self.planned_um) == 1 or not math.isfinite(planned_um):
+            return self.times_s[-1]
+        return float(np.interp(math.log(planned_um), np.log(self.planned_um), self.times_s))
+
+
+@dataclass(frozen=True)
+class TolerancePoint:
+    """The program at one contour tolerance."""
+
+    name: str  # "as asked", "1.5 times", "the original's contour error", "no slowing"
+    tolerance_um: float  # that the cuts are planned for; without slowing: what they then reach
+    time_s: float  # of the program
+    time_increase_percent: float  # over the original
+    is_within_price: bool  # of the program and of each cut
+    is_knee: bool = False  # a tighter tolerance costs disproportionately more time
+
+
+@dataclass(frozen=True)
+class ToleranceCurve:
+    """Tolerance against time, of the cuts that can be shaped."""
+
+    points: tuple[TolerancePoint, ...]  # from tight to loose
+    cuts: int  # how many cuts it is of
+
+    @property
+    def sentence(self) -> str:
+        """The price of what was asked and of the knee, such as "15 µm costs +102 %, 25 µm +18 %"; empty: no time."""
+        first, knee = self.points[0], next((each for each in self.points if each.is_knee), None)
+        if knee is None:
+            return ""
+        return (
+            f"{first.tolerance_um:.3g} µm costs {first.time_increase_percent:+.3g} % time, "
+            f"{knee.tolerance_um:.3g} µm {knee.time_increase_percent:+.3g} %"
+        )
+
+
+def plan_curve(
+    path: _core.Path, fir: _core.Fir, options: _core.ShapingOptions, asked_um: float, original_um: float
+) -> CutCurve:
+    """Plan a cut at several tolerances, from no slowing to the requested one; each search starts from the last
+    speeds."""
+    wanted = sorted(
+        {*(factor * asked_um for factor in (*FACTORS, *_BETWEEN)), max(original_um, asked_um)}, reverse=True
+    )
+    tried = [math.inf, *(each * 1e-3 for each in wanted)]
+    planned = _core.plan_tolerances(path, fir, options, tried)
+    reached_um = max(planned[0][1] * 1e3, 1e-3)
+    points = {reached_um: planned[0][0]}
+    # What keeps a tolerance without slowing says nothing new; a search may end a little above a looser one's time.
+    slowest = planned[0][0]
+    for tolerance_um, (time_s, _) in zip(wanted, planned[1:], strict=True):
+        if tolerance_um < reached_um:
+            slowest = max(slowest, time_s)
+            points[tolerance_um] = slowest
+    ordered = sorted(points.items())
+    return CutCurve(tuple(um for um, _ in ordered), tuple(time_s for _, time_s in ordered))
+
+
+class CutCurves:
+    """The curve of each cut of a conversion on one grid, planned when it is first used."""
+
+    def __init__(
+        self,
+        writer: TextWriter,
+        program: Program,
+        machine: Machine,
+        originals: Sequence[Future[_core.SimulationFigures]],
+    ) -> None:
+        self._writer, self._program, self._machine, self._originals = writer, program, machine, originals
+        self._known: dict[int, CutCurve] = {}
+
+    def use(self, writer: TextWriter) -> None:
+        """Plan on another grid from now on."""
+        self._writer, self._known = writer, {}
+
+    def note(self, written: Written) -> None:
+        """Remember cuts that the tolerance does not slow: nothing needs to be planned for them."""
+        for index in written.unslowed - self._known.keys():
+            planned_um = max(written.planned_um.get(index, 0.0), 1e-3)
+            self._known[index] = CutCurve((planned_um,), (written.durations_s[index],))
+
+    def of(self, index: int) -> CutCurve:
+        """The curve of a cut."""
+        if index in self._known:
+            return self._known[index]
+        asked_um = self._machine.tolerance.contour_um * MARGIN
+        target = "command" if self._machine.shaping.contour != "response" else "response"
+        original_um = getattr(self._originals[index].result(), target).max_abs_mm * 1e3
+        path = self._program.regions[index].path
+        options = self._writer.options(index)
+        self._known[index] = plan_curve(path, self._writer.grid.fir, options, asked_um, original_um)
+        return self._known[index]
+
+
+def knee_of(tolerances_um: Sequence[float], times_s: Sequence[float]) -> int | None:
+    """Rank of the point that lies furthest below the line from first to last, over logarithms."""
+    if len(times_s) < 3 or times_s[0] <= times_s[-1] * (1.0 + _FLAT):
+        return None
+    x, y = np.log(tolerances_um), np.log(times_s)
+    if x[-1] <= x[0]:
+        return None
+    below = (1.0 - (x - x[0]) / (x[-1] - x[0])) - (y - y[-1]) / (y[0] - y[-1])
+    rank = int(np.argmax(below))
+    return rank if below[rank] > 0.0 else None
+
+
+def curve_table(curve: ToleranceCurve) -> Table:
+    """The curve as a table."""
+    columns = (
+        Column("contour tolerance", value="name", text=True),
+        Column("µm", value="tolerance_um", digits=1),
+        Column("program s", value="time_s", digits=2),
+        Column("increase %", value="time_increase_percent", digits=1),
+        Column("", value=lambda each: ", ".join(_remarks(each)), text=True),
+    )
+    return Table(
+        "tolerance against time", columns, curve.points, caption=f"of the cuts that can be shaped: {curve.cuts}"
+    )
+
+
+def _remarks(point: TolerancePoint) -> list[str]:
+    return (["knee"] if point.is_knee else []) + ([] if point.is_within_price else ["above the price"])
+
 
 _NEAR_PRICE = 0.7  # of the price: from here on the time of the program is worked out in full
 

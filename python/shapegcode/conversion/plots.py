@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from shapegcode.conversion.aims import ToleranceCurve
+from shapegcode.conversion.plan import ToleranceCurve
 from shapegcode.conversion.result import Conversion
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results import plot

@@ -10,12 +10,12 @@ from typing import Literal, get_args
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.comparison.result import ProgramDifference
 from shapegcode.conversion.sensitivity import unknown_axes
 from shapegcode.machine import Machine
 from shapegcode.machine.programs import Tolerance
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, written_increment_mm
+from shapegcode.program.comparison import ProgramDifference
 from shapegcode.program.stamp import no_room
 from shapegcode.verdict.figures import Placed, ProgramFigures, RegionVerdict
 from shapegcode.verdict.judge import Judge, RegionFigures

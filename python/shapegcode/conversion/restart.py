@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.modes import slowest_excited_hz
 from shapegcode.program import Program, between_increments

@@ -6,10 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from shapegcode.comparison.result import KindCount, ProgramDifference
-from shapegcode.conversion.aims import ToleranceCurve, curve_table
 from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.operating import ControlNote, control_table, restart_table
+from shapegcode.conversion.plan import ToleranceCurve, curve_table
 from shapegcode.conversion.recommendation import FilterAdvice, Grade
 from shapegcode.conversion.restart import RestartPoint
 from shapegcode.conversion.sensitivity import Sensitivity
@@ -25,9 +24,9 @@ from shapegcode.conversion.tables import (
 )
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
-from shapegcode.results.figures import CONTOURS, ContourError
+from shapegcode.program.comparison import KindCount, ProgramDifference
 from shapegcode.results.json import Made, exact, hidden, sparse
-from shapegcode.results.result import Pair, Plot, Result, Xyz
+from shapegcode.results.result import CONTOURS, ContourError, Pair, Plot, Result, Xyz
 from shapegcode.results.table import Table
 from shapegcode.verdict.cases import case_table
 from shapegcode.verdict.figures import AppliedLimits, BlockCount, Placed, ProgramFigures, UsedShaper

@@ -19,7 +19,7 @@ from shapegcode.feed.plan import Mover, OrdinaryMotion, Travelled, travel_emitte
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import MARGIN, feed_figures, schedule_survey
 from shapegcode.feed.survey import survey
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program

@@ -20,10 +20,10 @@ from shapegcode.identification.frf_model import mode_columns
 from shapegcode.identification.frf_search import cut
 from shapegcode.identification.lines import measured_lines
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_measurement
 from shapegcode.io.record import UNITS, ReadOptions, Record
+from shapegcode.io.units import FloatArray
 from shapegcode.results.result import Xyz
 
 Measured = Record | FrequencyResponse

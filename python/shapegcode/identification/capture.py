@@ -18,12 +18,12 @@ from shapegcode.identification.model_search import Sought
 from shapegcode.identification.parts import Spectra, moving_parts, transforms
 from shapegcode.identification.result import Identification, as_sweep
 from shapegcode.identification.servo.record import ServoTrace, read_servo_record
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.data_file import open_file
 from shapegcode.io.edge_json import is_edge_json
 from shapegcode.io.frequency_response import FEWEST_LINES, FrequencyResponse
 from shapegcode.io.record import ReadOptions
 from shapegcode.io.servo_log import is_servo_log
+from shapegcode.io.units import FloatArray
 
 _LOWEST_HZ, _OVER_HALF = 4.0, 2.5  # samples in a cycle of the highest line
 _WINDOW_S = 8.0  # of a motion without rests

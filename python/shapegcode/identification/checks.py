@@ -11,8 +11,8 @@ import numpy.typing as npt
 from shapegcode.errors import RecordError
 from shapegcode.identification.decay import find_decay, part_of
 from shapegcode.identification.spectra import decay_spectrum
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.record import UNITS, Quantity, Record
+from shapegcode.io.units import FloatArray
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.spectra import decay_spectrum
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.record import Record
+from shapegcode.io.units import FloatArray
 
 #: The envelope is the RMS over so many periods of the slowest mode, and over a beat of the two closest modes.
 _ENVELOPE_PERIODS = 2.0

@@ -54,8 +54,8 @@ from shapegcode.identification.model_search import (
 )
 from shapegcode.identification.problem import MIN_SWINGS, Starts
 from shapegcode.identification.result import ChartPole, Identification, IdentifiedMode, by_support
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
+from shapegcode.io.units import FloatArray
 
 _BESIDE = 0.25  # lines beside the band asked for that are fitted along, as a share of its ends
 _COMMON = 0.5  # share of the band that several responses must have in common

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from scipy.linalg.lapack import dtrtrs
 
 from shapegcode.errors import ArgumentError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.frequency_response import ComplexArray
+from shapegcode.io.units import FloatArray
 
 POWERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _LARGEST_STEP = 0.3  # of ln omega and ln zeta in one iteration

@@ -11,8 +11,8 @@ import scipy.linalg
 from shapegcode.errors import ArgumentError
 from shapegcode.identification.frf_model import Lines, ModalFit, fit_modes, mode_columns, modelled
 from shapegcode.identification.problem import Starts
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.frequency_response import ComplexArray
+from shapegcode.io.units import FloatArray
 
 _BAND = 1.8  # upper end of a band of poles over its lower end
 _STEP = 1.3  # from band to band

@@ -23,12 +23,12 @@ from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf
 from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Fit, FitProblem, Taps, are_blows, problem_of
 from shapegcode.identification.result import Identification, MassCheck, by_support
 from shapegcode.identification.sweep import find_swept_modes
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.record import Quantity, ReadOptions, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.taps import is_klipper, read_sweep
+from shapegcode.io.units import FloatArray
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine

@@ -24,10 +24,10 @@ from shapegcode.identification.model_search import Sought
 from shapegcode.identification.parts import REST_S, Spectra, moving_parts, transforms
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, as_sweep
 from shapegcode.identification.sweep_program import commanded
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_records
 from shapegcode.io.record import ReadOptions, Record
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 

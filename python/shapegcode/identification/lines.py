@@ -11,8 +11,8 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from shapegcode.identification.checks import Usable
 from shapegcode.identification.frf_model import POWERS, Lines
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
+from shapegcode.io.units import FloatArray
 
 _END = 1e-2  # of the exponential window
 _LEAD = 4  # samples before a pulse

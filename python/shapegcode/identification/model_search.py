@@ -14,7 +14,7 @@ from shapegcode import _core
 from shapegcode.errors import RecordError
 from shapegcode.identification.problem import MIN_SWINGS, Fit, FitProblem, Starts
 from shapegcode.identification.result import ChartPole, Estimate, IdentifiedMode
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 
 # A further mode must explain this share of the response's energy: sensors are not linear beyond .1 % of amplitude.
 _MIN_SHARE = 1e-6

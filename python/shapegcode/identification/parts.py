@@ -10,8 +10,8 @@ import numpy.typing as npt
 from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.signal import czt
 
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.frequency_response import ComplexArray
+from shapegcode.io.units import FloatArray
 
 REST_S = 0.5  # of a command, between two parts
 _EXCITED = 0.2  # of the median of the command's spectrum, in amplitude: lines below are not used

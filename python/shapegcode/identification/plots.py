@@ -12,9 +12,9 @@ import numpy as np
 
 from shapegcode.identification.result import Identification
 from shapegcode.identification.spectra import decay_spectrum, frf, mode_envelopes
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.record import UNITS, Record
+from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
 

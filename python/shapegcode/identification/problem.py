@@ -13,7 +13,7 @@ from shapegcode import _core
 from shapegcode.errors import RecordError
 from shapegcode.identification.checks import MIN_PULSE, Prepared
 from shapegcode.identification.spectra import decay_spectrum
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 
 Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
 Fit = _core.ModalFit | _core.DecayFit

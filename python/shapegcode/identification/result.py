@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from shapegcode.identification.checks import Prepared, RecordUse
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.record import Record
+from shapegcode.io.units import FloatArray
 from shapegcode.results.json import hidden, sparse
 from shapegcode.results.page.model import Light
 from shapegcode.results.result import Plot, Result, Xyz

@@ -9,9 +9,9 @@ import numpy as np
 from scipy import fft, signal
 
 from shapegcode.errors import RecordError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.record import Record
+from shapegcode.io.units import FloatArray
 
 _PEAK_SHARE = 0.01  # A peak counts above this share of the largest (-40 dB)
 _PEAK_RISES = 2.0  # ... and if it stands out of its surroundings by this factor

@@ -15,8 +15,8 @@ from scipy.stats import t as student
 from shapegcode.errors import RecordError
 from shapegcode.identification.model_search import Sought, mode_estimates
 from shapegcode.identification.result import Identification, IdentifiedMode, Sweep, by_support
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.record import Record
+from shapegcode.io.units import FloatArray
 
 SWEPT_HZ = (10.0, 130.0)  # What Klipper sweeps unless told otherwise is 5 to 133 Hz; its ends are no steady sweep
 _BIN_HZ = 0.5  # over which the spectrum is averaged: interference of the harmonics ripples faster

@@ -13,8 +13,8 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.errors import ArgumentError
 from shapegcode.identification.parts import moving_parts
-from shapegcode.io.arrays import FloatArray
-from shapegcode.io.atomic import write_text
+from shapegcode.io.data_file import write_text
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.stream import stream

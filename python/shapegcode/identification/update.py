@@ -22,9 +22,8 @@ from shapegcode.identification.across import LEAST_MOVE, told_moves
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, MachineFile
 from shapegcode.machine import Machine, check_axes
 from shapegcode.settings import edit
-from shapegcode.settings.keys import toml
+from shapegcode.settings.keys import remarks_of, toml
 from shapegcode.settings.load import read_text
-from shapegcode.settings.remarks import remarks_of
 
 
 @dataclass(frozen=True)

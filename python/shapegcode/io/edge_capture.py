@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 
 IntArray = npt.NDArray[np.int64]
 

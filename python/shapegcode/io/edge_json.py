@@ -20,10 +20,10 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.data_file import DataFile
 from shapegcode.io.edge_capture import EdgeAxis, EdgeBlock, EdgeCall, EdgeCapture, EdgeGap, EdgeValue
 from shapegcode.io.run_tracks import RunLog, Signal
+from shapegcode.io.units import FloatArray
 
 _MIN_ROWS = 2
 _MAX_VALUE = 1e12

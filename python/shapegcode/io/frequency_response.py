@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.record import Quantity, ReadOptions, stated_unit
-from shapegcode.io.units import Unit, find_unit
+from shapegcode.io.units import FloatArray, Unit, find_unit
 
 ComplexArray = npt.NDArray[np.complex128]
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.columns import Label, tap_label
 from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import (
@@ -27,6 +26,7 @@ from shapegcode.io.frequency_response import (
 from shapegcode.io.layout import utf8_text
 from shapegcode.io.record import ReadOptions
 from shapegcode.io.table import TextTable
+from shapegcode.io.units import FloatArray
 
 _PARTS = {
     "frequency": "f freq frequency frequenz hz",

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.data_file import open_file, read_file
 from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.frf_files import is_frf_text, is_mat, read_frf_mat, read_frf_text
@@ -18,6 +17,7 @@ from shapegcode.io.sampling import STATED_RATE_TOLERANCE
 from shapegcode.io.servo_tuning import is_xml, read_servo_tuning
 from shapegcode.io.taps import is_klipper, klipper_options, read_csv
 from shapegcode.io.uff import is_frf_uff, read_frf_uff, read_uff
+from shapegcode.io.units import FloatArray
 
 _BYTES_TO_KNOW = 4096
 _WAV = (b"RIFF", b"RIFX", b"RF64")

@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.arrays import FloatArray
-from shapegcode.io.units import Measured, Unit, find_unit, units_of
+from shapegcode.io.units import FloatArray, Measured, Unit, find_unit, units_of
 
 Quantity = Literal["acceleration", "velocity", "displacement"]
 

@@ -11,8 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.run_items import FileNotes, Item, Role
+from shapegcode.io.units import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

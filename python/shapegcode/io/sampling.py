@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 
 #: An instant may lie this share of a period away from where even sampling puts it. Rounding to the digits of the file
 #: moves it by up to half a digit; a missing or a doubled sample moves it, or a neighbour, by half a period or more.

@@ -17,10 +17,10 @@ from xml.parsers import expat
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.data_file import MAX_DEPTH, read_file
 from shapegcode.io.frequency_response import FrequencyResponse, checked_lines
 from shapegcode.io.record import ReadOptions
+from shapegcode.io.units import FloatArray
 
 _MAX_BYTES = 64 << 20
 _SIEMENS = "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ!#$`()*+-/:;=?@[]^_{|}~"

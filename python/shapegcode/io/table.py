@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.columns import Label
 from shapegcode.io.layout import (
     cells_of,
@@ -26,6 +25,7 @@ from shapegcode.io.layout import (
     utf8_text,
     without_thousands,
 )
+from shapegcode.io.units import FloatArray
 
 #: Faults are looked for in pieces of this size.
 _PIECE_BYTES = 4_000_000

@@ -10,12 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.columns import tap_label
 from shapegcode.io.frequency_response import FrequencyResponse, checked_lines, frequency_factor, scale_of
 from shapegcode.io.record import Quantity, ReadOptions, Record, per_volt, stated_unit, volts_of
 from shapegcode.io.sampling import UnevenTimeError, even_period
-from shapegcode.io.units import find_unit, units_of
+from shapegcode.io.units import FloatArray, find_unit, units_of
 
 _TIME_RESPONSE = 1
 _FUNCTIONS = {

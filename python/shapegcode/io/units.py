@@ -1,10 +1,17 @@
-"""The one table of units, and how measuring programs spell them: ``m/s^2``, ``m_s2``, ``mm/min``, ``kgf``."""
+"""The one table of units, how measuring programs spell them: ``m/s^2``, ``m_s2``, ``mm/min``, ``kgf``, arrays."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+"""Of doubles, of any shape."""
+
 
 Measured = Literal["time", "force", "torque", "acceleration", "velocity", "displacement"]
 

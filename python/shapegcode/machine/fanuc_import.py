@@ -16,7 +16,7 @@ from shapegcode.machine.fanuc_motion import take_motion, take_tables
 from shapegcode.machine.fanuc_program import take_program
 from shapegcode.machine.machine import Machine
 from shapegcode.machine.result import DEFAULT_WHY, ParameterImport
-from shapegcode.settings.remarks import inherited
+from shapegcode.settings.keys import inherited
 
 _EXPECTED = (20, 1013, 1401, 1420, 1430, 1604, 1610, 1620, 1622, 1660, 1735, 1783, 1820, 1825, 1826, 3401, 3402, 3410)
 _LONGEST_NAME = 60

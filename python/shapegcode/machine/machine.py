@@ -21,7 +21,21 @@ from shapegcode.machine.axes import Axes
 from shapegcode.machine.controller import Controller, FeedControl, PowerOn, Times
 from shapegcode.machine.dialects import CODE, code_name, dialect_of, fanuc_meaning
 from shapegcode.machine.programs import Emission, Input, Price, Shaping, Tolerance, Verdict
-from shapegcode.settings.keys import KeyValue, Text, TomlTable, key, toml, values_of
+from shapegcode.settings.keys import (
+    DEFAULT,
+    ORIGIN_TEXT,
+    KeyValue,
+    Text,
+    TomlTable,
+    inherited,
+    key,
+    origin_of,
+    remark_of,
+    remarks_in_comments,
+    take_origins,
+    toml,
+    values_of,
+)
 from shapegcode.settings.load import (
     MAX_PROBLEMS,
     KeyProblem,
@@ -31,15 +45,6 @@ from shapegcode.settings.load import (
     read_text,
     validated,
     with_values,
-)
-from shapegcode.settings.remarks import (
-    DEFAULT,
-    ORIGIN_TEXT,
-    inherited,
-    origin_of,
-    remark_of,
-    remarks_in_comments,
-    take_origins,
 )
 
 _ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
@@ -221,7 +226,7 @@ class Machine(TomlTable):
         """The same machine with other provenance of its values.
 
         Args:
-            remarks: by dotted key, in place of those that there are; see `shapegcode.settings.remarks` for their form.
+            remarks: by dotted key, in place of those that there are; see `shapegcode.settings.load` for their form.
 
         Returns:
             A new machine; this one stays as it is.

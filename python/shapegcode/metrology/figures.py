@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from shapegcode import _core
-from shapegcode.io.arrays import FloatArray
-from shapegcode.results.figures import ContourError, Tracks, largest_xyz_um
+from shapegcode.io.units import FloatArray
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Xyz
+from shapegcode.results.result import ContourError, Tracks, Xyz, largest_xyz_um
 
 T = TypeVar("T")
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.metrology.figures import MeasuredSection, WallProfile
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement

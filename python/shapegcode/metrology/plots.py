@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.metrology.figures import WallProfile
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
 from shapegcode.results import plot

@@ -11,9 +11,8 @@ from pathlib import Path
 from shapegcode import _core
 from shapegcode.metrology.figures import FittedCircle, MeasuredArc, MeasuredSection, SidedError, WallDeviation
 from shapegcode.model.programs import SimulatedPrograms
-from shapegcode.results.figures import Tracks, largest_xyz_um
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Plot, Result, Xyz
+from shapegcode.results.result import Plot, Result, Tracks, Xyz, largest_xyz_um
 from shapegcode.results.table import Column, Table
 
 _MAX_SECTIONS = 12

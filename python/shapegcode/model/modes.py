@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import MachineError, Problem
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import AxisMode, Machine
 from shapegcode.machine.axes import Drive
 

@@ -94,7 +94,7 @@ def expand(
         machine: whose controller reads it.
         compensation: "expand": G41/G42 become plain moves of the tool's centre; "keep": they stay as they stand.
         program_number: which program of a file that holds several: its O number, or an address as in
-            `shapegcode.program.several`; None: the first.
+            `shapegcode.program.reading`; None: the first.
 
     Returns:
         The plain program, and where each of its lines comes from.

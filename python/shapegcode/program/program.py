@@ -14,10 +14,16 @@ from shapegcode import _core
 from shapegcode.errors import ProgramError, located_error
 from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.computer import require_memory_for_lines
-from shapegcode.program.foreign.plain import ForeignProgram
-from shapegcode.program.foreign.read import CONTROLS, LOOKED_AT_BYTES, doubtful_word, foreign_program
-from shapegcode.program.reading import Reading, given_text, signs_of_turning
-from shapegcode.program.several import ProgramPlace, called_from, index_of, programs_of
+from shapegcode.program.foreign.read import CONTROLS, LOOKED_AT_BYTES, ForeignProgram, doubtful_word, foreign_program
+from shapegcode.program.reading import (
+    ProgramPlace,
+    Reading,
+    called_from,
+    given_text,
+    index_of,
+    programs_of,
+    signs_of_turning,
+)
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict
 
 if TYPE_CHECKING:
@@ -67,7 +73,7 @@ class Program:
             path: the file; a string of several lines is the program's text itself.
             machine: whose controller reads it, its file or its built-in name.
             program_number: which program of a file that holds several: its O number, or an address as in
-                `shapegcode.program.several`; None: the first.
+                `shapegcode.program.reading`; None: the first.
             expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
             collect_alarms: go on behind an alarm and keep all in `core.alarms`.
 
@@ -117,7 +123,7 @@ class Program:
             emitted: the text was written by shapegcode: its arcs are FANUC's, whatever the original's were.
             probe_lines: ascending line numbers behind which the modal state is kept.
             program_number: which program of a text that holds several: its O number, or an address as in
-                `shapegcode.program.several`; None: the first.
+                `shapegcode.program.reading`; None: the first.
             expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
             collect_alarms: go on behind an alarm and keep all in `core.alarms`.
             folder: where programs that it calls are looked for; None: nowhere but in the text and the machine's

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
 from shapegcode.results.motion_plots import (
     AXIS_NAMES,

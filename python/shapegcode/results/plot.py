@@ -13,7 +13,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.io.atomic import write_bytes
+from shapegcode.io.data_file import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,8 +22,7 @@ import numpy as np
 from shapegcode._core import ArgumentError
 from shapegcode.io.data_file import DataFile
 from shapegcode.results.json import FORMAT, Made
-from shapegcode.results.outcome import NotKeptError, Outcome
-from shapegcode.results.result import Result
+from shapegcode.results.result import NotKeptError, Outcome, Result
 
 
 class NotKept:

@@ -9,8 +9,18 @@ from typing import Any, get_origin
 from pydantic.fields import FieldInfo
 
 from shapegcode.settings.edit import origin_lines
-from shapegcode.settings.keys import InlineTable, TomlTable, facts, item_type, key_info, table_type, toml  # fmt: skip
-from shapegcode.settings.remarks import ORIGIN, ORIGIN_TEXT, origin_of
+from shapegcode.settings.keys import (  # fmt: skip
+    ORIGIN,
+    ORIGIN_TEXT,
+    InlineTable,
+    TomlTable,
+    facts,
+    item_type,
+    key_info,
+    origin_of,
+    table_type,
+    toml,
+)
 
 _LINE_WIDTH = 110
 

@@ -15,7 +15,7 @@ import tomlkit
 from tomlkit.items import AoT, Comment, InlineTable, Item, Key, Table, Whitespace
 
 from shapegcode.errors import ArgumentError
-from shapegcode.settings.remarks import ORIGIN, ORIGIN_TEXT, ORIGIN_WORDS, lines_of, origin_of, remarks_of, take_origins
+from shapegcode.settings.keys import ORIGIN, ORIGIN_TEXT, ORIGIN_WORDS, lines_of, origin_of, remarks_of, take_origins
 
 Entry = tuple[Key | None, Item]
 

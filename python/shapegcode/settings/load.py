@@ -14,8 +14,7 @@ from pydantic.fields import FieldInfo
 
 from shapegcode.errors import FileError, Problem
 from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file, toml_tables
-from shapegcode.settings.keys import InlineTable, TomlTable, facts, table_type, toml, toml_key
-from shapegcode.settings.remarks import lines_of
+from shapegcode.settings.keys import InlineTable, TomlTable, facts, lines_of, table_type, toml, toml_key
 
 MAX_PROBLEMS = 100
 _LONGEST_NAME = 200  # that is compared with known ones

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode._core import DesignError
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import ModeBand
 
 # Tolerance and presolve: now and then the solver gives up, or goes round in circles, at the first of them.

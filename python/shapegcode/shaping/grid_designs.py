@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shapegcode._core import DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import check_modes_and_times, mode_names, ms, whole_periods
 from shapegcode.shaping.cutting_planes import LinearProgram, non_negative_least_squares
 

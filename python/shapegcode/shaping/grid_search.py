@@ -25,7 +25,7 @@ from shapegcode._core import (
     sensitivity_curve,
     worst_residual,
 )
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import check_times, ms, whole_periods
 from shapegcode.shaping.cutting_planes import TapProgram
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, exact_conditions, halved, refined

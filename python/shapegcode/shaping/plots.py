@@ -10,7 +10,7 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode._core import ArgumentError, MinimalBranches, Mode, Shaper, minimal_branches
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
 from shapegcode.shaping.bands import Design, ModeBand, mode_band

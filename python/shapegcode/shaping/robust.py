@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import (
     VIBRATION_LIMIT,
     ModeBand,

@@ -26,7 +26,7 @@ from shapegcode._core import (
     negative_zv,
     repeated_zv,
 )
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import DesignOptions, ModeBand, mode_names, ms, on_grid
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, halved
 from shapegcode.shaping.grid_search import Conditions, ResidualLimit, Zero, shortest_on_grid

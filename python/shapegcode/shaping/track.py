@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, Shaper, VaryingFir
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import check_times, whole_periods
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, Vertices, refined, shortest_non_negative
 

@@ -14,7 +14,7 @@ from typing import BinaryIO
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.io.atomic import named_errors, replaced_file
+from shapegcode.io.data_file import named_errors, replaced_file
 from shapegcode.model.stream import KINDS, Chunk
 
 _COPY_BYTES = 1 << 20

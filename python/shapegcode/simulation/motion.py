@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.model.stream import Chunk
 from shapegcode.results.result import Xyz
 from shapegcode.simulation.result import Motion

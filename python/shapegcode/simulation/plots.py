@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
 from shapegcode.results.path_plots import RECORD_SAMPLES, SimulatedRegion, motion_pictures
 from shapegcode.results.result import Plot

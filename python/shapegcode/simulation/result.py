@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.model.programs import SimulatedPrograms
-from shapegcode.results.figures import CONTOURS, ContourError, Tracks
 from shapegcode.results.json import hidden, sparse
-from shapegcode.results.result import Plot, Result, Xyz
+from shapegcode.results.result import CONTOURS, ContourError, Plot, Result, Tracks, Xyz
 from shapegcode.results.table import Column, Table, xyz_columns
 from shapegcode.verdict.cases import case_table
 from shapegcode.verdict.figures import ProgramFigures

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from shapegcode.errors import ArgumentError, DesignError, MachineError
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.program import Program

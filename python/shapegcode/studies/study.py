@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from shapegcode.batching.process import Cluster, cluster_executor
 from shapegcode.errors import ArgumentError, DesignError, MachineError
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.program.computer import cores

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, MachineError, Problem
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.settings.keys import toml
 from shapegcode.settings.load import missing_row

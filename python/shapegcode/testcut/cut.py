@@ -17,8 +17,8 @@ from scipy.ndimage import grey_dilation
 from shapegcode import _core
 from shapegcode.cutting.tool import COEFFICIENTS
 from shapegcode.errors import ArgumentError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.data_file import DataFile
+from shapegcode.io.units import FloatArray
 
 _FORMAT = "shapegcode test cut 1"
 _Kind = Literal["taper", "corner", "interval"]

@@ -17,8 +17,8 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.cutting.tool import Tool
 from shapegcode.errors import ArgumentError
-from shapegcode.io.arrays import FloatArray
-from shapegcode.io.atomic import write_text
+from shapegcode.io.data_file import write_text
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program.stamp import OVERRIDE
 from shapegcode.results.json import to_text

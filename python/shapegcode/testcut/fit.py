@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy.special import lambertw
 
 from shapegcode.errors import ArgumentError
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.testcut.cut import CuttingLaw, IntervalDetails, MeasuringPass, TestCut, read_test_cut
 from shapegcode.testcut.forces import (
     CoefficientFit,

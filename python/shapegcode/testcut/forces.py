@@ -15,7 +15,7 @@ from scipy.optimize import nnls
 from shapegcode import _core
 from shapegcode.cutting.tool import COEFFICIENTS
 from shapegcode.errors import ArgumentError
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.testcut.cut import CuttingLaw, CutTool, MeasuringPass, TestCut
 
 

@@ -15,12 +15,12 @@ from typing import Literal
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
-from shapegcode.machine.planners import PLANNER_NAMES
+from shapegcode.machine.controller import PLANNER_NAMES
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import Offset
-from shapegcode.results.figures import Deviation
+from shapegcode.results.result import Deviation
 from shapegcode.results.table import NO_BREAK, Column, Table
 from shapegcode.verdict.figures import CaseVerdict
 

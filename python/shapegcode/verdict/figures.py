@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 
 from shapegcode import _core
 from shapegcode.program import Program
-from shapegcode.results.figures import ContourError, Tracks
 from shapegcode.results.json import sparse
-from shapegcode.results.result import Pair, Xyz
+from shapegcode.results.result import ContourError, Pair, Tracks, Xyz
 
 
 @dataclass(frozen=True)

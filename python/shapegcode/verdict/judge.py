@@ -14,13 +14,12 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.errors import RoundTripError
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm, written_increment_mm
 from shapegcode.program.computer import cores
-from shapegcode.results.figures import ContourError, Deviation, Tracks, largest_xyz_um
-from shapegcode.results.result import Pair, Xyz
+from shapegcode.results.result import ContourError, Deviation, Pair, Tracks, Xyz, largest_xyz_um
 from shapegcode.verdict.cases import (
     ALL_MODES,
     Case,

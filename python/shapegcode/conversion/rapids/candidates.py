@@ -11,7 +11,7 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.conversion.whole_text import why_off_grid
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import MM_PER_INCH, Program
 

@@ -13,7 +13,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.conversion.rapids.candidates import Gap, Rapid
 from shapegcode.conversion.write import EmittedRegion
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import NO_OFFSET
 from shapegcode.verdict.figures import RegionVerdict

@@ -24,7 +24,7 @@ from shapegcode.identification.servo.models import (
 )
 from shapegcode.identification.servo.record import ServoRecord, ServoTrace, read_servo_record
 from shapegcode.identification.servo.result import ServoAxis, ServoCurves, ServoEstimate, ServoFit, ServoModel
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 
 _STILL_TRAVEL = 1e-3  # mm or degrees

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.identification.servo.record import ServoTrace
 from shapegcode.identification.servo.result import ServoEstimate
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 
 Masks = Sequence[npt.NDArray[np.bool_]]  # of each stretch: which samples count
 SETTLE_S = 0.1

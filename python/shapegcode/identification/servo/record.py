@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from shapegcode.errors import ArgumentError, RecordError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.data_file import open_file
 from shapegcode.io.edge_capture import EdgeCapture
 from shapegcode.io.edge_json import is_edge_json, read_edge_json
 from shapegcode.io.servo_log import parse_units, read_log
+from shapegcode.io.units import FloatArray
 
 _GAP = 1.5  # of the usual step
 _FEWEST = 100

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from shapegcode.errors import ArgumentError
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result

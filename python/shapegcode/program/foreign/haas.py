@@ -12,7 +12,7 @@ from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode.program.foreign.plain import ForeignProgram, ForeignSettings, Note, number_text, refusal
+from shapegcode.program.foreign.read import ForeignProgram, ForeignSettings, Note, number_text, refusal
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine

@@ -20,7 +20,7 @@ from shapegcode.program.foreign.linuxcnc_expression import Block, Scanner, evalu
 from shapegcode.program.foreign.linuxcnc_parameters import MAX_ARGUMENTS, Frame, ParameterTable
 from shapegcode.program.foreign.linuxcnc_source import KEYWORDS, OLine, SourceFile, subroutine_file
 from shapegcode.program.foreign.linuxcnc_state import Modes, State, find_tool_table, normal_axis
-from shapegcode.program.foreign.plain import (
+from shapegcode.program.foreign.read import (
     ForeignProgram,
     ForeignSettings,
     PlainProgram,

@@ -14,7 +14,7 @@ from shapegcode.program.foreign.linuxcnc_codes import SYSTEMS, by_group_of, refu
 from shapegcode.program.foreign.linuxcnc_cycles import drill
 from shapegcode.program.foreign.linuxcnc_offsets import Offsets
 from shapegcode.program.foreign.linuxcnc_state import AXES, CYCLES, Modes, State, given_axes, plane_axes, system_words
-from shapegcode.program.foreign.plain import PlainProgram, number_text, words_of
+from shapegcode.program.foreign.read import PlainProgram, number_text, words_of
 
 _BEFORE_MOTION = (6, 19, 3, 4, 5, 7, 8, 9, 48, 49)
 _STOPS = (0, 1, 2, 30, 60)

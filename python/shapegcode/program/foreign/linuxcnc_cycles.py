@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from shapegcode.program.foreign.linuxcnc_state import AXES, CycleWords, State, normal_axis, plane_axes
-from shapegcode.program.foreign.plain import number_text, words_of
+from shapegcode.program.foreign.read import number_text, words_of
 
 PECK_CLEARANCE_MM = 0.254
 _NEEDS_DWELL = {820: "G82", 860: "G86", 890: "G89"}

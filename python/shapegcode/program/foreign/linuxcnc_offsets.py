@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from shapegcode.program.foreign.linuxcnc_state import AXES, State, given_axes, system_words
-from shapegcode.program.foreign.plain import number_text, words_of
+from shapegcode.program.foreign.read import number_text, words_of
 
 _DYNAMIC_NUMBER = 999  # H number under which the plain program holds the length of G43.1
 

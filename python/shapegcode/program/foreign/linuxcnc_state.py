@@ -10,7 +10,7 @@ from pathlib import Path
 from shapegcode.io.data_file import read_file
 from shapegcode.io.ini import UNITS_MM, ini_entries
 from shapegcode.io.units import MM_PER_INCH
-from shapegcode.program.foreign.plain import refusal
+from shapegcode.program.foreign.read import refusal
 
 AXES = "xyz"
 _MAX_BYTES = 10_000_000

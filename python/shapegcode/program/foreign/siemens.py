@@ -15,7 +15,7 @@ from pathlib import Path
 
 from shapegcode.errors import ProgramError, located_error
 from shapegcode.machine import Machine
-from shapegcode.program.foreign.plain import (
+from shapegcode.program.foreign.read import (
     ForeignProgram,
     ForeignSettings,
     PlainProgram,

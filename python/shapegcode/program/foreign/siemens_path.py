@@ -16,7 +16,7 @@ import numpy as np
 from shapegcode.machine import Machine
 from shapegcode.program.foreign import arcs
 from shapegcode.program.foreign.arcs import PLANES, Element, Vector, flat
-from shapegcode.program.foreign.plain import PlainProgram, number_text
+from shapegcode.program.foreign.read import PlainProgram, number_text
 from shapegcode.program.foreign.siemens_expressions import AtColumn, WordError
 
 _FLIN_ERROR_MM = 0.0005  # of blocks of constant feed in the place of one whose feed is linear

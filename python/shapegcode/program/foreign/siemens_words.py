@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from shapegcode.io.units import MM_PER_INCH
-from shapegcode.program.foreign.plain import number_text, words_of
+from shapegcode.program.foreign.read import number_text, words_of
 from shapegcode.program.foreign.siemens_blocks import SiemensBlock, Word
 from shapegcode.program.foreign.siemens_expressions import Scope, Value, WordError, number, whole
 from shapegcode.program.foreign.siemens_path import Given, SiemensFrame, SiemensModes, SiemensPath, offset_word

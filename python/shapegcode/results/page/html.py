@@ -15,7 +15,7 @@ from importlib import metadata, resources
 from pathlib import Path
 
 from shapegcode.errors import ArgumentError
-from shapegcode.io.atomic import write_bytes, write_text
+from shapegcode.io.data_file import write_bytes, write_text
 from shapegcode.results.json import this_version
 from shapegcode.results.page.markup import json_script, light_sign, prose, section_of
 from shapegcode.results.page.model import Page, Script

@@ -13,7 +13,7 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.timing.calibration import open_times

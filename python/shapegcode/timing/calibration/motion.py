@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import fanuc_model
 from shapegcode.timing.calibration.observed import IntArray, ObservedRun, seen_arc_acceleration

@@ -16,9 +16,8 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import RecordError
-from shapegcode.io.arrays import FloatArray
 from shapegcode.io.run_tracks import RunLog, Signal
-from shapegcode.io.units import MM_PER_INCH, find_unit
+from shapegcode.io.units import MM_PER_INCH, FloatArray, find_unit
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import fanuc_model
 from shapegcode.program import Program

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapegcode.io.arrays import FloatArray
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.settings.keys import toml
 from shapegcode.timing.calibration.motion import FunctionFit, MotionFit, misfit, section_residuals, sections_of

@@ -1,1 +1,0 @@
-"""Two programs side by side: what one does and the other does not."""
