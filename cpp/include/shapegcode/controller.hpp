@@ -217,7 +217,7 @@ class MotionController {
 
   /// The next segment, from the planning thread: never blocks, does not allocate. `following_end`: where the following
   /// axes are at its end; they follow in proportion to the path length. A segment of no length in X, Y and Z is one of
-  /// the following axes alone if they move: its length is then the largest of their ways, its feed that axis'.
+  /// the following axes alone if they move: its length is then the largest of their distances, its feed that axis'.
   PushResult push(const Segment& segment, std::span<const double> following_end = {},
                   const SegmentRules& rules = {}) noexcept;
 

@@ -1,7 +1,7 @@
 #ifndef SHAPEGCODE_SHAPEGCODE_H
 #define SHAPEGCODE_SHAPEGCODE_H
 
-// What is C++'s own way does not hold here.  NOLINTBEGIN(modernize-*)
+// A header for C: idioms of C++ do not hold here.  NOLINTBEGIN(modernize-*)
 #include <stddef.h>
 #include <stdint.h>
 
