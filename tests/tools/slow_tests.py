@@ -3,7 +3,7 @@
     .venv/bin/python -m pytest -n 2 --dist worksteal -m 'not slow' --durations=0 > durations.log
     python3 tests/tools/slow_tests.py durations.log [SECONDS]
 
-Adds those that took so long or longer (2 s) to tests/python/slow_tests.txt. tests/python/conftest.py gives what stands
+Adds those that took so long or longer (1 s) to tests/python/slow_tests.txt. tests/python/conftest.py gives what stands
 there the mark `slow`.
 """
 
@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 LIST = Path(__file__).resolve().parents[1] / "python" / "slow_tests.txt"
-HEAD = "# Marked `slow`, because they took 2 s or more: written by tests/tools/slow_tests.py.\n"
+HEAD = "# Marked `slow`, because they took a second or more: written by tests/tools/slow_tests.py.\n"
 
 
 def read_list() -> set[str]:
@@ -25,7 +25,7 @@ def read_list() -> set[str]:
 
 def main() -> None:
     """Add what a log says."""
-    least_s = float(sys.argv[2]) if len(sys.argv) > 2 else 2.0
+    least_s = float(sys.argv[2]) if len(sys.argv) > 2 else 1.0
     found = read_list()
     for line in Path(sys.argv[1]).read_text().splitlines():
         if (one := re.fullmatch(r"(\d+\.\d+)s call +tests/python/(\S.*?) *", line)) and float(one[1]) >= least_s:
