@@ -306,7 +306,8 @@ def main() -> None:
         missed = [" ".join(cells) for cells, within in rows if not within]
         for title, found in machines.items():
             held = [f"{log_name(run)} for {run.held_s:.1f} s" for run in found.runs if run.use == "test" and run.held_s]
-            print(f"\n{title}: held and not counted: {', '.join(held) or 'none'}; not told: {len(found.not_told)}")
+            unknown = len(found.undetermined)
+            print(f"\n{title}: held and not counted: {', '.join(held) or 'none'}; not determined: {unknown}")
             judge_all_runs(title, found)
         if args.plots:
             print(*plot.save_all({"evidence-nist": partial(plot_evidence, machines)}, args.plots))

@@ -62,7 +62,7 @@ def gain(entry: dict[str, Any]) -> float:
 
 def given_up(judged: Judged) -> set[int]:
     """First lines of the regions given up."""
-    return {entry["lines"][0] for entry in judged.conversion.to_dict()["budget"]["given_up"]}
+    return {entry["lines"][0] for entry in judged.conversion.to_dict()["budget"]["left_unchanged"]}
 
 
 def rates(judged: Judged) -> tuple[float, float]:
@@ -127,15 +127,17 @@ def test_what_is_given_up_is_said() -> None:
     assert budget["before"]["bytes"] == len(free().conversion.text)
     assert budget["after"]["bytes"] == report["bytes_emitted"] <= limit
     assert budget["block_period_s"] == report["block_period_s"] == free().conversion.to_dict()["block_period_s"]
-    assert len(budget["given_up"]) + len(report["regions"]) == len(FEEDS)
-    for entry in budget["given_up"]:
+    assert len(budget["left_unchanged"]) + len(report["regions"]) == len(FEEDS)
+    for entry in budget["left_unchanged"]:
         whole = original.pop(tuple(entry["lines"]))
         assert entry["residual_um"] == whole["residual_vibration_um"]["original"]
         assert entry["bytes"] == emitted_size(free(), whole)
         assert str(limit) in entry["reason"]
     (sentence,) = (warning for warning in report["warnings"] if "given up for the budget" in warning)
-    first, last = budget["given_up"][0]["lines"]
-    assert f"{len(budget['given_up'])} of {len(FEEDS)} cuts are left unchanged (lines {first} to {last}" in sentence
+    first, last = budget["left_unchanged"][0]["lines"]
+    assert (
+        f"{len(budget['left_unchanged'])} of {len(FEEDS)} cuts are left unchanged (lines {first} to {last}" in sentence
+    )
 
 
 def test_everything_is_given_up_before_nothing_fits() -> None:
@@ -260,7 +262,7 @@ def test_an_argument_fixes_the_block_period_too() -> None:
     assert judged.conversion.to_dict()["block_period_s"] == 0.005
     assert len(given_up(judged)) == len(FEEDS)
     assert judged.conversion.text.decode() == PART
-    assert "limit 300" in judged.conversion.to_dict()["budget"]["given_up"][0]["reason"]
+    assert "limit 300" in judged.conversion.to_dict()["budget"]["left_unchanged"][0]["reason"]
 
 
 def test_what_misses_its_tolerance_only_for_the_longer_period_is_kept() -> None:
@@ -271,7 +273,7 @@ def test_what_misses_its_tolerance_only_for_the_longer_period_is_kept() -> None:
     assert convert(text, machine_with(keys)).conversion.ok
     judged = budgeted(text, keys, max_blocks_per_second=25)
     assert judged.conversion.shaped_cuts_within
-    (entry,) = judged.conversion.to_dict()["budget"]["given_up"]
+    (entry,) = judged.conversion.to_dict()["budget"]["left_unchanged"]
     assert entry["lines"] == [8, 15]
     period_ms = judged.conversion.to_dict()["block_period_s"] * 1e3
     assert entry["reason"].endswith(f"limit 1.2 um, at a block period of {period_ms:g} ms")
@@ -289,7 +291,7 @@ def test_what_runs_too_fast_only_for_the_longer_period_is_kept() -> None:
     assert convert(text, machine_with(keys)).conversion.ok
     judged = budgeted(text, keys, max_blocks_per_second=60)
     assert judged.conversion.shaped_cuts_within
-    (entry,) = judged.conversion.to_dict()["budget"]["given_up"]
+    (entry,) = judged.conversion.to_dict()["budget"]["left_unchanged"]
     assert entry["lines"] == [5, 5]
     assert entry["reason"].startswith("runs in ")
     assert "too slow a feed" in entry["reason"]
@@ -340,7 +342,7 @@ def test_a_budget_that_is_not_reached_changes_nothing() -> None:
     report = dict(judged.conversion.to_dict())
     budget = report.pop("budget")
     assert report == free().conversion.to_dict()
-    assert budget["given_up"] == []
+    assert budget["left_unchanged"] == []
     assert budget["before"] == budget["after"]
     assert "budget" not in free().conversion.to_dict()
 
@@ -367,7 +369,7 @@ def test_command(tmp_path: Path) -> None:
     limits: dict[str, Any] = {"max_bytes": 2048, "baud": 38400.0, "max_blocks_per_second": None}
     budget = json.loads((tmp_path / "report.json").read_text())["budget"]
     assert budget["limits"] == limits
-    assert budget["given_up"]
+    assert budget["left_unchanged"]
     assert "given up for the budget" in done.stdout
     assert (
         text

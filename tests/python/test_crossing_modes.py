@@ -139,7 +139,7 @@ def test_what_another_axis_excites_is_ranked_by_what_it_changes() -> None:
         {"axes.y.modes.1.excited_by": {"y": 1.0, "x": 0.5}, "axes.y.modes.1.moves": {"x": 1.0}, "axes.z.rigid": True}
     )
     program = sg.Program.from_text("%\nO1\nG21 G90 G17\nG0 X0 Y0 Z0\nG1 X40 F6000.\nX0\nM30\n%\n", machine)
-    ranked = {row.key for row in sg.convert(program, machine, shape_all=True).rests_on}
+    ranked = {row.key for row in sg.convert(program, machine, shape_all=True).parameter_sensitivity}
     assert {f"axes.{letter}.modes.1.damping_ratio" for letter in "xy"} <= ranked
 
 

@@ -61,7 +61,7 @@ def test_what_the_runs_tell_is_what_the_control_does(learned: tuple[sg.CycleTime
         "tool change": control.tool_change,
     }
     for (_, meaning), number in numbers.items():
-        if meaning in truth and number.told:
+        if meaning in truth and number.is_determined:
             assert number.low <= truth[meaning] <= number.high, number
     assert machine.axes.x.rapid_mm_per_min == pytest.approx(control.rapid * 60.0, rel=0.02)
     assert machine.times.tool_change_s == pytest.approx(control.tool_change, abs=0.6)
@@ -197,11 +197,11 @@ def test_the_kind_of_look_ahead_is_chosen_by_runs_left_out(tmp_path: Path) -> No
     file = shop(tmp_path, control, [1, 2], [])
     kinds = ["speed difference", "after interpolation"]
     clock = sg.calibrate_cycle_time(file, sg.Machine.load("vx500"), families=kinds)
-    scores = {family.name: family.left_out_s for family in clock.families}
+    scores = {family.name: family.cross_validated_s for family in clock.families}
     assert set(scores) == set(kinds)
     assert None not in scores.values()
     assert clock.family == "speed difference"
-    assert all(run.left_out_s is not None for run in clock.runs)
+    assert all(run.cross_validated_s is not None for run in clock.runs)
 
 
 def test_unknown_kinds_and_nothing_to_fit_are_refused(tmp_path: Path) -> None:

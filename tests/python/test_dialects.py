@@ -551,7 +551,7 @@ def test_budget(dialect: str) -> None:
         assert less is not None and int(less[1]) > limit > int(less[2])
         cut = converted(dialect, budget=sg.Budget(max_bytes=int(less[2])))
     assert len(cut.text) == cut.bytes_emitted <= limit
-    assert cut.budget is not None and cut.budget.given_up
+    assert cut.budget is not None and cut.budget.left_unchanged
     if dialect in ("siemens", "isg"):
         with pytest.raises(sg.ArgumentError, match="computed for FANUC's blocks"):
             converted(dialect, budget=sg.Budget(max_blocks_per_second=100.0))

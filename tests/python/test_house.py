@@ -555,3 +555,32 @@ def test_public_names_say_what_they_take_what_they_give_and_what_they_raise() ->
         if name.partition(".")[0] in names and (lacks := silent_on(function))
     ]
     assert offenders == []
+
+
+ENTERED = """
+import sys
+
+entered, (package, program, output) = set(), sys.argv[1:]
+
+def note(frame, event, argument):
+    if frame.f_code.co_filename.startswith(package):
+        entered.add(frame.f_code.co_filename)
+
+import threading
+threading.settrace(note)
+sys.settrace(note)
+from shapegcode.cli import main
+main(["convert", program, "-m", "vx500", "-o", output, "-q"])
+sys.settrace(None)
+print(len(entered), file=sys.stderr)
+"""
+"""Counts the files of the package in which a line is executed by a conversion."""
+
+
+def test_four_moves_are_converted_by_few_files(tmp_path: Path) -> None:
+    program = tmp_path / "four.nc"
+    program.write_text("%\nO1\nG21 G90 G17 G54\nG00 X0 Y0 Z-1.\nG01 X40. F3000.\nY30.\nX0.\nY0.\nM30\n%\n")
+    words = [sys.executable, "-c", ENTERED, str(PACKAGE), str(program), str(tmp_path / "out.nc")]
+    run = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert int(run.stderr.split()[-1]) <= 60

@@ -450,7 +450,7 @@ def test_verdict_rests_on_a_filter_that_nobody_measured() -> None:
     """1622 unknown: 24 ms of it would take the circle inwards, by what a second simulation finds."""
     machine = unmeasured_machine({}, {"controller.shaped_time_constant_s": "assumed"})
     judged = convert(CIRCLE, machine)
-    rows = [row for row in judged.conversion.rests_on if row.key == "controller.shaped_time_constant_s"]
+    rows = [row for row in judged.conversion.parameter_sensitivity if row.key == "controller.shaped_time_constant_s"]
     (row,) = rows
     assert (row.origin, row.value, row.moved) == ("assumed", "0.0 s", "0.024 s")
     assert row.figure == "contour error of the response"
@@ -466,7 +466,7 @@ def test_verdict_rests_on_a_mode_of_another_machine() -> None:
     for stated, percent in ((None, 5.0), (2.0, 2.0)):
         keys = {"axes.x.modes.1.frequency_uncertainty_percent": stated, "verdict.mode_uncertainty": False}
         judged = convert(PART, unmeasured_machine(keys, inherited))
-        (row,) = judged.conversion.rests_on
+        (row,) = judged.conversion.parameter_sensitivity
         assert (row.key, row.origin, row.moved[1:]) == (*list(inherited), "inherited", f"{percent:g} %")
         x, y, z = judged.modes
         left = []
@@ -481,7 +481,7 @@ def test_verdict_rests_on_a_mode_of_another_machine() -> None:
 
 def test_what_is_measured_is_nothing_to_rest_on() -> None:
     judged = convert(PART, unmeasured_machine({}, {}))
-    assert (judged.conversion.rests_on, judged.conversion.unmeasured_tried) == ((), 0)
+    assert (judged.conversion.parameter_sensitivity, judged.conversion.unmeasured_tried) == ((), 0)
     assert not any("rests on" in str(table.title) for table in judged.conversion.tables())
 
 
@@ -491,7 +491,7 @@ def test_verdict_ends_with_what_it_rests_on(started: Path, tmp_path: Path, capsy
     out = str(tmp_path / "out.nc")
     main(["convert", str(part), "-m", str(started), "-o", out, "--shape-all", "--json", str(report)])
     shown = capsys.readouterr().out
-    rows = json.loads(report.read_text(encoding="utf-8"))["rests_on"]
+    rows = json.loads(report.read_text(encoding="utf-8"))["parameter_sensitivity"]
     keys = [row["key"] for row in rows]
     assert "axes.x.modes.1.frequency_hz" in keys
     assert "axes.z.modes" not in keys  # Z stands still
@@ -505,9 +505,9 @@ def test_verdict_ends_with_what_it_rests_on(started: Path, tmp_path: Path, capsy
 
 def test_an_axis_of_which_nobody_knows_is_tried_with_a_mode() -> None:
     keys = {"axes.y.modes": [], "axes.z.modes": []}
-    (row,) = convert(PART, unmeasured_machine(keys, {})).conversion.rests_on
+    (row,) = convert(PART, unmeasured_machine(keys, {})).conversion.parameter_sensitivity
     assert (row.key, row.value, row.moved) == ("axes.y.modes", "none", "a mode of 40 Hz")
-    assert convert(PART, unmeasured_machine(keys | {"axes.y.rigid": True}, {})).conversion.rests_on == ()
+    assert convert(PART, unmeasured_machine(keys | {"axes.y.rigid": True}, {})).conversion.parameter_sensitivity == ()
 
 
 def test_an_axis_that_moves_elsewhere_is_named_too() -> None:
@@ -515,7 +515,7 @@ def test_an_axis_that_moves_elsewhere_is_named_too() -> None:
     text = PART.replace("M30", "G0Z1.\nM8\nG1Z0.5F50.\nM30")
     keys = {"input.tool_change_unknown_axes": "XYZ", "axes.z.modes": []}
     conversion = convert(text, unmeasured_machine(keys, {})).conversion
-    assert [row.key for row in conversion.rests_on] == ["axes.z.modes"]
+    assert [row.key for row in conversion.parameter_sensitivity] == ["axes.z.modes"]
 
 
 def test_what_it_rests_on_costs_no_more_than_the_verdict(monkeypatch: pytest.MonkeyPatch) -> None:

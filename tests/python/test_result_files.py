@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,6 +17,7 @@ import write_schemas
 import shapegcode as sg
 from command import run
 from page_pieces import pieces
+from shapegcode.results.json import RENAMED, OldNames
 from shapegcode.results.result import NotKeptError
 from shapegcode.results.revive import load_result
 
@@ -231,3 +234,45 @@ def test_results_for_notebooks_and_tables(tmp_path: Path) -> None:
     assert data["low"].dims[0] == "times_s"
     assert list(data["axis"].values) == ["x", "y", "z"]
     assert data["times_s"].attrs["units"] == "s"
+
+
+def test_keys_of_the_version_before_are_read(kept: Callable[[str], Shown], tmp_path: Path) -> None:
+    report = json.loads(kept("Conversion").json.read_text(encoding="utf-8"))
+    current = load_result(kept("Conversion").json)
+    report["rests_on"] = report.pop("parameter_sensitivity")
+    for cut in report["cuts"]:
+        cut["cure"] = cut.pop("remedy")
+    for case in report["cases"]:
+        case["starved_ms"] = case.pop("underrun_ms")
+    (tmp_path / "old.json").write_text(json.dumps(report))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        old = load_result(tmp_path / "old.json")
+    assert {str(each.message).rpartition(": ")[2] for each in caught} == {
+        "key rests_on of a Conversion is parameter_sensitivity now",
+        "key cure of a CutOutcome is remedy now",
+        "key starved_ms of a CaseVerdict is underrun_ms now",
+    }
+    assert len(caught) == 3, "each once"
+    assert old == current and isinstance(old, sg.Conversion)
+    with pytest.warns(FutureWarning, match=r"Conversion\.rests_on is Conversion\.parameter_sensitivity now"):
+        assert old.rests_on == old.parameter_sensitivity  # type: ignore[attr-defined]
+    with pytest.warns(FutureWarning, match=r"CutOutcome\.cure is CutOutcome\.remedy now"):
+        assert old.cuts[0].cure == old.cuts[0].remedy  # type: ignore[attr-defined]
+    with pytest.raises(AttributeError, match="'ruse'"):
+        old.ruse  # type: ignore[attr-defined]  # noqa: B018
+
+
+def test_names_of_the_version_before_are_free() -> None:
+    """An old name leads to a field or property that is there, and is none itself."""
+    classes = {cls.__name__: cls for cls in with_old_names(OldNames)}
+    assert RENAMED.keys() <= classes.keys()
+    for name, fields in RENAMED.items():
+        own = {*dir(classes[name]), *(field.name for field in dataclasses.fields(classes[name]))}
+        assert set(fields.values()) <= own and not fields.keys() & own
+
+
+def with_old_names(cls: type) -> set[type]:
+    """Every class below one, in all modules of the package."""
+    write_schemas.results()
+    return {cls}.union(*(with_old_names(each) for each in cls.__subclasses__()))

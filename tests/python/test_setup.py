@@ -319,8 +319,8 @@ def test_show_ranks_what_nobody_measured_on_a_program(tmp_path: Path) -> None:
     conversion = sg.convert(
         tmp_path / "part.nc", sg.Machine.load(tmp_path / "m.toml").with_values(ANY_PRICE), shape_all=True
     )
-    assert [row["key"] for row in report["matters"]] == [row.key for row in conversion.rests_on]
-    assert f"most of all {conversion.rests_on[0].key}" in ranked.stdout.splitlines()[0]
+    assert [row["key"] for row in report["matters"]] == [row.key for row in conversion.parameter_sensitivity]
+    assert f"most of all {conversion.parameter_sensitivity[0].key}" in ranked.stdout.splitlines()[0]
     assert len(ranked.stdout.splitlines()) <= 30
     whole = run(tmp_path, "machine", "show", "m.toml", "--for", "part.nc", "--verbose")
     assert "largest cutting feed of this axis" in whole.stdout and "largest cutting feed" not in ranked.stdout

@@ -90,7 +90,7 @@ def test_overrides_and_shifted_modes_are_the_judges_too(judged: Judged) -> None:
     cuts = emitted_cuts(judged)
     compared = 0
     for case in judged.conversion.to_dict()["cases"]:
-        if case["look_ahead"] or case["starved_ms"]:
+        if case["look_ahead"] or case["underrun_ms"]:
             continue
         points = play(cuts, period_s=TICK, block_end=case["block_end"], override=case["override"])
         found = residual_um(points, shifted_modes(judged, case["mode"], case["shift"]), TICK, still_mm=1e-9)
@@ -215,7 +215,7 @@ def test_a_starved_block_is_as_bad_as_the_worst_of_all_places(time_constant_tick
     judged = convert(PART, machine_with(keys))
     cuts = emitted_cuts(judged)
     case = judged.conversion.to_dict()["cases"][-1]
-    assert (case["name"], case["starved_ms"]) == ("underrun 20 ms", 20.0)
+    assert (case["name"], case["underrun_ms"]) == ("underrun 20 ms", 20.0)
     worst = np.zeros(3)
     for after in range(len(cuts) - 1):
         points, begin, end = starved_points(cuts, after, 0.020, "ceil")
@@ -366,7 +366,7 @@ def test_a_region_is_not_too_fast_because_its_original_is_slow() -> None:
 
 def test_keys_of_a_case_are_stable(judged: Judged) -> None:
     keys = {
-        "name", "block_end", "override", "mode", "shift", "look_ahead", "starved_ms", "counts", "residual_um",
+        "name", "block_end", "override", "mode", "shift", "look_ahead", "underrun_ms", "counts", "residual_um",
         "contour_error_um", "time_s", "within", "figure", "value_um", "limit_um", "share_of_limit", "lines",
     }  # fmt: skip
     report = judged.conversion.to_dict()

@@ -91,7 +91,7 @@ def _runs(args: argparse.Namespace, machine: Machine) -> int:
     with runner.progress(f"learning from {args.runs}", args) as bar:
         found = calibrate_cycle_time(file, machine, families=args.look_ahead, on_progress=bar.update)
     return runner.finish(
-        found, args, output=_machine_file(args, found), notes=[f"not told: {each}" for each in found.not_told]
+        found, args, output=_machine_file(args, found), notes=[f"not determined: {each}" for each in found.undetermined]
     )
 
 

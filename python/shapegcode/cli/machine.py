@@ -195,7 +195,7 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
         if any(axis.modes for axis in machine.axes.as_tuple()):
             # What matters is asked of a shaped program, whether or not shaping it is worth its price.
             conversion = convert(args.input, machine.with_values(ANY_PRICE), shape_all=True, tolerance_curve=False)
-            rows = conversion.rests_on
+            rows = conversion.parameter_sensitivity
             if conversion.worst_case is None:
                 note = f"{args.input}: nothing in it was shaped, so nothing is ranked"
         else:

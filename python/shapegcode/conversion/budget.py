@@ -13,6 +13,7 @@ from shapegcode import _core
 from shapegcode.conversion.write import EmittedRegion
 from shapegcode.machine import Machine
 from shapegcode.program import Program
+from shapegcode.results.json import OldNames
 from shapegcode.results.result import Xyz
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.figures import RegionVerdict
@@ -112,7 +113,7 @@ class GivenUp:
 
 
 @dataclass(frozen=True)
-class BudgetOutcome:
+class BudgetOutcome(OldNames):
     """Effect of a budget on a conversion."""
 
     limits: Budget  # the budget; null: no limit
@@ -121,7 +122,7 @@ class BudgetOutcome:
     before: TextNeeds
     after: TextNeeds  # of the text as it is
     block_period_s: float  # on which it is written
-    given_up: tuple[GivenUp, ...]  # regions that are left unchanged
+    left_unchanged: tuple[GivenUp, ...]  # regions that are left unchanged
 
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
@@ -165,7 +166,7 @@ class Spending:
 
     def __init__(self, budget: Budget, program: Program, machine: Machine) -> None:
         self.budget = budget
-        self.given_up: dict[int, GivenUp] = {}
+        self.left_unchanged: dict[int, GivenUp] = {}
         """Regions that are left unchanged, per index."""
         self._program = program
         self._tick_s = machine.controller.interpolation_period_s
@@ -233,7 +234,7 @@ class Spending:
         chosen |= self._too_large(size, {k: load for k, load in loads.items() if k not in chosen}, simulated)
         for index, reason in chosen.items():
             region = simulated[index]
-            self.given_up[index] = GivenUp(
+            self.left_unchanged[index] = GivenUp(
                 region.lines, reason, region.residual_vibration_um.original, loads[index].extra_bytes
             )
         return bool(chosen)
@@ -241,8 +242,8 @@ class Spending:
     def outcome(self, grid: Grid, written: WrittenText) -> BudgetOutcome:
         """What the budget did, once the text fits."""
         after = _needs(grid, written)
-        given_up = tuple(self.given_up[index] for index in sorted(self.given_up))
-        return BudgetOutcome(self.budget, self._before or after, after, grid.block_period_s, given_up)
+        left_unchanged = tuple(self.left_unchanged[index] for index in sorted(self.left_unchanged))
+        return BudgetOutcome(self.budget, self._before or after, after, grid.block_period_s, left_unchanged)
 
     def warning(self, grid: Grid) -> str:
         """One sentence on what was given up; empty if nothing was."""
@@ -250,8 +251,8 @@ class Spending:
         if self._longer and self._before is not None:
             was, now = self._before.block_period_s * 1e3, grid.block_period_s * 1e3
             parts.append(f"the block period is {now:g} ms instead of {was:g} ms")
-        if self.given_up:
-            entries = [self.given_up[index] for index in sorted(self.given_up)]
+        if self.left_unchanged:
+            entries = [self.left_unchanged[index] for index in sorted(self.left_unchanged)]
             lines = ", ".join("{} to {}".format(*entry.lines) for entry in entries[:_LINES_NAMED])
             lines += f" and {len(entries) - _LINES_NAMED} more" if len(entries) > _LINES_NAMED else ""
             stays = max(max(entry.residual_um) for entry in entries)

@@ -179,8 +179,8 @@ def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
     """Shape the chosen cuts on a grid, and write the whole text."""
     plan.use_grid(grid)
     # Of what was given up for a budget, or is left unchanged by choice, the table of cuts speaks.
-    given_up = {} if plan.spending is None else plan.spending.given_up
-    unreported = {*given_up, *plan.left, *plan.aims.emitted_s}
+    left_unchanged = {} if plan.spending is None else plan.spending.left_unchanged
+    unreported = {*left_unchanged, *plan.left, *plan.aims.emitted_s}
     on_progress = partial(plan.on_progress, stage) if stage else lambda _done, _total: None
     written = plan.writer.write(plan.reasons, plan.aims.room_um, plan.aims.feed_ratio, unreported, on_progress)
     for index, reason in written.no_room.items():
@@ -229,8 +229,8 @@ def simulate(plan: ConversionPlan, written: Written, text: ReadBack, *, prefetch
 def keep_what_pays(plan: ConversionPlan, shaped: Shaped) -> Shaped:
     """The same with cuts loosened or left unchanged for the budget, for what they gain, and for the program's price."""
     while plan.spending is not None and plan.spending.give_up(plan.grid, shaped.written, plan.verdicts(shaped)):
-        for index, given_up in plan.spending.given_up.items():
-            plan.reasons[index] = given_up.reason
+        for index, left_unchanged in plan.spending.left_unchanged.items():
+            plan.reasons[index] = left_unchanged.reason
         shaped = settle(plan)
     shaped = _without_what_gains_nothing(plan, shaped)
     for _ in range(_PRICE_ROUNDS):

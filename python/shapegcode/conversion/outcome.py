@@ -134,7 +134,7 @@ def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> 
         budget=plan.spending.outcome(plan.grid, shaped.written) if plan.spending is not None else None,
         rapids=shaped.rapids.outcome if shaped.rapids is not None else None,
         least_gain_um=machine.shaping.least_gain_um,
-        rests_on=sensitivity,
+        parameter_sensitivity=sensitivity,
         unmeasured_tried=tried,
         at_the_control=at_the_control(
             shaped.emitted,

@@ -53,7 +53,7 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
         return "amber", next(conversion.misses(), conversion.reason)
     if conversion.nothing_shaped:
         return "calm", conversion.reason
-    turning = [row.key for row in conversion.rests_on if row.moved_um > row.limit_um]
+    turning = [row.key for row in conversion.parameter_sensitivity if row.moved_um > row.limit_um]
     if turning:
         return "amber", f"an unverified parameter of this machine could change the verdict: {turning[0]}"
     if count := len(conversion.warnings):
@@ -72,8 +72,8 @@ def sections_of(conversion: Conversion, made: Made | None = None) -> Iterator[Se
     yield next_steps(conversion, *_further(conversion))
     if conversion.cases:
         yield _cases(conversion)
-    if conversion.rests_on:
-        table = sensitivity_table(conversion.rests_on, conversion.unmeasured_tried)
+    if conversion.parameter_sensitivity:
+        table = sensitivity_table(conversion.parameter_sensitivity, conversion.unmeasured_tried)
         how = "Measure the topmost first: it moves the verdict furthest. Red: it could turn it."
         yield Section("rests", "Sensitivity to unverified parameters", (table,), how=how)
     yield from _price(conversion, made)
@@ -162,8 +162,8 @@ def _further(conversion: Conversion) -> Iterator[NextStep]:
     for note in conversion.at_the_control:
         if note.topic in ("look-ahead", "override") or "override" in note.topic:
             yield NextStep(f"At the control, {note.topic}: {note.text}.")
-    if conversion.rests_on:
-        key = conversion.rests_on[0].key
+    if conversion.parameter_sensitivity:
+        key = conversion.parameter_sensitivity[0].key
         text = f"Measure {key}: it is assumed, and the verdict depends on it more than on any other parameter."
         yield NextStep(text, "shapegcode identify --tap-plan -m MACHINE.toml" if ".modes" in key else "")
 

@@ -92,7 +92,8 @@ class Conversion(ProgramFigures, Result):
         budget: only under one: what it allowed, and what was given up for it.
         rapids: only where rapids may be shaped: what became of them.
         least_gain_um: what is too little.
-        rests_on: values that were not measured on this machine, by how far each moves the deciding figure to its limit.
+        parameter_sensitivity: values that were not measured on this machine, by how far each moves the deciding figure
+            to its limit.
         unmeasured_tried: how many such values were moved.
         at_the_control: caution, before you run when it is loaded and run; empty where nothing was shaped.
         restart_points: blocks inside of shaped cuts at which the control can begin.
@@ -127,7 +128,7 @@ class Conversion(ProgramFigures, Result):
     budget: BudgetOutcome | None = field(default=None, metadata=sparse())
     rapids: RapidsOutcome | None = field(default=None, metadata=sparse())
     least_gain_um: float = 0.0
-    rests_on: tuple[Sensitivity, ...] = ()
+    parameter_sensitivity: tuple[Sensitivity, ...] = ()
     unmeasured_tried: int = 0
     at_the_control: tuple[ControlNote, ...] = ()
     restart_points: tuple[RestartPoint, ...] = ()
@@ -173,8 +174,8 @@ class Conversion(ProgramFigures, Result):
     @property
     def kept(self) -> tuple[CutOutcome, ...]:
         """The cuts left unchanged, but for those of a budget."""
-        given_up = {each.lines for each in self.budget.given_up} if self.budget is not None else set()
-        return tuple(cut for cut in self.cuts if not cut.is_shaped and cut.lines not in given_up)
+        over_budget = {each.lines for each in self.budget.left_unchanged} if self.budget is not None else set()
+        return tuple(cut for cut in self.cuts if not cut.is_shaped and cut.lines not in over_budget)
 
     @property
     def answer(self) -> str:
@@ -203,8 +204,8 @@ class Conversion(ProgramFigures, Result):
         axis = max("xyz", key=lambda each: vibration.original[each])
         target = getattr(self.contour_error_um, self.limits.contour_target)
         if self.nothing_shaped:
-            given_up = self.budget is not None and self.budget.given_up
-            why = "nothing fits the budget" if given_up else self._why_unchanged()
+            over_budget = self.budget is not None and self.budget.left_unchanged
+            why = "nothing fits the budget" if over_budget else self._why_unchanged()
             return (
                 f"{verdict}: {why}; residual vibration {axis.upper()} {vibration.original[axis]:.1f} µm, contour "
                 f"{target.original.max:.1f} µm; {self._unchanged}"
@@ -238,9 +239,9 @@ class Conversion(ProgramFigures, Result):
         out = sorted((cut for cut in self.cuts if cut.misses), key=lambda cut: cut.is_shaped)
         for cut in out[:1]:
             how = f"left unchanged ({cut.reason})" if not cut.is_shaped else self._cost_of(cut)
-            cure = f": {cut.cure}" if cut.cure else ""
+            remedy = f": {cut.remedy}" if cut.remedy else ""
             more = f" (and {len(out) - 1} further cuts out of their limits)" if len(out) > 1 else ""
-            yield "lines {} to {}: ".format(*cut.lines) + f"{cut.misses[0]}; {how}{cure}{more}"
+            yield "lines {} to {}: ".format(*cut.lines) + f"{cut.misses[0]}; {how}{remedy}{more}"
 
     def _cost_of(self, cut: CutOutcome) -> str:
         """Why a shaped cut does not keep its tolerance, as far as its price is the reason."""
@@ -307,7 +308,9 @@ class Conversion(ProgramFigures, Result):
         if self.nothing_shaped:
             return [*cuts, *curve] if any(cut.misses for cut in self.cuts) else cuts
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
-        rests = [sensitivity_table(self.rests_on, self.unmeasured_tried)] if self.rests_on else []
+        rests = (
+            [sensitivity_table(self.parameter_sensitivity, self.unmeasured_tried)] if self.parameter_sensitivity else []
+        )
         points = [restart_table(self.restart_points)] if self.restart_points else []
         before_after = before_after_table(self.before_after())
         return [before_after, *cuts, *curve, *cases, *rests, control_table(self.at_the_control), *points]
@@ -384,7 +387,7 @@ class Conversion(ProgramFigures, Result):
             BeforeAfter("block period", "ms", None, self.block_period_s * 1e3, 3),
         ]
         if self.budget is not None:
-            rows.append(BeforeAfter("regions given up for the budget", "", None, len(self.budget.given_up), 0))
+            rows.append(BeforeAfter("regions given up for the budget", "", None, len(self.budget.left_unchanged), 0))
         rows.append(BeforeAfter("duration of the shaper", "ms", None, self.shaper.duration_s * 1e3, 3))
         if self.shaper.per_axis_duration_s:
             shorter_ms = self.shaper.per_axis_duration_s * 1e3

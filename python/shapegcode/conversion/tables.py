@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from shapegcode import _core
 from shapegcode.conversion.sensitivity import Sensitivity
 from shapegcode.program import Program
+from shapegcode.results.json import OldNames
 from shapegcode.results.result import Pair, Xyz
 from shapegcode.results.table import NO_BREAK, Column, Table
 from shapegcode.verdict.cases import unbroken
@@ -99,7 +100,7 @@ _TOOL_CHANGE = 6
 
 
 @dataclass(frozen=True)
-class CutOutcome:
+class CutOutcome(OldNames):
     """One cut, shaped or left unchanged."""
 
     lines: Lines  # of the original, first and last
@@ -117,7 +118,7 @@ class CutOutcome:
     bytes: Pair[int]  # of its text
     misses: tuple[str, ...]  # limits that it misses, in words
     # what would keep the limits that a cut left unchanged misses; empty: nothing is missed, or nothing known
-    cure: str = ""
+    remedy: str = ""
 
     @property
     def cutting_s(self) -> float:
@@ -150,11 +151,11 @@ def outcome_of(
         time_s=cut.time_s,
         bytes=size,
         misses=cut.misses,
-        cure="" if is_shaped or not cut.misses else _cure(reason),
+        remedy="" if is_shaped or not cut.misses else _remedy(reason),
     )
 
 
-def _cure(reason: str) -> str:
+def _remedy(reason: str) -> str:
     """What the reason of a cut left unchanged suggests."""
     if "price." in reason:
         return "allow more time (--max-cut-time-increase, --max-time-increase) or a larger --contour-tolerance"

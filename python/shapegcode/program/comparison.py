@@ -128,7 +128,7 @@ class KindCount:
     """How many there are of one kind.
 
     Attributes:
-        kind: of them, as `shapegcode.comparison.result.KINDS` names it.
+        kind: of them, as `shapegcode.program.comparison.KINDS` names it.
         original: in the original.
         emitted: in the other program.
         unchanged: the same in both, at the same place in their order.
@@ -150,7 +150,7 @@ class ProgramDifference:
     """One thing in which two programs differ.
 
     Attributes:
-        kind: of `shapegcode.comparison.result.KINDS`, "path", or "emission" for a line of emission.* around a cut.
+        kind: of `shapegcode.program.comparison.KINDS`, "path", or "emission" for a line of emission.* around a cut.
         original_line: from 1; None: the original has nothing there.
         emitted_line: likewise of the other program.
         original: what the original has; empty: nothing.
@@ -186,7 +186,7 @@ class Comparison(Result):
         counts: of each kind of which one of them has some.
         path_um: largest distance of the paths of a cut that both have, seen from either, µm.
         differences: all, in the order of the original.
-        allow: what was allowed, as `shapegcode.comparison.result.Allowed.of` takes it.
+        allow: what was allowed, as `shapegcode.program.comparison.Allowed.of` takes it.
         warnings: none.
     """
 

@@ -15,6 +15,7 @@ import math
 import re
 import types
 import typing
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -99,6 +100,53 @@ def exact() -> dict[str, Any]:
 def sparse() -> dict[str, Any]:
     """Metadata of a field whose key is left out where its value is None: ``field(default=None, metadata=sparse())``."""
     return {"sparse": True}
+
+
+RENAMED: Mapping[str, Mapping[str, str]] = {
+    "BudgetOutcome": {"given_up": "left_unchanged"},
+    "CalibratedParameter": {"told": "is_determined", "had": "previous_value"},
+    "CalibrationRun": {"left_out_s": "cross_validated_s", "left_out_percent": "cross_validated_percent"},
+    "CaseVerdict": {"starved_ms": "underrun_ms"},
+    "Conversion": {"rests_on": "parameter_sensitivity"},
+    "CutOutcome": {"cure": "remedy"},
+    "CycleTimeCalibration": {"not_told": "undetermined"},
+    "FamilyScore": {"left_out_s": "cross_validated_s"},
+}
+"""By class: keys of the JSON and fields, as the version before named them, and as they are named."""
+
+
+@cache
+def renamed_of(cls: type) -> Mapping[str, str]:
+    """The old names of the fields of a class and its bases, and the new ones."""
+    return {old: new for base in cls.__mro__ for old, new in RENAMED.get(base.__name__, {}).items()}
+
+
+class OldNames:
+    """Base of what has fields that were renamed: the name of the version before gives the value, with a warning."""
+
+    if not typing.TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """The field that had another name."""
+            new = renamed_of(type(self)).get(name)
+            if new is None:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+            what = type(self).__name__
+            warnings.warn(f"{what}.{name} is {what}.{new} now", FutureWarning, stacklevel=2)
+            return getattr(self, new)
+
+
+def current_keys(cls: type, data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The JSON of an object with the keys of this version; warns once of each key of the version before."""
+    old = {key: new for key, new in renamed_of(cls).items() if key in data and new not in data}
+    for key, new in old.items():
+        _warn_of_old_key(cls.__name__, key, new)
+    return {old.get(key, key): value for key, value in data.items()} if old else data
+
+
+@cache
+def _warn_of_old_key(what: str, key: str, new: str) -> None:
+    warnings.warn(f"JSON of the version before: key {key} of a {what} is {new} now", FutureWarning, stacklevel=2)
 
 
 class Streamed(list[Any]):

@@ -21,7 +21,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode._core import ArgumentError
 from shapegcode.io.units import FloatArray
-from shapegcode.results.json import plain, sparse
+from shapegcode.results.json import OldNames, plain, sparse
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -167,7 +167,7 @@ class Xyz(Generic[T]):
         return value
 
 
-class Outcome:
+class Outcome(OldNames):
     """What every result is; `json_extra` names properties that the JSON holds beside the fields, with their types."""
 
     from_json: bool = False

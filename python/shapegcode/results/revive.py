@@ -21,7 +21,7 @@ import numpy as np
 
 from shapegcode._core import ArgumentError
 from shapegcode.io.data_file import DataFile
-from shapegcode.results.json import FORMAT, Made
+from shapegcode.results.json import FORMAT, Made, current_keys
 from shapegcode.results.result import NotKeptError, Outcome, Result
 
 
@@ -114,6 +114,7 @@ def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingPr
     cls = getattr(package, made.result) if made.result in package.__all__ else None
     if not (isinstance(cls, type) and issubclass(cls, Result)):
         raise ArgumentError(f"made.result = {made.result}: not a result that this version knows")
+    report = current_keys(cls, report)
     beside = {*cls.json_extra, "made", "plots", "output", "program_address"}
     names = {field.name for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
     known = names | beside
@@ -192,6 +193,7 @@ def _sequence(cls: type, arguments: Sequence[Any], data: list[Any], where: str, 
 def _object(cls: Any, arguments: Sequence[Any], data: Any, where: str, bound: Mapping[Any, Any]) -> Any:
     if not isinstance(data, dict):
         _wrong(where, data, "an object")
+    data = dict(current_keys(cls, data))
     own = dict(zip(getattr(cls, "__parameters__", ()), (bound.get(each, each) for each in arguments), strict=False))
     return _from_json(cls(**dict(_fields(cls, data, where, own))))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from shapegcode import _core
 from shapegcode.program import Program
-from shapegcode.results.json import sparse
+from shapegcode.results.json import OldNames, sparse
 from shapegcode.results.result import ContourError, Pair, Tracks, Xyz
 
 
@@ -106,7 +106,7 @@ class FrequencyResidual:
 
 
 @dataclass(frozen=True)
-class CaseVerdict:
+class CaseVerdict(OldNames):
     """The emitted program in one case: residual and the figure nearest to its limit."""
 
     name: str  # in words, unique
@@ -115,7 +115,7 @@ class CaseVerdict:
     mode: str | None  # that is off: "x.1" as in the machine file, "all", or null
     shift: float  # by how many of its stated uncertainties, -1 or +1
     look_ahead: bool  # the controller's look-ahead stays on
-    starved_ms: float  # how long the block buffer is empty once; 0: never
+    underrun_ms: float  # how long the block buffer is empty once (buffer underrun); 0: never
     counts: bool  # it lies in the band that the machine file states
     residual_um: Xyz[float]  # largest of all regions
     contour_error_um: Tracks[float | None]  # largest of all regions; null where it was not measured

@@ -324,7 +324,7 @@ def _case_verdict(
         mode=case.mode,
         shift=case.shift,
         look_ahead=case.look_ahead,
-        starved_ms=case.starved_s * 1e3,
+        underrun_ms=case.starved_s * 1e3,
         counts=case.counts,
         residual_um=largest_xyz_um(run.residual_mm for run in simulated),
         contour_error_um=Tracks(*(None if found is None else found.largest_mm * 1e3 for found in tracks)),

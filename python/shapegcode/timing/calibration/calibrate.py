@@ -119,7 +119,7 @@ def calibrate_cycle_time(
     folds = _folds(fitted)
     meter = _Meter(on_progress, len(tried) * (1 + (len(folds) if len(folds) > 1 else 0)))
     fits, scores = _tried(tried, fitted, folds, machine, rate, meter)
-    order = [score.left_out_s if score.left_out_s is not None else score.fitted_s for score in scores]
+    order = [score.cross_validated_s if score.cross_validated_s is not None else score.fitted_s for score in scores]
     best = 0
     for index in range(1, len(order)):
         if order[index] < _BETTER * order[best]:
@@ -134,7 +134,9 @@ def calibrate_cycle_time(
     ]
     others = _left_out(fitted, folds, motion, machine, rate) if len(folds) > 1 else {}
     rows, warnings = _rows(observed, learned, others)
-    with_it, remarks, numbers, not_told = learned_machine(learned, fitted, rivals, _scatters(rows, observed, learned))
+    with_it, remarks, numbers, undetermined = learned_machine(
+        learned, fitted, rivals, _scatters(rows, observed, learned)
+    )
     rows = [_with_interval(row, run, with_it) for row, run in zip(rows, observed, strict=True)]
     return CycleTimeCalibration(
         machine=machine.name,
@@ -144,7 +146,7 @@ def calibrate_cycle_time(
         runs=tuple(rows),
         fitted=with_it,
         remarks=remarks,
-        not_told=tuple(not_told),
+        undetermined=tuple(undetermined),
         warnings=tuple(dict.fromkeys(warnings)),
     )
 
@@ -276,7 +278,7 @@ def _row(run: ObservedRun, learned: _Calibration, other: _Calibration | None) ->
         predicted_s=float(starts[-1]),
         low_s=math.nan,
         high_s=math.nan,
-        left_out_s=float(other.starts(run)[-1]) if other is not None else None,
+        cross_validated_s=float(other.starts(run)[-1]) if other is not None else None,
         feed_override=_feed_override(run),
         rapid_override=run.rapid_override,
         tools=tools,
@@ -450,13 +452,13 @@ def learned_machine(
         key, meaning = "axes.x|y|z.rapid_mm_per_min", "rate of rapids, of the fastest axis"
         numbers.append(_number(key, meaning, (rate, 0.99 * rate, 1.01 * rate), "mm/min", True, had))
     numbers += _function_numbers(functions)
-    not_told = [
+    undetermined = [
         f"{number.meaning} ({number.key}): the runs allow {number.low:.3g} to {number.high:.3g} {number.unit}"
         for number in numbers
-        if not number.told
+        if not number.is_determined
     ]
     if not math.isfinite(motion.rapid_mm_per_s):
-        not_told.append("rapid rate: no log shows a rapid at constant speed; the value of the file is kept")
+        undetermined.append("rapid rate: no log shows a rapid at constant speed; the value of the file is kept")
     values["times.scatter"] = {
         "cuts_percent": round(100.0 * open_times.cut_scatter(runs, motion, machine), 3),
         "between_cuts_s": round(scatters[0], 3),
@@ -472,7 +474,7 @@ def learned_machine(
         if key != "times.open":  # beside each value of its rows, once is enough: times.scatter says it
             remarks.setdefault(key, f"measured ({source})")
     fitted = machine.with_values(values, source=f"{machine.name} with calibrated parameters")
-    return fitted.with_remarks(machine.all_remarks() | remarks), remarks, numbers, not_told
+    return fitted.with_remarks(machine.all_remarks() | remarks), remarks, numbers, undetermined
 
 
 def _motion_numbers(

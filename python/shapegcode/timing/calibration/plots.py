@@ -53,9 +53,9 @@ def plot_cycle_time_calibration(found: CycleTimeCalibration, ax: Axes | None = N
         reach = 100.0 * (run.high_s - run.predicted_s) / took
         label = once("whole run, with its interval")
         panel.errorbar(error, row, xerr=reach, fmt="o", color=plot.COLOURS[1], capsize=3, label=label)
-        if run.left_out_percent is not None:
+        if run.cross_validated_percent is not None:
             label = once("whole run, calibrated with the others")
-            panel.plot(run.left_out_percent, row, "D", color=plot.COLOURS[0], markersize=5, label=label)
+            panel.plot(run.cross_validated_percent, row, "D", color=plot.COLOURS[0], markersize=5, label=label)
         for share in run.tools:
             if share.measured_s > 0.02 * took:
                 panel.plot(share.error_percent, row + 0.22, "|", color=plot.COLOURS[2], label=once("tools"))

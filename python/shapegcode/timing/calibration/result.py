@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from shapegcode.machine import Machine
-from shapegcode.results.json import hidden
+from shapegcode.results.json import OldNames, hidden
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
 
@@ -15,7 +15,7 @@ TOLERANCE_PERCENT = 2.0
 
 
 @dataclass(frozen=True)
-class FamilyScore:
+class FamilyScore(OldNames):
     """One kind of look-ahead that was tried.
 
     Attributes:
@@ -23,17 +23,17 @@ class FamilyScore:
         meaning: in words.
         fitted_s: how far its times differ from the logs that it was fitted to, s (weighted root mean square over
             windows of seconds to minutes).
-        left_out_s: the same on runs that it was not fitted to; null: too few runs to leave any out.
+        cross_validated_s: the same on runs that it was not fitted to; null: too few runs to leave any out.
     """
 
     name: str
     meaning: str
     fitted_s: float
-    left_out_s: float | None
+    cross_validated_s: float | None
 
 
 @dataclass(frozen=True)
-class CalibratedParameter:
+class CalibratedParameter(OldNames):
     """One number of the machine file.
 
     Attributes:
@@ -43,8 +43,9 @@ class CalibratedParameter:
         low: least value of the 95 % interval.
         high: largest one.
         unit: of all three.
-        told: whether the runs determine it; else they allow very different values, or determine only sums with others.
-        had: what the machine file had before.
+        is_determined: whether the runs determine it; else they allow very different values, or determine only sums
+            with others.
+        previous_value: that of the machine file before; null: it had none.
     """
 
     key: str
@@ -53,8 +54,8 @@ class CalibratedParameter:
     low: float
     high: float
     unit: str
-    told: bool
-    had: float | None = None
+    is_determined: bool
+    previous_value: float | None = None
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class CycleTimePart:
 
 
 @dataclass(frozen=True)
-class CalibrationRun:
+class CalibrationRun(OldNames):
     """One run.
 
     Attributes:
@@ -90,7 +91,7 @@ class CalibrationRun:
         predicted_s: of the calibrated model, at the overrides of this run.
         low_s: least time of the 95 % interval.
         high_s: largest one.
-        left_out_s: of a model calibrated with the other programs (or runs) alone; null: no others.
+        cross_validated_s: of a model calibrated with the other programs (or runs) alone; null: no others.
         feed_override: ratio at which most of it was cut.
         rapid_override: ratio of its rapids.
         tools: by tool.
@@ -107,7 +108,7 @@ class CalibrationRun:
     predicted_s: float
     low_s: float
     high_s: float
-    left_out_s: float | None
+    cross_validated_s: float | None
     feed_override: float
     rapid_override: float
     tools: tuple[CycleTimePart, ...]
@@ -127,14 +128,14 @@ class CalibrationRun:
         return _error(self.predicted_s, self.measured_s, self.held_s)
 
     @property
-    def left_out_percent(self) -> float | None:
+    def cross_validated_percent(self) -> float | None:
         """The same of the model calibrated with the others."""
-        return _error(self.left_out_s, self.measured_s, self.held_s)
+        return _error(self.cross_validated_s, self.measured_s, self.held_s)
 
     @property
     def judged_percent(self) -> float | None:
         """Error as a run left out, where there is one; else of the fit."""
-        return self.left_out_percent if self.left_out_s is not None else self.error_percent
+        return self.cross_validated_percent if self.cross_validated_s is not None else self.error_percent
 
 
 def _error(predicted_s: float | None, measured_s: float | None, held_s: float) -> float | None:
@@ -155,7 +156,7 @@ class CycleTimeCalibration(Result):
         runs: one row for each run.
         fitted: the machine with it.
         remarks: for each key that was set, by its dotted name: interval and source.
-        not_told: what the logs do not determine, in words.
+        undetermined: what the logs do not determine, in words.
         warnings: runs that differ by more than 2 %, and where one was held.
         largest_error_percent: of a run: as one left out where others are, without holds; null: no whole run.
     """
@@ -167,7 +168,7 @@ class CycleTimeCalibration(Result):
     runs: tuple[CalibrationRun, ...]
     fitted: Machine = field(metadata=hidden())
     remarks: Mapping[str, str] = field(metadata=hidden())
-    not_told: tuple[str, ...]
+    undetermined: tuple[str, ...]
     warnings: tuple[str, ...]
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "largest_error_percent": float | None}
@@ -188,11 +189,13 @@ class CycleTimeCalibration(Result):
     def answer(self) -> str:
         """How well it says what the machine did."""
         largest = self.largest_error_percent
-        learned = sum(number.told for number in self.numbers)
+        learned = sum(number.is_determined for number in self.numbers)
         head = f"{self.machine}: {learned} parameters calibrated with {sum(run.use == 'fit' for run in self.runs)} runs"
         if largest is None:
             return f"{head}; no log has a complete run to check them"
-        kind = "left out" if any(run.left_out_s is not None or run.use == "test" for run in self.runs) else "fitted"
+        kind = (
+            "left out" if any(run.cross_validated_s is not None or run.use == "test" for run in self.runs) else "fitted"
+        )
         within = "within" if self.ok else "NOT within"
         return f"{head}; runs {kind} are {within} {TOLERANCE_PERCENT:g} % (at most {largest:.1f} %)"
 
@@ -234,7 +237,7 @@ class CycleTimeCalibration(Result):
 
 
 def _interval(number: CalibratedParameter) -> str:
-    return f"{number.low:.4g} ... {number.high:.4g}" if number.told else "not determined"
+    return f"{number.low:.4g} ... {number.high:.4g}" if number.is_determined else "not determined"
 
 
 _RUNS = (
@@ -245,7 +248,7 @@ _RUNS = (
     Column("predicted", "s", "predicted_s", digits=1),
     Column("95 %", "s", lambda run: f"{run.low_s:.0f}-{run.high_s:.0f}"),
     Column("error", "%", "error_percent", digits=2),
-    Column("left out", "%", "left_out_percent", digits=2),
+    Column("left out", "%", "cross_validated_percent", digits=2),
 )
 _SHARES = (
     Column("run", value=lambda row: row[0].name, text=True),
@@ -257,13 +260,13 @@ _SHARES = (
 _FAMILIES = (
     Column("kind", value="name", text=True),
     Column("fitted", "s", "fitted_s", digits=3),
-    Column("left out", "s", "left_out_s", digits=3),
+    Column("left out", "s", "cross_validated_s", digits=3),
     Column("what it is", value="meaning", text=True),
 )
 _NUMBERS = (
     Column("number", value="meaning", text=True),
     Column("value", value=lambda number: f"{number.value:.4g} {number.unit}"),
     Column("95 % interval", value=_interval),
-    Column("file had", value=lambda number: None if number.had is None else f"{number.had:.4g}"),
+    Column("file had", value=lambda number: None if number.previous_value is None else f"{number.previous_value:.4g}"),
     Column("key", value="key", text=True),
 )
