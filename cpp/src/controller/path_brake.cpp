@@ -6,6 +6,12 @@
 #include "controller/cubic.hpp"
 
 namespace shapegcode {
+namespace {
+
+// Of the acceleration: the rest is for a curve that begins within the period.
+constexpr double braking_share = 0.995;
+
+}  // namespace
 
 void PathBrake::begin(const Section& section, std::size_t index) noexcept {
   section_ = &section;
@@ -19,7 +25,8 @@ double PathBrake::hardest() const noexcept {
   for (std::size_t i = 0; i < axes_; ++i) {
     const double along = point_.velocity[i] / speed;
     const double across = point_.acceleration[i] - along * point_.point.state.acceleration;
-    if (along != 0.0) most = std::min(most, std::max(0.0, acceleration_[i] - std::abs(across)) / std::abs(along));
+    if (along != 0.0)
+      most = std::min(most, std::max(0.0, braking_share * acceleration_[i] - std::abs(across)) / std::abs(along));
   }
   return most;
 }
