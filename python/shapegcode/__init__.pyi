@@ -195,9 +195,10 @@ from shapegcode.results.motion_plots import (
     plot_feed as plot_feed,
     plot_vibration as plot_vibration,
 )
+from shapegcode.results.outcome import Pair as Pair, Xyz as Xyz
 from shapegcode.results.path_plots import plot_path as plot_path
 from shapegcode.results.report_result import Reports as Reports
-from shapegcode.results.result import Pair as Pair, Result as Result, Xyz as Xyz
+from shapegcode.results.result import Result as Result
 from shapegcode.results.revive import load_result as load_result
 from shapegcode.results.table import Column as Column, Table as Table
 from shapegcode.setup.answers import Answers as Answers, AnswersError as AnswersError, read_answers as read_answers

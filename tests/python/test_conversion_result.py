@@ -11,10 +11,9 @@ import pytest
 
 import shapegcode as sg
 from acceptance import machine_with
-from shapegcode.conversion.sensitivity import Sensitivity
-from shapegcode.conversion.tables import BeforeAfter, sensitivity_table
+from shapegcode.conversion.tables import BeforeAfter, Sensitivity, sensitivity_table
 from shapegcode.results.json import schema
-from shapegcode.results.result import Pair, Xyz
+from shapegcode.results.outcome import Pair, Xyz
 from shapegcode.verdict.cases import case_table
 from shapegcode.verdict.figures import RegionVerdict
 

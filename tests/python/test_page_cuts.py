@@ -15,9 +15,9 @@ import pytest
 from selenium.webdriver import Keys
 
 from browser import Browser, grave
+from shapegcode.results.outcome import Pair
 from shapegcode.results.page.html import save
 from shapegcode.results.page.model import CutPicker, CutRow, CutTotals, Light, Page, Section
-from shapegcode.results.result import Pair
 
 COMMAND = "shapegcode convert part.nc -m mine.toml -o shaped.nc --only {lines}"
 TOTALS = CutTotals(300.0, 50_000, residual_limit_um=5.0, contour_limit_um=20.0)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from shapegcode.errors import ArgumentError
+from shapegcode.results.outcome import Pair
 from shapegcode.results.page.html import plotly_name, save, to_html
 from shapegcode.results.page.model import (
     Bars,
@@ -33,7 +34,6 @@ from shapegcode.results.page.model import (
 )
 from shapegcode.results.page.scene import CHANNELS, Scene, Variant
 from shapegcode.results.plot import axes
-from shapegcode.results.result import Pair
 from shapegcode.results.table import Column, Table
 
 EVIL = "</script><b onclick='x'>&amp;\u2028"

@@ -16,7 +16,7 @@ import shapegcode as sg
 from acceptance import Judged, convert, machine_with
 from judge import Mode, contour_error_um, play, residual_um, response, starts
 from shapegcode.cli import main
-from shapegcode.conversion.sensitivity import _Region
+from shapegcode.conversion.tables import _Region
 from shapegcode.identification.result import Estimate, IdentifiedMode
 from shapegcode.identification.update import update_modes
 from shapegcode.settings.edit import with_remarks, without_origins

@@ -18,7 +18,7 @@ import shapegcode as sg
 from command import run
 from page_pieces import pieces
 from shapegcode.results.json import RENAMED, OldNames
-from shapegcode.results.result import NotKeptError
+from shapegcode.results.outcome import NotKeptError
 from shapegcode.results.revive import load_result
 
 PART = "%\nO0001\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\nX30. Y40.\nX60. Y0.\nG0 Z5.\nG4 P504\nM30\n%\n"

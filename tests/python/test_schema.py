@@ -12,7 +12,7 @@ import pytest
 import write_schemas
 
 from shapegcode.results.json import exact, hidden, plain, schema, sparse, to_text
-from shapegcode.results.result import Pair, Xyz
+from shapegcode.results.outcome import Pair, Xyz
 
 RESULTS = write_schemas.results()
 

@@ -15,7 +15,7 @@ import pytest
 
 import shapegcode as sg
 from command import run
-from shapegcode.results.result import NotKeptError, Outcome
+from shapegcode.results.outcome import NotKeptError, Outcome
 from test_feed_schedule import ALLOWANCE, CORNER, tool
 
 NO_UNIT = "%\nO1\nG17G90G94\nG0X0Y0Z0\nG1X2.F600\nG3X4.Y2.R2.\nG1Y4.\nG0Z5.\nM30\n%\n"

@@ -22,7 +22,7 @@ from shapegcode.conversion.plan import knee_of
 from shapegcode.conversion.recommendation import recommend
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.results.result import Pair, Xyz
+from shapegcode.results.outcome import Pair, Xyz
 from shapegcode.shaping.grid import choose_grid
 from shapegcode.verdict.figures import RegionVerdict
 

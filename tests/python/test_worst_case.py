@@ -20,7 +20,7 @@ from judge import Mode, Move, contour_error_um, durations, play, residual_um, re
 from judge.player import BlockEnd, moving_average
 from shapegcode.cli import main
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.results.result import Deviation
+from shapegcode.results.outcome import Deviation
 from shapegcode.shaping import choose_shaper
 from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region, stated_cases
 

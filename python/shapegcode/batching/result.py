@@ -11,8 +11,9 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 from shapegcode.results.json import Streamed, hidden, plain
+from shapegcode.results.outcome import Pair
 from shapegcode.results.page.model import Figure
-from shapegcode.results.result import Pair, Result
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 Ended = Literal["ok", "not ok", "refused", "failed"]

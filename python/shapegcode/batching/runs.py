@@ -28,8 +28,8 @@ from shapegcode.batching.result import BatchRow, Ended, figures_of
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import write_bytes
 from shapegcode.results.json import MadeFile, plain
+from shapegcode.results.outcome import Pair
 from shapegcode.results.page.html import is_shared
-from shapegcode.results.result import Pair
 
 _ENDED: dict[int, Ended] = {0: "ok", 1: "not ok", 2: "refused"}
 _PAIRS = ("residual_um", "contour_um", "cycle_time_s")

@@ -185,7 +185,7 @@ def _write_origins(name: str) -> None:
 def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescription:
     """With the values that were not measured, by what they do to a program."""
     from shapegcode.conversion.convert import convert
-    from shapegcode.conversion.sensitivity import rank_unknown_axes
+    from shapegcode.conversion.tables import rank_unknown_axes
     from shapegcode.machine import Machine
     from shapegcode.machine.description_result import OpenValue
     from shapegcode.machine.programs import ANY_PRICE

@@ -70,8 +70,8 @@ def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[flo
     from shapegcode._core import ArgumentError
     from shapegcode.cli.replay import changes, simulated_again
     from shapegcode.results.json import this_version
+    from shapegcode.results.outcome import NotKeptError
     from shapegcode.results.page.default import raw_page
-    from shapegcode.results.result import NotKeptError
     from shapegcode.results.revive import made_of, revived
 
     try:

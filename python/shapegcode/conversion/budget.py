@@ -14,7 +14,7 @@ from shapegcode.conversion.write import EmittedRegion
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.results.json import OldNames
-from shapegcode.results.result import Xyz
+from shapegcode.results.outcome import Xyz
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.figures import RegionVerdict
 from shapegcode.verdict.judge import residual_floor_um

@@ -16,8 +16,7 @@ from shapegcode.conversion.outcome import judge, result_of
 from shapegcode.conversion.plan import ConversionPlan, CutChoice, Progress, Shaped
 from shapegcode.conversion.recommendation import gain_um
 from shapegcode.conversion.result import Conversion
-from shapegcode.conversion.sensitivity import StartedTrials, start_trials
-from shapegcode.conversion.tables import chosen_cuts
+from shapegcode.conversion.tables import StartedTrials, chosen_cuts, start_trials
 from shapegcode.conversion.whole_text import Written
 from shapegcode.machine import Machine
 from shapegcode.program import Program

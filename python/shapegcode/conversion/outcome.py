@@ -19,15 +19,14 @@ from shapegcode.conversion.recommendation import (
 )
 from shapegcode.conversion.restart import restart_points
 from shapegcode.conversion.result import ChangeProof, Conversion
-from shapegcode.conversion.sensitivity import Sensitivity, parameter_sensitivity
-from shapegcode.conversion.tables import CutOutcome, outcome_of, tools_of_cuts
+from shapegcode.conversion.tables import CutOutcome, Sensitivity, outcome_of, parameter_sensitivity, tools_of_cuts
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import ini_lines
 from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.program.comparison import Allowed, compare
-from shapegcode.results.result import Pair
+from shapegcode.results.outcome import Pair
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.figures import (
     AppliedLimits,

@@ -16,6 +16,7 @@ from shapegcode.conversion.scheduled import ScheduledConversion
 from shapegcode.conversion.tables import CutOutcome, before_after_table, sensitivity_table
 from shapegcode.machine import Machine
 from shapegcode.results.json import Made
+from shapegcode.results.outcome import Pair
 from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
 from shapegcode.results.page.model import (
     Bars,
@@ -32,7 +33,6 @@ from shapegcode.results.page.model import (
     Section,
     Text,
 )
-from shapegcode.results.result import Pair
 from shapegcode.results.table import Column, Table
 from shapegcode.verdict.figures import CaseVerdict
 

@@ -14,7 +14,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget, Spending, keepable
 from shapegcode.conversion.recommendation import benefits, most_to_gain_um
-from shapegcode.conversion.sensitivity import StartedTrials
+from shapegcode.conversion.tables import StartedTrials
 from shapegcode.conversion.whole_text import TextWriter, Written, why_kept
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel

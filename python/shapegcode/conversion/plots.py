@@ -9,8 +9,8 @@ from shapegcode.conversion.plan import ToleranceCurve
 from shapegcode.conversion.result import Conversion
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results import plot
+from shapegcode.results.outcome import Plot
 from shapegcode.results.path_plots import RECORD_SAMPLES, SimulatedRegion, motion_pictures
-from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

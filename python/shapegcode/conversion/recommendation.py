@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.sensitivity import unknown_axes
+from shapegcode.conversion.tables import unknown_axes
 from shapegcode.machine import Machine
 from shapegcode.machine.programs import Tolerance
 from shapegcode.model.machine_model import MachineModel

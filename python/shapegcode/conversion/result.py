@@ -11,11 +11,11 @@ from shapegcode.conversion.operating import ControlNote, control_table, restart_
 from shapegcode.conversion.plan import ToleranceCurve, curve_table
 from shapegcode.conversion.recommendation import FilterAdvice, Grade
 from shapegcode.conversion.restart import RestartPoint
-from shapegcode.conversion.sensitivity import Sensitivity
 from shapegcode.conversion.tables import (
     BeforeAfter,
     CutOutcome,
     RapidsOutcome,
+    Sensitivity,
     before_after_table,
     change_percent,
     cut_table,
@@ -26,7 +26,8 @@ from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.program.comparison import KindCount, ProgramDifference
 from shapegcode.results.json import Made, exact, hidden, sparse
-from shapegcode.results.result import CONTOURS, ContourError, Pair, Plot, Result, Xyz
+from shapegcode.results.outcome import CONTOURS, ContourError, Pair, Plot, Xyz
+from shapegcode.results.result import Result
 from shapegcode.results.table import Table
 from shapegcode.verdict.cases import case_table
 from shapegcode.verdict.figures import AppliedLimits, BlockCount, Placed, ProgramFigures, UsedShaper

@@ -23,7 +23,7 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
-from shapegcode.results.result import Plot
+from shapegcode.results.outcome import Plot
 from shapegcode.results.table import Table
 from shapegcode.shaping.grid import Grid, choose_grid
 

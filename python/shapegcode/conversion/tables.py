@@ -2,17 +2,302 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, replace
+from itertools import islice
+from pathlib import Path
 
 from shapegcode import _core
-from shapegcode.conversion.sensitivity import Sensitivity
+from shapegcode.errors import MachineError
+from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.results.json import OldNames
-from shapegcode.results.result import Pair, Xyz
+from shapegcode.results.outcome import Pair, Xyz
 from shapegcode.results.table import NO_BREAK, Column, Table
-from shapegcode.verdict.cases import unbroken
-from shapegcode.verdict.figures import RegionVerdict
+from shapegcode.settings.keys import KeyValue
+from shapegcode.verdict.cases import Case, CaseFigures, LimitCheck, RegionLimits, case_figures, judge_region, unbroken
+from shapegcode.verdict.figures import Placed, RegionVerdict
+from shapegcode.verdict.judge import Judge, RegionFigures
+
+LEAST_SHARE = 0.01
+"""Of a limit: a value that moves its figure by less does not matter."""
+
+_MOST_SHOWN = 8
+_FREE_S = 60.0  # of motion: so much is always simulated
+_FULL_RUNS = 2  # about half as often as a verdict simulates every region with its contour
+_FILTER_S = 0.024  # moving average of 1769 or 1622 on a machining centre, where the file says that there is none
+_MODE = {"frequency_hz": 40.0, "damping_ratio": 0.02}  # of an axis of a machining centre, where none is known
+_USUAL_MODE = f"a mode of {_MODE['frequency_hz']:g} Hz"
+_PERCENT = {"frequency_hz": 5.0, "damping_ratio": 50.0, "participation": 30.0}  # where no uncertainty is stated
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """A value of the machine file that was not measured, and what it would do to the verdict."""
+
+    key: str  # dotted name in the machine file
+    value: str  # as it stands there, with its unit
+    origin: str  # "assumed", "inherited" from another machine, or "default"
+    moved: str  # what it was moved to, in words
+    figure: str  # the judged figure that it moves furthest towards its limit
+    figure_um: float  # that figure as the file has the value
+    moved_um: float  # the same with the value moved
+    limit_um: float  # what is allowed
+
+    @property
+    def share(self) -> float:
+        """How far the figure moves, of its limit."""
+        return (self.moved_um - self.figure_um) / self.limit_um if self.limit_um > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A value that is moved, and how the region is then simulated."""
+
+    value: KeyValue
+    moved: str  # to what, in words
+    machine: Machine
+    shift: float = 0.0
+    only: str | None = None
+    moves_command: bool = False  # the set-points are others too, not the table alone
+
+
+StartedTrials = Mapping[tuple[str, str], "Future[CaseFigures]"]
+"""Running simulations, by the value and what it is changed to."""
+
+
+@dataclass(frozen=True)
+class _Region:
+    """A region, how it is simulated, and what its figures are judged by."""
+
+    place: Placed
+    emitted: Program
+    judge: Judge
+    tracker: _core.ContourTracker | None
+
+    def simulate(self, trial: _Trial, *, contour: bool) -> CaseFigures:
+        """The figures with a value moved; without the contour they come from the end of the region alone."""
+        model, path = MachineModel(trial.machine), self.place.region.path
+        contour = contour and self.needs_contour(trial)
+        run = model.simulate_emitted(
+            self.place.blocks(self.emitted), path, shift=trial.shift, only=trial.only,
+            offset=model.offset(self.place.region), contour=contour,
+            command_contour=self.judge.target == "command", response_contour=self.judge.target == "response",
+            last_seconds=0.0 if contour else model.vibration_memory_s, tracker=self.tracker,
+        )  # fmt: skip
+        return case_figures(run, contour=contour, response=self.judge.target == "response")
+
+    def needs_contour(self, trial: _Trial) -> bool:
+        """Whether the judged deviation is another one with the value moved."""
+        return trial.moves_command or self.judge.target == "response"
+
+    @property
+    def moving(self) -> str:
+        """Letters of the axes that move in it."""
+        extent_mm = self.place.region.path.extent_mm
+        return "".join(axis for axis, extent in zip("xyz", extent_mm, strict=True) if extent > 0.0)
+
+    def limits(self, figures: RegionFigures) -> RegionLimits:
+        """What it is judged by."""
+        return self.judge.limits(figures, self.place)
+
+    def before(self, figures: RegionFigures) -> dict[str, LimitCheck]:
+        """Its judged figures as it is meant to run, under the controller's own rule of block timing."""
+        own = figures.emitted[self.judge.rules.index(self.judge.own_rule)]
+        return {each.figure: each for each in judge_region(case_figures(own), self.limits(figures))}
+
+
+def start_trials(
+    judge: Judge, machine: Machine, place: Placed, emitted: Program, tracker: _core.ContourTracker, pool: Executor
+) -> StartedTrials:
+    """Start what `parameter_sensitivity` will simulate with the contour, where only one region can decide."""
+    region = _Region(place, emitted, judge, tracker)
+    trials = filter(region.needs_contour, islice(_trials(machine, region.moving), _FULL_RUNS))
+    return {_name(trial): pool.submit(region.simulate, trial, contour=True) for trial in trials}
+
+
+def _name(trial: _Trial) -> tuple[str, str]:
+    return trial.value.key, trial.moved
+
+
+def parameter_sensitivity(
+    judge: Judge,
+    machine: Machine,
+    simulated: Sequence[tuple[Placed, RegionFigures, _core.ContourTracker | None]],
+    emitted: Program,
+    deciding_lines: tuple[int, int],
+    pool: Executor,
+    started: StartedTrials,
+    on_step: Callable[[int, int], None] = lambda _done, _total: None,
+) -> tuple[tuple[Sensitivity, ...], int]:
+    """The unmeasured values that matter for a program, those first that move its verdict furthest towards a limit."""
+    regions = [(_Region(place, emitted, judge, tracker), figures) for place, figures, tracker in simulated]
+    deciding, decided = next(pair for pair in regions if pair[0].place.original_lines == deciding_lines)
+    moving = deciding.moving
+    trials = [(deciding, decided, trial) for trial in _trials(machine, moving)]
+    for axis, trial in _axis_trials(machine).items():
+        if axis not in moving:
+            pair = next((pair for pair in regions if axis in pair[0].moving), None)
+            trials += [(*pair, trial)] if pair is not None else []
+    left_s = max(_FREE_S, _FULL_RUNS * sum(figures.emitted_s for _, figures in regions))
+    running = []
+    for region, figures, trial in trials:
+        left_s -= figures.emitted_s
+        run = started.get(_name(trial))
+        running.append(pool.submit(region.simulate, trial, contour=left_s >= 0.0) if run is None else run)
+    rows = []
+    for done, ((region, figures, trial), run) in enumerate(zip(trials, running, strict=True), start=1):
+        checks = judge_region(run.result(), region.limits(figures))
+        rows.append(_sensitivity(trial.value, trial.moved, region.before(figures), checks))
+        on_step(done, len(trials))
+    rows += _from_cases(machine, deciding, decided)
+    return _ranked(rows), len({row.key for row in rows})
+
+
+def _sensitivity(
+    value: KeyValue, moved: str, before: Mapping[str, LimitCheck], checks: Sequence[LimitCheck]
+) -> Sensitivity:
+    """The figure that a value moves furthest towards its limit."""
+    after = max(checks, key=lambda each: each.share - before[each.figure].share)
+    unit = f" {value.unit}" if value.unit not in ("", "1") and value.value not in ("not set", "[]") else ""
+    shown = "none" if value.value == "[]" else value.value + unit
+    origin = "assumed" if value.assumed else value.origin
+    figure_um = before[after.figure].value_um
+    return Sensitivity(value.key, shown, origin, moved, after.figure, figure_um, after.value_um, after.limit_um)
+
+
+def _ranked(rows: Sequence[Sensitivity]) -> tuple[Sensitivity, ...]:
+    """The worst of each key, the furthest first; an axis that may have a mode or not is always named."""
+    worst: dict[str, Sensitivity] = {}
+    for row in rows:
+        matters = row.share >= LEAST_SHARE or row.key.endswith(".modes")
+        if matters and (row.key not in worst or row.share > worst[row.key].share):
+            worst[row.key] = row
+    return tuple(sorted(worst.values(), key=lambda row: -row.share)[:_MOST_SHOWN])
+
+
+def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
+    """What is tried, the most likely to matter first."""
+    unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
+    now_s = machine.controller.shaped_time_constant_s
+    other_s = 1.2 * now_s if now_s else _FILTER_S
+    yield from _other_command(machine, unmeasured, "controller.shaped_time_constant_s", other_s)
+    yield from (trial for axis, trial in _axis_trials(machine).items() if axis in moving)
+    yield from _frequencies(machine, unmeasured, moving)
+    yield from _shares(machine, unmeasured, moving)
+    freed = machine.with_values("emission.block_period_s", None)
+    period_s = 2.0 * machine.controller.interpolation_period_s
+    yield from _other_command(freed, unmeasured, "controller.interpolation_period_s", period_s)
+
+
+def _changed(machine: Machine, key: str, value: object) -> Iterator[Machine]:
+    """The machine with another value; nothing where the file could not have it."""
+    try:
+        yield machine.with_values(key, value)
+    except MachineError:
+        return
+
+
+def _other_command(machine: Machine, unmeasured: Mapping[str, KeyValue], key: str, other_s: float) -> Iterator[_Trial]:
+    """Another time with which the set-points are others too."""
+    if key in unmeasured:
+        for each in _changed(machine, key, other_s):
+            yield _Trial(unmeasured[key], f"{other_s:g} s", each, moves_command=True)
+
+
+def unknown_axes(machine: Machine) -> dict[str, KeyValue]:
+    """Letters of the axes of which it is not known whether they have a mode, and their keys."""
+    values = {value.key: value for value in machine.values()}
+    return {
+        letter: replace(values[f"axes.{letter}.modes"], origin="assumed", assumed=True)
+        for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True)
+        if not axis.modes and (not axis.rigid or values[f"axes.{letter}.rigid"].unmeasured)
+    }
+
+
+def _with_usual_modes(machine: Machine, letters: Iterable[str]) -> Machine:
+    pairs = ((f"axes.{letter}.rigid", f"axes.{letter}.modes") for letter in letters)
+    values = {key: value for pair in pairs for key, value in zip(pair, (False, [_MODE]), strict=True)}
+    return machine.with_values(values) if values else machine
+
+
+def _axis_trials(machine: Machine) -> dict[str, _Trial]:
+    """Each unknown axis with a usual mode."""
+    unknown = unknown_axes(machine)
+    return {axis: _Trial(value, _USUAL_MODE, _with_usual_modes(machine, axis)) for axis, value in unknown.items()}
+
+
+def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[Sensitivity, ...]:
+    """Axes that may have a mode, by how much a usual one would vibrate behind the program: which to measure first."""
+    from shapegcode.simulation.simulate import simulate
+
+    unknown = unknown_axes(machine)
+    simulated = simulate(program, _with_usual_modes(machine, unknown), record_samples=0)
+    rows = [
+        Sensitivity(
+            value.key, "none", "assumed", _USUAL_MODE, f"residual vibration {letter.upper()}", 0.0,
+            simulated.residual_vibration_um[letter], machine.tolerance.residual_floor_um,
+        )
+        for letter, value in unknown.items()
+    ]  # fmt: skip
+    return tuple(sorted(rows, key=lambda row: -row.moved_um))
+
+
+def _modes(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str, name: str) -> Iterator[tuple[str, int]]:
+    """Letter and number of every mode of which a value is unmeasured and that a moving axis excites."""
+    for axis, (letter, table) in enumerate(zip("xyz", machine.axes.as_tuple(), strict=True)):
+        for number, mode in enumerate(table.modes, start=1):
+            excited = any(share and by in moving for share, by in zip(mode.excitation(axis), "xyz", strict=True))
+            if excited and f"axes.{letter}.modes.{number}.{name}" in unmeasured:
+                yield letter, number
+
+
+def _frequencies(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
+    """Changed up and down; a table over a position or a mass changes as a whole."""
+    for letter, number in _modes(machine, unmeasured, moving, "frequency_hz"):
+        stem = f"axes.{letter}.modes.{number}"
+        stated = getattr(machine.axes, letter).modes[number - 1].frequency_uncertainty_percent
+        percent = stated if stated is not None else _PERCENT["frequency_hz"]
+        sharp = {f"{stem}.frequency_uncertainty_percent": percent, f"{stem}.damping_uncertainty_percent": None}
+        other = machine.with_values(sharp)
+        for shift in (-1.0, 1.0):
+            only = f"{letter}.{number}"
+            yield _Trial(unmeasured[f"{stem}.frequency_hz"], f"{shift * percent:+g} %", other, shift, only)
+
+
+def _shares(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
+    """Changed towards more residual vibration: less damping, more participation."""
+    for name, sign in (("damping_ratio", -1.0), ("participation", 1.0)):
+        for letter, number in _modes(machine, unmeasured, moving, name):
+            mode, stem = getattr(machine.axes, letter).modes[number - 1], f"axes.{letter}.modes.{number}"
+            stated = mode.damping_uncertainty_percent if name == "damping_ratio" else None
+            percent = sign * (stated if stated is not None else _PERCENT[name])
+            for each in _changed(machine, f"{stem}.{name}", getattr(mode, name) * (1.0 + percent / 100.0)):
+                yield _Trial(unmeasured[f"{stem}.{name}"], f"{percent:+g} %", each)
+
+
+def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> Iterator[Sensitivity]:
+    """What was simulated anyway and does not count: the other rule of block timing, look-ahead on, an underrun."""
+    unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
+    for case, simulated in zip(region.judge.cases, figures.cases, strict=True):
+        key, moved = _key_of(case)
+        if not case.counts and key in unmeasured and simulated is not None:
+            yield _sensitivity(
+                unmeasured[key], moved, region.before(figures), judge_region(simulated, region.limits(figures))
+            )
+
+
+def _key_of(case: Case) -> tuple[str, str]:
+    """The value that a case is about, and what it would be; empty where it is about none."""
+    name = f"case {case.name}"
+    if case.look_ahead:
+        return "controller.motion", name
+    if case.starved_s > 0.0:
+        return "controller.block_time_s", f"longer, {name}"
+    return ("controller.block_end", name) if case.nominal else ("", "")
+
 
 # Rounding in sums of increments stays far below this, a least increment far above.
 # A percentage of less than this compares rounding with rounding.

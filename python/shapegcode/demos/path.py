@@ -18,7 +18,8 @@ from shapegcode.machine import Machine
 from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.model.machine_model import MachineModel, motion_limits
 from shapegcode.program import Program
-from shapegcode.results.result import Result, Xyz, largest_xyz_um
+from shapegcode.results.outcome import Xyz, largest_xyz_um
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 _PAPER = "Ko, Lim and Hong, 2023 (paper 000 in docs/evidence/references.md)"

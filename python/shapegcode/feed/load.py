@@ -13,7 +13,7 @@ from shapegcode.cutting.tool import Tool
 from shapegcode.feed.plan import FeedPlan, Mover, Travelled, Vector, goes_on, limits_of
 from shapegcode.feed.survey import Survey, SurveyedMove, SurveyedRegion
 from shapegcode.machine import Machine
-from shapegcode.results.result import Pair
+from shapegcode.results.outcome import Pair
 
 _SLACK = 1e-3  # of a limit: what its own search and the rounding of a figure may be off by
 LOADS = {  # columns of Load, named as their limits in the core: name, unit and decimals for people

@@ -16,8 +16,8 @@ from shapegcode._core import Region
 from shapegcode.feed.load import LOADS, FeedTraces, envelope, groups
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.results import plot
+from shapegcode.results.outcome import Plot
 from shapegcode.results.page.scene import Scene, Variant
-from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

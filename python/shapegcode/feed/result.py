@@ -14,9 +14,10 @@ from shapegcode.feed.survey import Survey
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.json import hidden
+from shapegcode.results.outcome import Pair, Plot
 from shapegcode.results.page.model import Figure, Page
 from shapegcode.results.page.scene import Scene
-from shapegcode.results.result import Pair, Plot, Result
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 _SHOWN_RANGES = 24

@@ -35,7 +35,7 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.program.compensation import program_for_conversion
-from shapegcode.results.result import Pair
+from shapegcode.results.outcome import Pair
 
 MARGIN = 0.015  # Share of each limit that a schedule leaves free: for what model and position of the load are off by
 

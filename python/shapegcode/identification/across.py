@@ -24,7 +24,7 @@ from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_measurement
 from shapegcode.io.record import UNITS, ReadOptions, Record
 from shapegcode.io.units import FloatArray
-from shapegcode.results.result import Xyz
+from shapegcode.results.outcome import Xyz
 
 Measured = Record | FrequencyResponse
 _AXES = "xyz"

@@ -16,7 +16,7 @@ from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.record import UNITS, Record
 from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
-from shapegcode.results.result import Plot
+from shapegcode.results.outcome import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

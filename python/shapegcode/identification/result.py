@@ -15,8 +15,9 @@ from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.record import Record
 from shapegcode.io.units import FloatArray
 from shapegcode.results.json import hidden, sparse
+from shapegcode.results.outcome import Plot, Xyz
 from shapegcode.results.page.model import Light
-from shapegcode.results.result import Plot, Result, Xyz
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 

@@ -10,7 +10,7 @@ from shapegcode.machine.axes import check_axes
 from shapegcode.machine.fanuc_dump import Dump, DumpValues
 from shapegcode.machine.machine import Machine
 from shapegcode.machine.result import AssumedValue, MissingParameter, ReadParameter, ReadTable, Value
-from shapegcode.results.result import Xyz
+from shapegcode.results.outcome import Xyz
 
 
 class Draft:

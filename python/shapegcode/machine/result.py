@@ -8,7 +8,8 @@ from itertools import groupby
 
 from shapegcode.machine.machine import Machine
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Result, Xyz
+from shapegcode.results.outcome import Xyz
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 from shapegcode.settings.keys import toml
 

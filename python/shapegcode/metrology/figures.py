@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 from shapegcode import _core
 from shapegcode.io.units import FloatArray
 from shapegcode.results.json import hidden
-from shapegcode.results.result import ContourError, Tracks, Xyz, largest_xyz_um
+from shapegcode.results.outcome import ContourError, Tracks, Xyz, largest_xyz_um
 
 T = TypeVar("T")
 

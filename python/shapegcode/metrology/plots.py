@@ -12,7 +12,7 @@ from shapegcode.io.units import FloatArray
 from shapegcode.metrology.figures import WallProfile
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
 from shapegcode.results import plot
-from shapegcode.results.result import Plot
+from shapegcode.results.outcome import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,8 @@ from shapegcode import _core
 from shapegcode.metrology.figures import FittedCircle, MeasuredArc, MeasuredSection, SidedError, WallDeviation
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Plot, Result, Tracks, Xyz, largest_xyz_um
+from shapegcode.results.outcome import Plot, Tracks, Xyz, largest_xyz_um
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 _MAX_SECTIONS = 12

@@ -24,7 +24,7 @@ from shapegcode.results.motion_plots import (
     plot_feed,
     plot_vibration,
 )
-from shapegcode.results.result import Plot
+from shapegcode.results.outcome import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,7 +22,8 @@ import numpy as np
 from shapegcode._core import ArgumentError
 from shapegcode.io.data_file import DataFile
 from shapegcode.results.json import FORMAT, Made, current_keys
-from shapegcode.results.result import NotKeptError, Outcome, Result
+from shapegcode.results.outcome import NotKeptError, Outcome
+from shapegcode.results.result import Result
 
 
 class NotKept:

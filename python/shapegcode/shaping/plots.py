@@ -12,7 +12,7 @@ from shapegcode import _core
 from shapegcode._core import ArgumentError, MinimalBranches, Mode, Shaper, minimal_branches
 from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
-from shapegcode.results.result import Plot
+from shapegcode.results.outcome import Plot
 from shapegcode.shaping.bands import Design, ModeBand, mode_band
 from shapegcode.shaping.result import Recommendation, times_name
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from shapegcode.results.result import Plot, Result
+from shapegcode.results.outcome import Plot
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 from shapegcode.shaping.bands import Design, ModeBand, spoken
 from shapegcode.shaping.ranking import NO_RESIDUAL, is_within, recommend

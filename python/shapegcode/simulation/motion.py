@@ -6,7 +6,7 @@ import numpy as np
 
 from shapegcode.io.units import FloatArray
 from shapegcode.model.stream import Chunk
-from shapegcode.results.result import Xyz
+from shapegcode.results.outcome import Xyz
 from shapegcode.simulation.result import Motion
 
 _BUCKETS = 4000

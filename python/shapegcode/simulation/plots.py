@@ -10,8 +10,8 @@ import numpy as np
 
 from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
+from shapegcode.results.outcome import Plot
 from shapegcode.results.path_plots import RECORD_SAMPLES, SimulatedRegion, motion_pictures
-from shapegcode.results.result import Plot
 from shapegcode.simulation.result import Motion, Simulation
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ from shapegcode import _core
 from shapegcode.io.units import FloatArray
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.results.json import hidden, sparse
-from shapegcode.results.result import CONTOURS, ContourError, Plot, Result, Tracks, Xyz
+from shapegcode.results.outcome import CONTOURS, ContourError, Plot, Tracks, Xyz
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table, xyz_columns
 from shapegcode.verdict.cases import case_table
 from shapegcode.verdict.figures import ProgramFigures

@@ -19,7 +19,7 @@ from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.model.stream import stream
 from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions
-from shapegcode.results.result import ContourError, Tracks, Xyz, largest_xyz_um
+from shapegcode.results.outcome import ContourError, Tracks, Xyz, largest_xyz_um
 from shapegcode.simulation.files import csv_file, npz_file
 from shapegcode.simulation.motion import MotionRecorder
 from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.results import plot
-from shapegcode.results.result import Plot
+from shapegcode.results.outcome import Plot
 from shapegcode.studies.replay import MEASURES, SHARE
 from shapegcode.studies.result import Bins, MachineStudy, Optimum
 

@@ -18,7 +18,7 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.program.compensation import program_for_conversion
 from shapegcode.program.computer import cores
-from shapegcode.results.result import Deviation
+from shapegcode.results.outcome import Deviation
 from shapegcode.studies.varied import sampled_machine
 from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region
 from shapegcode.verdict.judge import Judge, RegionFigures

@@ -13,8 +13,9 @@ import numpy.typing as npt
 
 from shapegcode._core import ArgumentError
 from shapegcode.results.json import hidden
+from shapegcode.results.outcome import NotKeptError, Plot
 from shapegcode.results.page.model import Figure
-from shapegcode.results.result import NotKeptError, Plot, Result
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 if TYPE_CHECKING:

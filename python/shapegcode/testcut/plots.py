@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shapegcode.results import plot
-from shapegcode.results.result import Plot
+from shapegcode.results.outcome import Plot
 from shapegcode.testcut.result import CornerResult, IntervalResult, TaperResult
 
 if TYPE_CHECKING:

@@ -9,7 +9,8 @@ from typing import ClassVar, Literal
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Plot, Result
+from shapegcode.results.outcome import Plot
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 from shapegcode.testcut.cut import CuttingLaw, Edge, TestCut
 from shapegcode.testcut.forces import Coefficient, CoefficientFit, Expected, MeanForces

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.results import plot
-from shapegcode.results.result import Plot
+from shapegcode.results.outcome import Plot
 from shapegcode.timing.result import LABELS, PARTS, CycleTime, tool_name
 
 if TYPE_CHECKING:

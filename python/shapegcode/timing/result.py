@@ -10,8 +10,9 @@ import numpy as np
 
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.results.json import hidden
+from shapegcode.results.outcome import Plot
 from shapegcode.results.page.model import Figure
-from shapegcode.results.result import Plot, Result
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table, share_percent
 from shapegcode.timing.interval import LogNext, OpenPart
 

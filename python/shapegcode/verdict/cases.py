@@ -20,7 +20,7 @@ from shapegcode.machine import Machine
 from shapegcode.machine.controller import PLANNER_NAMES
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import Offset
-from shapegcode.results.result import Deviation
+from shapegcode.results.outcome import Deviation
 from shapegcode.results.table import NO_BREAK, Column, Table
 from shapegcode.verdict.figures import CaseVerdict
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from shapegcode import _core
 from shapegcode.program import Program
 from shapegcode.results.json import OldNames, sparse
-from shapegcode.results.result import ContourError, Pair, Tracks, Xyz
+from shapegcode.results.outcome import ContourError, Pair, Tracks, Xyz
 
 
 @dataclass(frozen=True)

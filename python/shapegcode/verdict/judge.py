@@ -19,7 +19,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm, written_increment_mm
 from shapegcode.program.computer import cores
-from shapegcode.results.result import ContourError, Deviation, Pair, Tracks, Xyz, largest_xyz_um
+from shapegcode.results.outcome import ContourError, Deviation, Pair, Tracks, Xyz, largest_xyz_um
 from shapegcode.verdict.cases import (
     ALL_MODES,
     Case,

@@ -25,7 +25,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, written_increment_mm
 from shapegcode.program.stamp import RAPID_MARK
-from shapegcode.results.result import Pair
+from shapegcode.results.outcome import Pair
 from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.figures import Placed
 from shapegcode.verdict.judge import Judge

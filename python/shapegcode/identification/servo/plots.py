@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from shapegcode.identification.servo.result import ServoFit
 from shapegcode.results import plot
-from shapegcode.results.result import Plot
+from shapegcode.results.outcome import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

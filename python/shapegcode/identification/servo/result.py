@@ -10,7 +10,8 @@ from shapegcode.errors import ArgumentError
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Plot, Result
+from shapegcode.results.outcome import Plot
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 

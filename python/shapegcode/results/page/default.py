@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode.results.json import Made, plain, this_version
+from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.page.model import (
     Figure,
     Figures,
@@ -25,7 +26,6 @@ from shapegcode.results.page.model import (
     Text,
 )
 from shapegcode.results.page.scene import Scene
-from shapegcode.results.result import NotKeptError, Outcome
 from shapegcode.results.table import Column, Table
 
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from shapegcode.results.result import Pair, Plot
+from shapegcode.results.outcome import Pair, Plot
 from shapegcode.results.table import Table
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from shapegcode.results import plot
-from shapegcode.results.result import Plot
+from shapegcode.results.outcome import Plot
 from shapegcode.timing.calibration.result import TOLERANCE_PERCENT, CycleTimeCalibration
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 from shapegcode.machine import Machine
 from shapegcode.results.json import OldNames, hidden
-from shapegcode.results.result import Plot, Result
+from shapegcode.results.outcome import Plot
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 TOLERANCE_PERCENT = 2.0
