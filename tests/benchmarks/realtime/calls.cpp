@@ -38,6 +38,7 @@ class Session {
     settings.travel.assign(shapegcode::axis_count, {-1000.0, 1000.0});
     settings.emergency_acceleration.assign(shapegcode::axis_count, 10'000.0);
     settings.retrace_periods = 4000;
+    settings.contour_correction = false;  // which shapers that change have none beside
     settings.other_shapers = {shapegcode::Fir({0, 30}, {0.5, 0.5})};
     return settings;
   }
