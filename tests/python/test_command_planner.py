@@ -169,3 +169,10 @@ def test_without_a_limit_of_jerk_the_acceleration_builds_up_in_the_stated_time()
     slow = sg.convert(program, machine.with_values({"shaping.jerk_time_s": 0.08}), shape_all=True)
     assert slow.text == sg.convert(program, machine.with_values(jerks), shape_all=True).text
     assert slow.cutting_time_s.emitted > sg.convert(program, machine, shape_all=True).cutting_time_s.emitted
+
+
+@pytest.mark.parametrize("time_s", [1e-9, 1000.0])
+def test_a_time_that_no_axis_has_is_refused(time_s: float) -> None:
+    """So short a time is a jerk at which planning would not end."""
+    with pytest.raises(MachineError, match=r"shaping\.jerk_time_s = \S+: must be (0\.001 or more|1 or less)"):
+        machine_with({"shaping.jerk_time_s": time_s})

@@ -372,7 +372,7 @@ class Shaping(TomlTable):
         '"auto": "look-ahead" where controller.kind is "fanuc", else "optimal"',
         default="auto",
     )
-    jerk_time_s: Positive = key(
+    jerk_time_s: Annotated[Positive, Field(ge=0.001, le=1)] = key(
         'time in which a cut planned by "optimal" builds up max_acceleration_mm_s2 of an axis without max_jerk_mm_s3, '
         'where controller.kind is not "fanuc": those planners know no jerk',
         assumed=0.05,
