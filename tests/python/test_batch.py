@@ -82,7 +82,7 @@ def test_the_bytes_are_those_of_the_single_command(folder: Path) -> None:
     }  # fmt: skip
     assert report["warnings"] == ["subprograms (M99), done where they are called: parts/O1234"]
     (refused,) = (row for row in report["rows"] if row["ended"] == "refused")
-    assert "parts/bad.nc:6:1: " in refused["said"]
+    assert "parts/bad.nc:6:1: " in refused["answer"]
     found = contents(folder / "out", folder / "pages")
     for name in ("a.nc", "deep/a.nc", "caller.nc"):
         words = ["convert", f"parts/{name}", "-m", "vx500", "-o", f"out/{name}", "--json", f"out/{name}.json"]
@@ -187,9 +187,9 @@ def test_files_that_cannot_be_read_or_written_are_rows(folder: Path) -> None:
     ended = {row["program"]: row for row in told(folder, "parts", *ONE, "--command", "time")["rows"]}
     assert len(ended) == 6
     assert ended["parts/a.nc"]["ended"] == "ok"
-    assert ended["parts/link.nc"]["said"] == "parts/link.nc: No such file or directory"
-    assert ended["parts/deep/a.nc"]["said"] == "out/deep: File exists"
-    assert ended[f"parts/{'n' * 250}.nc"]["said"].endswith("File name too long")
+    assert ended["parts/link.nc"]["answer"] == "parts/link.nc: No such file or directory"
+    assert ended["parts/deep/a.nc"]["answer"] == "out/deep: File exists"
+    assert ended[f"parts/{'n' * 250}.nc"]["answer"].endswith("File name too long")
     assert (folder / "out/deep").read_text() == "mine"
 
 
@@ -222,10 +222,10 @@ def test_a_run_that_takes_too_long_ends_alone(folder: Path) -> None:
     words = ["parts/a.nc", "parts/long.nc", *ONE, "--command", "time"]
     a, long = told(folder, *words, "--time-limit", "400ms")["rows"]
     assert (a["ended"], long["ended"]) == ("ok", "failed")
-    assert long["said"] == "stopped after 0.4 s (--time-limit)"
+    assert long["answer"] == "stopped after 0.4 s (--time-limit)"
     a, long = told(folder, *words, "--memory-limit", "8M", "--resume")["rows"]
     assert (a["ended"], a["earlier"], long["ended"]) == ("ok", True, "failed")
-    assert "needs more than 8 MB (--memory-limit)" in long["said"]
+    assert "needs more than 8 MB (--memory-limit)" in long["answer"]
     a, long = told(folder, *words, "--resume", code=0)["rows"]
     assert (long["ended"], long["earlier"]) == ("ok", False)
 
@@ -251,7 +251,7 @@ def test_a_killed_process_is_a_row(folder: Path) -> None:
     long, a = told(folder, "parts/long.nc", "parts/a.nc", *ONE)["rows"]
     killer.join()
     assert killed
-    assert (long["ended"], long["said"]) == ("failed", "the process that ran it was killed")
+    assert (long["ended"], long["answer"]) == ("failed", "the process that ran it was killed")
     assert a["ended"] == "ok"
 
 

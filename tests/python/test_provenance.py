@@ -452,12 +452,12 @@ def test_verdict_rests_on_a_filter_that_nobody_measured() -> None:
     judged = convert(CIRCLE, machine)
     rows = [row for row in judged.conversion.parameter_sensitivity if row.key == "controller.shaped_time_constant_s"]
     (row,) = rows
-    assert (row.origin, row.value, row.moved) == ("assumed", "0.0 s", "0.024 s")
+    assert (row.origin, row.value, row.tested_value) == ("assumed", "0.0 s", "0.024 s")
     assert row.figure == "contour error of the response"
     before, after = (replayed(judged, judged.modes, ms)[0] for ms in (0, 24))
     assert row.figure_um == pytest.approx(before, rel=0.05, abs=0.1)
-    assert row.moved_um == pytest.approx(after, rel=0.05)
-    assert row.moved_um > row.figure_um + 1.0
+    assert row.tested_um == pytest.approx(after, rel=0.05)
+    assert row.tested_um > row.figure_um + 1.0
 
 
 def test_verdict_rests_on_a_mode_of_another_machine() -> None:
@@ -467,21 +467,21 @@ def test_verdict_rests_on_a_mode_of_another_machine() -> None:
         keys = {"axes.x.modes.1.frequency_uncertainty_percent": stated, "verdict.mode_uncertainty": False}
         judged = convert(PART, unmeasured_machine(keys, inherited))
         (row,) = judged.conversion.parameter_sensitivity
-        assert (row.key, row.origin, row.moved[1:]) == (*list(inherited), "inherited", f"{percent:g} %")
+        assert (row.key, row.origin, row.tested_value[1:]) == (*list(inherited), "inherited", f"{percent:g} %")
         x, y, z = judged.modes
         left = []
         for sign in (-1.0, 1.0):
             moved = [replace(m, frequency_hz=m.frequency_hz * (1.0 + sign * percent / 100.0)) for m in x]
             left.append(replayed(judged, [moved, y, z], 0))
         place = ["contour error of the response", *(f"residual vibration {axis}" for axis in "XYZ")].index(row.figure)
-        assert row.moved_um == pytest.approx(max(each[place] for each in left), rel=0.05, abs=0.02)
+        assert row.tested_um == pytest.approx(max(each[place] for each in left), rel=0.05, abs=0.02)
         assert row.figure_um == pytest.approx(replayed(judged, judged.modes, 0)[place], rel=0.05, abs=0.02)
-        assert row.moved_um > 1.2 * row.figure_um
+        assert row.tested_um > 1.2 * row.figure_um
 
 
 def test_what_is_measured_is_nothing_to_rest_on() -> None:
     judged = convert(PART, unmeasured_machine({}, {}))
-    assert (judged.conversion.parameter_sensitivity, judged.conversion.unmeasured_tried) == ((), 0)
+    assert (judged.conversion.parameter_sensitivity, judged.conversion.unverified_parameters_tested) == ((), 0)
     assert not any("rests on" in str(table.title) for table in judged.conversion.tables())
 
 
@@ -495,10 +495,10 @@ def test_verdict_ends_with_what_it_rests_on(started: Path, tmp_path: Path, capsy
     keys = [row["key"] for row in rows]
     assert "axes.x.modes.1.frequency_hz" in keys
     assert "axes.z.modes" not in keys  # Z stands still
-    moves = [(row["moved_um"] - row["figure_um"]) / row["limit_um"] for row in rows]
+    moves = [(row["tested_um"] - row["figure_um"]) / row["limit_um"] for row in rows]
     assert moves == sorted(moves, reverse=True)
     assert min(moves) >= 0.01
-    assert all(row["moved_um"] >= row["figure_um"] for row in rows)
+    assert all(row["tested_um"] >= row["figure_um"] for row in rows)
     assert len(keys) == len(set(keys)) <= 8
     assert shown.index("sensitivity to unverified parameters") > shown.index("operating conditions:")
 
@@ -506,7 +506,7 @@ def test_verdict_ends_with_what_it_rests_on(started: Path, tmp_path: Path, capsy
 def test_an_axis_of_which_nobody_knows_is_tried_with_a_mode() -> None:
     keys = {"axes.y.modes": [], "axes.z.modes": []}
     (row,) = convert(PART, unmeasured_machine(keys, {})).conversion.parameter_sensitivity
-    assert (row.key, row.value, row.moved) == ("axes.y.modes", "none", "a mode of 40 Hz")
+    assert (row.key, row.value, row.tested_value) == ("axes.y.modes", "none", "a mode of 40 Hz")
     assert convert(PART, unmeasured_machine(keys | {"axes.y.rigid": True}, {})).conversion.parameter_sensitivity == ()
 
 

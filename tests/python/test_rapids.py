@@ -240,10 +240,10 @@ def test_every_rapid_is_accounted_for() -> None:
     assert rapids["found"] == sum(
         line.startswith(("G00", "N10", "X20. Y5", "Z2", "Z50")) for line in PROGRAM.split("\n")
     )
-    assert rapids["found"] == rapids["shaped"] + sum(rapids["kept"].values())
-    assert rapids["kept"]["start position not known"] == 1  # Z50.
-    assert rapids["kept"]["other words in its block"] == 1  # S and M
-    assert rapids["kept"]["no cut follows"] == 1  # the last retract
+    assert rapids["found"] == rapids["shaped"] + sum(rapids["left_unchanged"].values())
+    assert rapids["left_unchanged"]["start position not known"] == 1  # Z50.
+    assert rapids["left_unchanged"]["other words in its block"] == 1  # S and M
+    assert rapids["left_unchanged"]["no cut follows"] == 1  # the last retract
     assert rapids["settle_band_um"] == BAND_UM
 
 
@@ -257,7 +257,7 @@ def test_where_nothing_is_gained_the_text_stays(damping_ratio: float) -> None:
     conversion = converted(text, machine)
     plain = convert(Program.from_text(text, machine), machine, shape_all=True)
     assert conversion.to_dict()["rapids"]["shaped"] == 0
-    assert conversion.to_dict()["rapids"]["kept"]["no time gained"] >= 1
+    assert conversion.to_dict()["rapids"]["left_unchanged"]["no time gained"] >= 1
     assert conversion.to_dict()["rapids"]["time_saved_s"] == 0.0
     assert conversion.text == plain.text
     assert conversion.to_dict()["warnings"] == plain.to_dict()["warnings"]
@@ -342,8 +342,8 @@ def test_a_rapid_in_inches_leaves_a_height_in_mm_where_it_is() -> None:
 def test_a_rapid_that_is_no_plain_one_stays(text: str, reason: str) -> None:
     conversion = converted(text)
     rapids = conversion.to_dict()["rapids"]
-    assert rapids["kept"].get(reason, 0) >= 1, rapids
-    assert rapids["found"] == rapids["shaped"] + sum(rapids["kept"].values())
+    assert rapids["left_unchanged"].get(reason, 0) >= 1, rapids
+    assert rapids["found"] == rapids["shaped"] + sum(rapids["left_unchanged"].values())
     assert rapids["shaped"] == 0
     off = with_tables(Machine.load("vx500"), emission={"header": False})
     assert conversion.text == convert(Program.from_text(text, off), off, shape_all=True).text
@@ -356,7 +356,7 @@ def test_compensated_rapids_stay() -> None:
     rapids = convert(Program.from_text(text, machine, expand_compensation=False), machine, shape_all=True).to_dict()[
         "rapids"
     ]
-    assert rapids["kept"]["cutter compensation"] == 1
+    assert rapids["left_unchanged"]["cutter compensation"] == 1
     assert rapids["shaped"] == 0
 
 
@@ -364,7 +364,7 @@ def test_nothing_is_shaped_where_no_cut_is() -> None:
     text = one_rapid("G00 X80.").replace("F500", "F.5")
     rapids = converted(text).to_dict()["rapids"]
     assert rapids["shaped"] == 0
-    assert rapids["kept"]["no cut of the program is shaped"] >= 1
+    assert rapids["left_unchanged"]["no cut of the program is shaped"] >= 1
 
 
 def test_a_long_approach_leaves_nothing_to_gain() -> None:
@@ -445,7 +445,7 @@ def test_other_controllers(controller: dict[str, Any]) -> None:
     conversion = converted(text, with_tables(Machine.load("vx500"), controller=controller))
     rapids = conversion.to_dict()["rapids"]
     check_text(conversion, text)
-    assert rapids["found"] == rapids["shaped"] + sum(rapids["kept"].values())
+    assert rapids["found"] == rapids["shaped"] + sum(rapids["left_unchanged"].values())
     for move in rapids["moves"]:
         assert not move["misses"]
         assert rapids["time_saved_s"] > 0.0
@@ -473,7 +473,7 @@ def test_a_budget_comes_first() -> None:
     plain = convert(Program.from_text(text, off), off, shape_all=True)
     tight = converted(text, budget=Budget(max_bytes=len(full.text) - 1))
     assert tight.text == plain.text
-    assert tight.to_dict()["rapids"]["kept"]["budget"] == 1
+    assert tight.to_dict()["rapids"]["left_unchanged"]["budget"] == 1
     assert tight.to_dict()["rapids"]["time_saved_s"] == 0.0
     assert converted(text, budget=Budget(max_bytes=len(full.text))).text == full.text
     slow = converted(text, block_period_s=0.005, budget=Budget(max_blocks_per_second=150))

@@ -36,10 +36,10 @@ def test_the_page_holds_the_json_and_both_programs(tmp_path: Path) -> None:
     text = (tmp_path / "page.html").read_text()
     assert "<script>alert" not in text
     assert html.escape(found["result"]["at_the_control"][0]["text"]) in text
-    made = found["result"]["made"]
-    assert {file["role"] for file in made["files"]} == {"input", "machine", "output"}
+    provenance = found["result"]["provenance"]
+    assert {file["role"] for file in provenance["files"]} == {"input", "machine", "output"}
     sheet = text[text.index('id="sheet"') :]
-    assert next(file["sha256"] for file in made["files"] if file["role"] == "output") in sheet
+    assert next(file["sha256"] for file in provenance["files"] if file["role"] == "output") in sheet
 
 
 def test_a_page_made_later_is_the_same(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_a_page_made_later_is_the_same(tmp_path: Path) -> None:
         (lambda folder: (folder / "part.nc").write_text("M30\n"), "input part.nc was changed since"),
         (lambda folder: (folder / "out.nc").unlink(), "output out.nc is not where it was"),
         (lambda folder: edit(folder / "r.json", by="shapegcode 0.0.9"), "made by shapegcode 0.0.9; this page by"),
-        (lambda folder: edit(folder / "r.json", format=7), "made.format = 7: written by"),
+        (lambda folder: edit(folder / "r.json", format=7), "provenance.format = 7: written by"),
         (lambda folder: edit(folder / "r.json", command="shapegcode convert --unheard"), "its command cannot be read"),
         (lambda folder: edit(folder / "r.json", command="shapegcode machine init -o x.toml"), "its command cannot"),
     ],
@@ -87,12 +87,12 @@ def test_what_has_changed_since_is_said_on_the_page_and_here(change: Any, said: 
 
 def edit(file: Path, **values: object) -> None:
     report = json.loads(file.read_text())
-    report["made"].update(values)
+    report["provenance"].update(values)
     file.write_text(json.dumps(report))
 
 
 def test_what_is_no_result_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
-    """A file cut off, one without `made`, two pages into one file, a page over its own JSON."""
+    """A file cut off, one without `provenance`, two pages into one file, a page over its own JSON."""
     file = converted(tmp_path)
     whole = file.read_text()
     (tmp_path / "cut.json").write_text(whole[:500])
@@ -100,7 +100,7 @@ def test_what_is_no_result_is_refused_and_nothing_is_written(tmp_path: Path) -> 
     (tmp_path / "old.json").write_text(json.dumps({"cycle_time_s": 1.0}))
     for words, said in (
         (["cut.json"], "the file ends in the middle"),
-        (["old.json"], "old.json: key made is missing"),
+        (["old.json"], "old.json: key provenance is missing"),
         (["r.json", "r.json", "-o", "both.html"], "2 results need a page each"),
         (["r.json", "-o", "r.json"], "would overwrite"),
         (["none.json"], "none.json: no such file"),

@@ -31,7 +31,7 @@ def test_schemas_are_schemas_and_say_what_each_key_means(name: str) -> None:
         silent = [
             key
             for key, entry in where.get("properties", {}).items()
-            if "description" not in entry and key not in {"warnings", "plots", "output", "made"}
+            if "description" not in entry and key not in {"warnings", "plots", "output", "provenance"}
         ]
         assert silent == [], name
 

@@ -88,7 +88,7 @@ def test_every_program_has_its_table_and_its_place_in_the_json(words: list[str],
     ours = {key: value for key, value in reports[1].items() if key != "program_address"}
     # Alone it is told that the file holds others.
     for report in (one, ours):
-        for key in ("warnings", "findings", "counts", "counts_by_code", "programs", "made"):
+        for key in ("warnings", "findings", "counts", "counts_by_code", "programs", "provenance"):
             report.pop(key, None)
     assert ours == one
     assert told.returncode >= alone.returncode

@@ -53,7 +53,7 @@ def test_json_of_a_grid(capsys: pytest.CaptureFixture[str]) -> None:
 def test_plus_minus_in_ascii_is_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     few = ("--block-period", "5ms", *FEW)
     ours = asked(capsys, "--mode", "46:0.02+-5%", "--mode", "131:0.02", *few)
-    assert {**ours, "made": None} == {**asked(capsys, *PAPER, *few), "made": None}
+    assert {**ours, "provenance": None} == {**asked(capsys, *PAPER, *few), "provenance": None}
 
 
 def test_a_file_and_the_table(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

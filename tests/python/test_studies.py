@@ -28,7 +28,7 @@ from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.results.json import schema
 from shapegcode.studies import replay as replays
 from shapegcode.studies.replay import SamplesJob, simulate_all
-from shapegcode.studies.study import decides, interval_of
+from shapegcode.studies.study import interval_of, parameter_sensitivity
 from shapegcode.studies.study_file import StudyFileError
 from shapegcode.studies.varied import sampled_columns, varied_values
 
@@ -137,7 +137,7 @@ def test_sobol_indices_of_a_sum_are_its_shares_of_the_variance() -> None:
     varied = varied_values(VX500, keys)
     columns = sampled_columns(varied, 10_000, "sobol", 0, indices=True)
     x, y = np.array(columns[0], float) - 40.0, np.array(columns[1], float) - 120.0
-    found = decides(varied, columns, 3.0 * x + y / 2.0, indices=True, seed=0)
+    found = parameter_sensitivity(varied, columns, 3.0 * x + y / 2.0, indices=True, seed=0)
     # Variances 9 · 100 / 12 and 100 / 12.
     assert [each.key for each in found] == [X_HZ, Y_HZ, X_DAMPING]
     assert [each.first for each in found] == pytest.approx([0.9, 0.1, 0.0], abs=0.02)
@@ -276,11 +276,13 @@ def test_the_command_says_what_python_says(tmp_path: Path) -> None:
 def test_pictures_show_what_decides_and_the_band(tmp_path: Path) -> None:
     found = paper_study()
     bars = found.plot("study-tornado")
-    assert [label.get_text() for label in bars.get_yticklabels()] == [each.key for each in found.decides]
-    assert [bar.get_width() for bar in bars.patches] == pytest.approx([each.high - each.low for each in found.decides])
+    assert [label.get_text() for label in bars.get_yticklabels()] == [each.key for each in found.parameter_sensitivity]
+    assert [bar.get_width() for bar in bars.patches] == pytest.approx(
+        [each.high - each.low for each in found.parameter_sensitivity]
+    )
     bands = found.plot("study-bands")
     (median,) = [line for line in bands.lines if len(line.get_xdata()) > 2]
-    first = next(bins for bins in found.curves if bins.key == found.decides[0].key)
+    first = next(bins for bins in found.curves if bins.key == found.parameter_sensitivity[0].key)
     assert list(median.get_ydata()) == [each.median for each in first.bins]
 
 

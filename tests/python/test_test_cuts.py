@@ -391,7 +391,7 @@ def test_the_api_does_what_the_command_does(tmp_path: Path) -> None:
     found = sg.fit_test_cut(design.cut, files)
     assert isinstance(found, sg.TaperResult)
     report = fitted(tmp_path, f"2={files[2]}", f"1={files[1]}", code=found.exit_code)
-    assert report.pop("made")["result"] == "TaperResult"
+    assert report.pop("provenance")["result"] == "TaperResult"
     assert report == {**found.to_dict(), "program": "CUT.NC"}
     assert tomllib.loads(found.to_toml())["cutting"]["chip_thickness"] == "mean"
     assert max(map(len, str(found.tables()[0]).splitlines())) <= 80

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, ClassVar, Literal
 
-from shapegcode.results.json import Streamed, hidden, plain
+from shapegcode.results.json import OldNames, Streamed, hidden, plain
 from shapegcode.results.outcome import Pair
 from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
@@ -24,14 +24,14 @@ _LISTED = 2000
 
 
 @dataclass(frozen=True)
-class BatchRow:
+class BatchRow(OldNames):
     """One program on one machine.
 
     Attributes:
         program: as it was given.
         machine: likewise.
         ended: how.
-        said: the first line of the command, or why there is none.
+        answer: the first line of the command, or why there is none.
         residual_um: residual vibration of the worst axis; None: the command does not find it.
         contour_um: contour error, likewise.
         cycle_time_s: likewise; of a command that writes no program both are the same.
@@ -48,7 +48,7 @@ class BatchRow:
     program: str
     machine: str
     ended: Ended
-    said: str
+    answer: str
     residual_um: Pair[float] | None
     contour_um: Pair[float] | None
     cycle_time_s: Pair[float] | None
@@ -233,7 +233,7 @@ class Batch(Result):
             Column("program", value="program", left=True, link=self._link, priority=0),
             Column("machine", value="machine", left=True, priority=4),
         )
-        why = (Column("", value="ended", left=True, priority=0), Column("why", value="said", text=True))
+        why = (Column("", value="ended", left=True, priority=0), Column("why", value="answer", text=True))
         tables = []
         if bad:
             left = len(self.rows) - counts["ok"] - shown

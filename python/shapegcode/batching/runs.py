@@ -27,7 +27,7 @@ from shapegcode.batching.process import BatchJob, JobOutcome, Packed
 from shapegcode.batching.result import BatchRow, Ended, figures_of
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import write_bytes
-from shapegcode.results.json import MadeFile, plain
+from shapegcode.results.json import ProvenanceFile, current_keys, plain
 from shapegcode.results.outcome import Pair
 from shapegcode.results.page.html import is_shared
 
@@ -102,7 +102,7 @@ class KeptRows(Sequence[BatchRow]):
 
     def _row(self, rank: int) -> BatchRow:
         self._stream.seek(self._places[rank])
-        row = json.loads(self._stream.readline())
+        row = current_keys(BatchRow, json.loads(self._stream.readline()))
         job, base = self._planned.job(rank), self._planned.base
         files = {name: base.path_of(row[name]) for name in ("output", "report", "page") if row[name]}
         given = {"program": job.program, "machine": job.machine}
@@ -242,7 +242,9 @@ class Runs:
         row = self._manifest.earlier(key) if self._resume else None
         if row is None or row.get("fingerprint") != fingerprint or row["ended"] == "failed":
             return False
-        if any(MadeFile.of("wrote", self._path_of(name)).sha256 != sha256 for name, sha256 in row["files"].items()):
+        if any(
+            ProvenanceFile.of("wrote", self._path_of(name)).sha256 != sha256 for name, sha256 in row["files"].items()
+        ):
             return False
         self.earlier[rank] = 1
         self._count(rank, self._manifest.kept_at(key), row["ended"])

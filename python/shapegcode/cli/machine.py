@@ -208,8 +208,8 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
             )
     matters = tuple(
         OpenValue(
-            row.key, row.value, row.origin, row.moved,
-            f"{row.figure} {row.figure_um:.1f} → {row.moved_um:.1f}, limit {row.limit_um:.1f} µm", row.share,
+            row.key, row.value, row.origin, row.tested_value,
+            f"{row.figure} {row.figure_um:.1f} → {row.tested_um:.1f}, limit {row.limit_um:.1f} µm", row.share,
         )
         for row in rows
     )  # fmt: skip

@@ -19,16 +19,16 @@ from shapegcode.machine import Machine
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.program.compensation import read_for_conversion
-from shapegcode.results.json import Made, MadeFile, file_hash
+from shapegcode.results.json import Provenance, ProvenanceFile, file_hash
 
 _WITH_MOTION = ("Check", "Conversion", "CycleTime", "FeedSchedule", "Measurement", "Simulation")
 
 
-def changes(made: Made, folder: Path) -> tuple[dict[tuple[str, str], Path], list[str]]:
+def changes(provenance: Provenance, folder: Path) -> tuple[dict[tuple[str, str], Path], list[str]]:
     """Look for the files of a run where they were, and in a folder."""
     found: dict[tuple[str, str], Path] = {}
     problems = []
-    for file in made.files:
+    for file in provenance.files:
         if file.role in ("wrote", "output of all"):
             continue
         place, problem = _looked_up(file, folder)
@@ -39,9 +39,9 @@ def changes(made: Made, folder: Path) -> tuple[dict[tuple[str, str], Path], list
     return found, problems
 
 
-def _looked_up(file: MadeFile, folder: Path) -> tuple[Path | None, str]:
+def _looked_up(file: ProvenanceFile, folder: Path) -> tuple[Path | None, str]:
     if file.role in MACHINES and file.name in Machine.builtin_names() and not Path(file.name).exists():
-        now = MadeFile.of(file.role, file.name, Machine.builtin_text(file.name).encode()).sha256
+        now = ProvenanceFile.of(file.role, file.name, Machine.builtin_text(file.name).encode()).sha256
         changed = f"the built-in machine {file.name} is another one in this version: motion is not shown"
         return Path(file.name), "" if now == file.sha256 else changed
     places = [place for place in (Path(file.name), folder / Path(file.name).name) if place.is_file()]
@@ -61,16 +61,16 @@ def _looked_up(file: MadeFile, folder: Path) -> tuple[Path | None, str]:
 
 
 def simulated_again(
-    made: Made, found: Mapping[tuple[str, str], Path], report: Mapping[str, Any]
+    provenance: Provenance, found: Mapping[tuple[str, str], Path], report: Mapping[str, Any]
 ) -> tuple[SimulatedPrograms | None, str]:
     """Read the programs and the machine of a run again, with the options that it was run with."""
-    if made.result not in _WITH_MOTION or not made.command or "program_address" in report:
+    if provenance.result not in _WITH_MOTION or not provenance.command or "program_address" in report:
         return None, ""
-    args = _typed(made.command)
+    args = _typed(provenance.command)
     if args is None or not hasattr(args, "machine"):
-        return None, f"its command cannot be read by this version: {made.command}; motion is not shown"
+        return None, f"its command cannot be read by this version: {provenance.command}; motion is not shown"
     try:
-        return _read_again(made, found, args, str(report.get("plant", "modal"))), ""
+        return _read_again(provenance, found, args, str(report.get("plant", "modal"))), ""
     except (ShapegcodeError, OSError) as error:
         return None, f"{error}: motion is not shown"
 
@@ -94,7 +94,7 @@ def _typed(command: str) -> argparse.Namespace | None:
 
 
 def _read_again(
-    made: Made, found: Mapping[tuple[str, str], Path], args: argparse.Namespace, plant: str
+    provenance: Provenance, found: Mapping[tuple[str, str], Path], args: argparse.Namespace, plant: str
 ) -> SimulatedPrograms | None:
     inputs = [place for (role, _), place in found.items() if role in ("input", "inputs")]
     if not inputs:
@@ -102,15 +102,15 @@ def _read_again(
     args.machine = str(found.get(("machine", str(args.machine)), args.machine))
     keys = getattr(importlib.import_module(f"shapegcode.cli.{args.command}"), "MACHINE_KEYS", {})
     machine = overridden(load_machine(args), args, keys)
-    conversion = made.result == "Conversion"
+    conversion = provenance.result == "Conversion"
     read = read_for_conversion if conversion else Program.read
     number = None if getattr(args, "program", None) == "all" else getattr(args, "program", None)
     original = read(inputs[0], machine, program_number=number)
-    made_of_it = next((place for (role, _), place in found.items() if role == "output"), None)
+    emitted_file = next((place for (role, _), place in found.items() if role == "output"), None)
     labels = ("original", "emitted")
-    if made.result == "Measurement":
-        made_of_it = inputs[1] if len(inputs) > 1 else None
-        labels = (inputs[0].name, made_of_it.name if made_of_it is not None else "")
-    emitted = None if made_of_it is None else Program.read(made_of_it, machine)
+    if provenance.result == "Measurement":
+        emitted_file = inputs[1] if len(inputs) > 1 else None
+        labels = (inputs[0].name, emitted_file.name if emitted_file is not None else "")
+    emitted = None if emitted_file is None else Program.read(emitted_file, machine)
     plant = machine.verdict.plant if conversion else plant
     return SimulatedPrograms(original, machine, emitted, labels=labels, plant=plant)

@@ -72,22 +72,24 @@ def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[flo
     from shapegcode.results.json import this_version
     from shapegcode.results.outcome import NotKeptError
     from shapegcode.results.page.default import raw_page
-    from shapegcode.results.revive import made_of, revived
+    from shapegcode.results.revive import provenance_in, revived
 
     try:
-        made = made_of(report)
-        problems = [] if made.by == this_version() else [f"made by {made.by}; this page by {this_version()}"]
-        found, changed = changes(made, source.parent)
+        provenance = provenance_in(report)
+        problems = (
+            [] if provenance.by == this_version() else [f"made by {provenance.by}; this page by {this_version()}"]
+        )
+        found, changed = changes(provenance, source.parent)
         problems += changed
-        simulated, why = (None, "") if changed else simulated_again(made, found, report)
+        simulated, why = (None, "") if changed else simulated_again(provenance, found, report)
         problems += [why] if why else []
         result = revived(report, {"simulated": simulated})
     except ArgumentError as error:
-        if not isinstance(report.get("made"), dict):
+        if not isinstance(report.get("provenance", report.get("made")), dict):
             raise ArgumentError(f"{source}: {error}") from None
         return raw_page(report, str(error)), ""
     try:
-        page = result.page(made=made, problems=problems, on_progress=on_progress)
+        page = result.page(provenance=provenance, problems=problems, on_progress=on_progress)
     except NotKeptError as error:
-        return raw_page(report, str(error)), made.result
-    return replace(page, report=report), made.result
+        return raw_page(report, str(error)), provenance.result
+    return replace(page, report=report), provenance.result

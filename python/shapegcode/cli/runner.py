@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
 
-    from shapegcode.results.json import Made, MadeFile
+    from shapegcode.results.json import Provenance, ProvenanceFile
     from shapegcode.results.result import Result
     from shapegcode.results.table import Table
 
@@ -175,14 +175,14 @@ def _write_page(
 
     from shapegcode.results.json import plain
 
-    made = made_by(result, args, output, wrote)
-    report["made"] = plain(made)
+    provenance = provenance_of(result, args, output, wrote)
+    report["provenance"] = plain(provenance)
     if html is None:
         return []
     from shapegcode.results.page.html import save
 
     with progress(f"writing {html}", args) as bar:
-        page = result.page(made=made, on_progress=bar.update)
+        page = result.page(provenance=provenance, on_progress=bar.update)
         return save(replace(page, report=report), html, getattr(args, "html_script", "inline"))
 
 
@@ -288,33 +288,33 @@ def given_files(args: argparse.Namespace) -> Iterator[tuple[str, str]]:
                 yield role, str(entry)
 
 
-def made_by(
+def provenance_of(
     result: Result,
     args: argparse.Namespace,
     output: tuple[str | Path, bytes | memoryview] | None = None,
     wrote: Sequence[str | Path] = (),
-) -> Made:
-    """Of what a command made its result."""
-    from shapegcode.results.json import FORMAT, Made, MadeFile, this_version
+) -> Provenance:
+    """Command, version and files of a result."""
+    from shapegcode.results.json import FORMAT, Provenance, ProvenanceFile, this_version
 
     files = [_read(role, name) for role, name in given_files(args)]
     if output is not None:
         # Programs of one file are written together, behind the last of them.
         alone = getattr(args, "several", None) is None
-        files.append(MadeFile.of("output" if alone else "output of all", output[0], output[1]))
-    files += [MadeFile.of("wrote", name) for name in wrote if Path(name).is_file()]
-    return Made(type(result).__name__, this_version(), FORMAT, _command(args), tuple(files))
+        files.append(ProvenanceFile.of("output" if alone else "output of all", output[0], output[1]))
+    files += [ProvenanceFile.of("wrote", name) for name in wrote if Path(name).is_file()]
+    return Provenance(type(result).__name__, this_version(), FORMAT, _command(args), tuple(files))
 
 
-def _read(role: str, name: str) -> MadeFile:
-    from shapegcode.results.json import MadeFile
+def _read(role: str, name: str) -> ProvenanceFile:
+    from shapegcode.results.json import ProvenanceFile
 
     if role in MACHINES and not Path(name).exists():
         from shapegcode.machine import Machine
 
         if name in Machine.builtin_names():
-            return MadeFile.of(role, name, Machine.builtin_text(name).encode())
-    return MadeFile.of(role, name)
+            return ProvenanceFile.of(role, name, Machine.builtin_text(name).encode())
+    return ProvenanceFile.of(role, name)
 
 
 def _command(args: argparse.Namespace) -> str:

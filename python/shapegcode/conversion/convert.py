@@ -297,8 +297,8 @@ def _within_price(plan: ConversionPlan, shaped: Shaped, rapids: ShapedRapids) ->
     if not rapids.outcome.shaped or added_s <= price_s:
         return rapids
     outcome, count = rapids.outcome, rapids.outcome.shaped
-    kept = {**outcome.kept, "the price of the program": count}
-    outcome = replace(outcome, shaped=0, kept=kept, time_saved_s=0.0, blocks=0, slowed_blocks=0, moves=())
+    left = {**outcome.left_unchanged, "the price of the program": count}
+    outcome = replace(outcome, shaped=0, left_unchanged=left, time_saved_s=0.0, blocks=0, slowed_blocks=0, moves=())
     why = f"{count} rapids stay rapids: with them as cutting moves the program would take {added_s:.2f} s more"
     return replace(
         rapids, emitted=shaped.emitted, placed=shaped.written.placed, outcome=outcome, extra_s=0.0,

@@ -134,7 +134,7 @@ def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> 
         rapids=shaped.rapids.outcome if shaped.rapids is not None else None,
         least_gain_um=machine.shaping.least_gain_um,
         parameter_sensitivity=sensitivity,
-        unmeasured_tried=tried,
+        unverified_parameters_tested=tried,
         at_the_control=at_the_control(
             shaped.emitted,
             shaped.written.placed,

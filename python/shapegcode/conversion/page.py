@@ -15,7 +15,7 @@ from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled import ScheduledConversion
 from shapegcode.conversion.tables import CutOutcome, before_after_table, sensitivity_table
 from shapegcode.machine import Machine
-from shapegcode.results.json import Made
+from shapegcode.results.json import Provenance
 from shapegcode.results.outcome import Pair
 from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
 from shapegcode.results.page.model import (
@@ -53,7 +53,7 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
         return "amber", next(conversion.misses(), conversion.reason)
     if conversion.nothing_shaped:
         return "calm", conversion.reason
-    turning = [row.key for row in conversion.parameter_sensitivity if row.moved_um > row.limit_um]
+    turning = [row.key for row in conversion.parameter_sensitivity if row.tested_um > row.limit_um]
     if turning:
         return "amber", f"an unverified parameter of this machine could change the verdict: {turning[0]}"
     if count := len(conversion.warnings):
@@ -61,7 +61,7 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
     return "green", f"every tolerance is kept in all {sum(case.counts for case in conversion.cases)} cases that count"
 
 
-def sections_of(conversion: Conversion, made: Made | None = None) -> Iterator[Section]:
+def sections_of(conversion: Conversion, provenance: Provenance | None = None) -> Iterator[Section]:
     """The sections of the page."""
     how = "Each card: original → emitted. The limit applies to the emitted program."
     yield Section("gain", "What it gains", (Figures(tuple(_figures(conversion))),), how=how)
@@ -73,10 +73,10 @@ def sections_of(conversion: Conversion, made: Made | None = None) -> Iterator[Se
     if conversion.cases:
         yield _cases(conversion)
     if conversion.parameter_sensitivity:
-        table = sensitivity_table(conversion.parameter_sensitivity, conversion.unmeasured_tried)
+        table = sensitivity_table(conversion.parameter_sensitivity, conversion.unverified_parameters_tested)
         how = "Measure the topmost first: it moves the verdict furthest. Red: it could turn it."
         yield Section("rests", "Sensitivity to unverified parameters", (table,), how=how)
-    yield from _price(conversion, made)
+    yield from _price(conversion, provenance)
     yield _times(conversion)
     if isinstance(conversion, ScheduledConversion):
         yield Section("feeds", "Feeds and cutting forces", tuple(conversion.feed_schedule.tables()), printed=False)
@@ -87,10 +87,10 @@ def sections_of(conversion: Conversion, made: Made | None = None) -> Iterator[Se
         yield _machine(conversion.simulated.machine)
     yield from pictures_of(conversion, ("path", "vibration"))
     if conversion.at_the_control:
-        yield _sheet(conversion, made)
+        yield _sheet(conversion, provenance)
 
 
-def _picker(conversion: Conversion, made: Made | None) -> CutPicker:
+def _picker(conversion: Conversion, provenance: Provenance | None) -> CutPicker:
     """The cuts that can be chosen; figures of a cut that was not shaped are not known."""
     rows = [
         CutRow(
@@ -100,7 +100,11 @@ def _picker(conversion: Conversion, made: Made | None) -> CutPicker:
         )
         for cut in conversion.cuts
     ]  # fmt: skip
-    command = "shapegcode convert IN -m MACHINE -o OUT" if made is None or not made.command else made.command
+    command = (
+        "shapegcode convert IN -m MACHINE -o OUT"
+        if provenance is None or not provenance.command
+        else provenance.command
+    )
     command = re.sub(r" --(?:only|leave)[ =]\S+", "", command)
     totals = CutTotals(
         conversion.cycle_time_s.original,
@@ -115,11 +119,11 @@ def _tried(pair: Pair[N], cut: CutOutcome) -> Pair[N | None]:
     return Pair(pair.original, pair.emitted if cut.is_shaped else None)
 
 
-def _price(conversion: Conversion, made: Made | None) -> Iterator[Section]:
+def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[Section]:
     """Cut by cut, and what other tolerances would cost."""
     if len(conversion.cuts) > 1:
         how = "Select the cuts to shape: the sums are updated, and the command below shapes only them."
-        parts, many = (_picker(conversion, made),), len(conversion.cuts) > _SHOWN_CUTS
+        parts, many = (_picker(conversion, provenance),), len(conversion.cuts) > _SHOWN_CUTS
         yield Section("cuts", "Cut by cut", parts, how=how, folded=many, printed=False)
     if conversion.tolerance_curve is not None:
         sentence = conversion.tolerance_curve.sentence
@@ -233,9 +237,9 @@ def _machine(machine: Machine) -> Section:
     return Section("machine", "Machine data used", (table,), how=how, folded=True, printed=False)
 
 
-def _sheet(conversion: Conversion, made: Made | None) -> Section:
+def _sheet(conversion: Conversion, provenance: Provenance | None) -> Section:
     """The run sheet: what the operator takes to the machine, on one page."""
-    output = None if made is None else made.file("output")
+    output = None if provenance is None else provenance.file("output")
     name = f"{Path(conversion.program).name}, shaped" if output is None else Path(output.name).name
     if output is not None:
         sha256 = output.sha256
@@ -244,7 +248,7 @@ def _sheet(conversion: Conversion, made: Made | None) -> Section:
     rows = [("program to load", f"{name}, for {conversion.machine}, {conversion.bytes_emitted} bytes")]
     rows.append(("SHA-256 of the program", sha256))
     for role, name in (("input", "original program"), ("machine", "machine file")):
-        if made is not None and (file := made.file(role)) is not None:
+        if provenance is not None and (file := provenance.file(role)) is not None:
             rows.append((name, f"{Path(file.name).name}, SHA-256 {file.sha256 or 'not known'}"))
     rows += [(note.topic, note.text) for note in conversion.at_the_control]
     strong = frozenset(topic for topic, _ in rows if topic in _RUN_FIRST or "override" in topic)

@@ -25,7 +25,7 @@ from shapegcode.conversion.tables import (
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.program.comparison import KindCount, ProgramDifference
-from shapegcode.results.json import Made, exact, hidden, sparse
+from shapegcode.results.json import Provenance, exact, hidden, sparse
 from shapegcode.results.outcome import CONTOURS, ContourError, Pair, Plot, Xyz
 from shapegcode.results.result import Result
 from shapegcode.results.table import Table
@@ -95,7 +95,7 @@ class Conversion(ProgramFigures, Result):
         least_gain_um: what is too little.
         parameter_sensitivity: values that were not measured on this machine, by how far each moves the deciding figure
             to its limit.
-        unmeasured_tried: how many such values were moved.
+        unverified_parameters_tested: how many such values were changed, one at a time.
         at_the_control: caution, before you run when it is loaded and run; empty where nothing was shaped.
         restart_points: blocks inside of shaped cuts at which the control can begin.
         emitted: the same, read back.
@@ -130,7 +130,7 @@ class Conversion(ProgramFigures, Result):
     rapids: RapidsOutcome | None = field(default=None, metadata=sparse())
     least_gain_um: float = 0.0
     parameter_sensitivity: tuple[Sensitivity, ...] = ()
-    unmeasured_tried: int = 0
+    unverified_parameters_tested: int = 0
     at_the_control: tuple[ControlNote, ...] = ()
     restart_points: tuple[RestartPoint, ...] = ()
     emitted: Program = field(metadata=hidden())
@@ -310,7 +310,9 @@ class Conversion(ProgramFigures, Result):
             return [*cuts, *curve] if any(cut.misses for cut in self.cuts) else cuts
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
         rests = (
-            [sensitivity_table(self.parameter_sensitivity, self.unmeasured_tried)] if self.parameter_sensitivity else []
+            [sensitivity_table(self.parameter_sensitivity, self.unverified_parameters_tested)]
+            if self.parameter_sensitivity
+            else []
         )
         points = [restart_table(self.restart_points)] if self.restart_points else []
         before_after = before_after_table(self.before_after())
@@ -426,13 +428,13 @@ class Conversion(ProgramFigures, Result):
         with_verdict = replace(last, text=self.emitted.text.decode("utf-8", "replace"))
         return replace(page, scene=replace(page.scene, variants=(*others, with_verdict)))
 
-    def page_sections(self, made: Made | None = None) -> tuple[Section, ...]:
+    def page_sections(self, provenance: Provenance | None = None) -> tuple[Section, ...]:
         """What it gains, its sensitivity to unverified parameters, where the time goes, and the operator's run sheet.
 
         Args:
-            made: of what it was made; None: it is not known.
+            provenance: of what it was made; None: it is not known.
 
         Returns:
             The sections.
         """
-        return tuple(self._beside("page").sections_of(self, made))
+        return tuple(self._beside("page").sections_of(self, provenance))

@@ -34,30 +34,30 @@ _PERCENT = {"frequency_hz": 5.0, "damping_ratio": 50.0, "participation": 30.0}  
 
 
 @dataclass(frozen=True)
-class Sensitivity:
+class Sensitivity(OldNames):
     """A value of the machine file that was not measured, and what it would do to the verdict."""
 
     key: str  # dotted name in the machine file
     value: str  # as it stands there, with its unit
     origin: str  # "assumed", "inherited" from another machine, or "default"
-    moved: str  # what it was moved to, in words
-    figure: str  # the judged figure that it moves furthest towards its limit
+    tested_value: str  # the changed value, in words
+    figure: str  # the judged figure that it takes furthest towards its limit
     figure_um: float  # that figure as the file has the value
-    moved_um: float  # the same with the value moved
+    tested_um: float  # the same with the changed value
     limit_um: float  # what is allowed
 
     @property
     def share(self) -> float:
-        """How far the figure moves, of its limit."""
-        return (self.moved_um - self.figure_um) / self.limit_um if self.limit_um > 0.0 else 0.0
+        """How far the figure goes, of its limit."""
+        return (self.tested_um - self.figure_um) / self.limit_um if self.limit_um > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
 class _Trial:
-    """A value that is moved, and how the region is then simulated."""
+    """A value that is changed, and how the region is then simulated."""
 
     value: KeyValue
-    moved: str  # to what, in words
+    tested_value: str  # in words
     machine: Machine
     shift: float = 0.0
     only: str | None = None
@@ -78,7 +78,7 @@ class _Region:
     tracker: _core.ContourTracker | None
 
     def simulate(self, trial: _Trial, *, contour: bool) -> CaseFigures:
-        """The figures with a value moved; without the contour they come from the end of the region alone."""
+        """The figures with a value changed; without the contour they come from the end of the region alone."""
         model, path = MachineModel(trial.machine), self.place.region.path
         contour = contour and self.needs_contour(trial)
         run = model.simulate_emitted(
@@ -90,7 +90,7 @@ class _Region:
         return case_figures(run, contour=contour, response=self.judge.target == "response")
 
     def needs_contour(self, trial: _Trial) -> bool:
-        """Whether the judged deviation is another one with the value moved."""
+        """Whether the judged deviation is another one with the value changed."""
         return trial.moves_command or self.judge.target == "response"
 
     @property
@@ -119,7 +119,7 @@ def start_trials(
 
 
 def _name(trial: _Trial) -> tuple[str, str]:
-    return trial.value.key, trial.moved
+    return trial.value.key, trial.tested_value
 
 
 def parameter_sensitivity(
@@ -150,14 +150,14 @@ def parameter_sensitivity(
     rows = []
     for done, ((region, figures, trial), run) in enumerate(zip(trials, running, strict=True), start=1):
         checks = judge_region(run.result(), region.limits(figures))
-        rows.append(_sensitivity(trial.value, trial.moved, region.before(figures), checks))
+        rows.append(_sensitivity(trial.value, trial.tested_value, region.before(figures), checks))
         on_step(done, len(trials))
     rows += _from_cases(machine, deciding, decided)
     return _ranked(rows), len({row.key for row in rows})
 
 
 def _sensitivity(
-    value: KeyValue, moved: str, before: Mapping[str, LimitCheck], checks: Sequence[LimitCheck]
+    value: KeyValue, tested: str, before: Mapping[str, LimitCheck], checks: Sequence[LimitCheck]
 ) -> Sensitivity:
     """The figure that a value moves furthest towards its limit."""
     after = max(checks, key=lambda each: each.share - before[each.figure].share)
@@ -165,7 +165,7 @@ def _sensitivity(
     shown = "none" if value.value == "[]" else value.value + unit
     origin = "assumed" if value.assumed else value.origin
     figure_um = before[after.figure].value_um
-    return Sensitivity(value.key, shown, origin, moved, after.figure, figure_um, after.value_um, after.limit_um)
+    return Sensitivity(value.key, shown, origin, tested, after.figure, figure_um, after.value_um, after.limit_um)
 
 
 def _ranked(rows: Sequence[Sensitivity]) -> tuple[Sensitivity, ...]:
@@ -242,7 +242,7 @@ def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[
         )
         for letter, value in unknown.items()
     ]  # fmt: skip
-    return tuple(sorted(rows, key=lambda row: -row.moved_um))
+    return tuple(sorted(rows, key=lambda row: -row.tested_um))
 
 
 def _modes(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str, name: str) -> Iterator[tuple[str, int]]:
@@ -282,10 +282,10 @@ def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> It
     """What was simulated anyway and does not count: the other rule of block timing, look-ahead on, an underrun."""
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
     for case, simulated in zip(region.judge.cases, figures.cases, strict=True):
-        key, moved = _key_of(case)
+        key, tested = _key_of(case)
         if not case.counts and key in unmeasured and simulated is not None:
             yield _sensitivity(
-                unmeasured[key], moved, region.before(figures), judge_region(simulated, region.limits(figures))
+                unmeasured[key], tested, region.before(figures), judge_region(simulated, region.limits(figures))
             )
 
 
@@ -359,7 +359,9 @@ def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
     """The sensitivity to unverified parameters as a table."""
     columns = (
         Column("key", left=True),
-        Column("assumed → tested", value=lambda row: unbroken(f"{row.value} {row.origin} → {row.moved}"), text=True),
+        Column(
+            "assumed → tested", value=lambda row: unbroken(f"{row.value} {row.origin} → {row.tested_value}"), text=True
+        ),
         Column("figure, µm", value=_figure, text=True),
         Column("limit", value="limit_um", digits=1),
     )
@@ -368,14 +370,14 @@ def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
         columns,
         rows,
         caption=f"{tried} values changed, one at a time, in the cut that comes nearest to a limit",
-        row_style=lambda row: "red" if row.moved_um > row.limit_um else "",
+        row_style=lambda row: "red" if row.tested_um > row.limit_um else "",
     )
 
 
 def _figure(row: Sensitivity) -> str:
     """A short name of the figure, and how far it moves."""
     name = row.figure.replace("residual vibration", "residual").replace("contour error", "contour")
-    return f"{name.partition(' of ')[0]} " + f"{row.figure_um:.1f} → {row.moved_um:.1f}".replace(" ", NO_BREAK)
+    return f"{name.partition(' of ')[0]} " + f"{row.figure_um:.1f} → {row.tested_um:.1f}".replace(" ", NO_BREAK)
 
 
 Lines = tuple[int, int]
@@ -543,12 +545,12 @@ class RapidMove:
 
 
 @dataclass(frozen=True)
-class RapidsOutcome:
+class RapidsOutcome(OldNames):
     """The rapids of a program: how many are shaped moves now, why the others stay, and what that saves."""
 
     found: int  # rapids in the program
     shaped: int  # of them, shaped moves now
-    kept: Mapping[str, int]  # how many stay, by reason
+    left_unchanged: Mapping[str, int]  # how many stay as they are, by reason
     time_saved_s: float  # by which the table is ready for the next cuts sooner, in all
     settle_band_um: float  # half the width of the band in which vibration counts as having decayed
     blocks: int  # shaped blocks that replace them

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from shapegcode.machine.machine import Machine
+from shapegcode.results.json import OldNames
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 from shapegcode.settings.keys import KeyValue
@@ -19,15 +20,15 @@ _Keyed = TypeVar("_Keyed", "KeyValue", "DifferentValue")
 
 
 @dataclass(frozen=True)
-class OpenValue:
+class OpenValue(OldNames):
     """A value that was not measured on the machine, and what it would do to a program."""
 
     key: str  # dotted name
     value: str  # as it stands in the file, with its unit
     origin: str  # "assumed", "inherited" or "default"
-    moved: str = ""  # what it was moved to, in words; empty: it was not tried
-    effect: str = ""  # what that does to the figure that it moves furthest, in words; empty: it was not tried
-    share: float | None = None  # how far the figure moves, of its limit; None: it was not tried
+    tested_value: str = ""  # the changed value, in words; empty: it was not tried
+    effect: str = ""  # what that does to the figure that it takes furthest, in words; empty: it was not tried
+    share: float | None = None  # how far the figure goes, of its limit; None: it was not tried
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -120,7 +121,7 @@ class MachineDescription(Result):
                 Column("matters most", value="key", left=True),
                 Column(
                     "assumed value → tested value",
-                    value=lambda row: f"{row.value} {row.origin} → {row.moved}",
+                    value=lambda row: f"{row.value} {row.origin} → {row.tested_value}",
                     text=True,
                 ),
                 Column("then, µm", value="effect", text=True),

@@ -31,7 +31,7 @@ FORMAT = 1
 
 
 @dataclass(frozen=True)
-class MadeFile:
+class ProvenanceFile:
     """A file that was read or written."""
 
     role: str  # what it was for: "input", "machine", "output" and so on
@@ -40,7 +40,7 @@ class MadeFile:
     size_bytes: int  # how many it has
 
     @classmethod
-    def of(cls, role: str, name: str | Path, content: bytes | memoryview | None = None) -> MadeFile:
+    def of(cls, role: str, name: str | Path, content: bytes | memoryview | None = None) -> ProvenanceFile:
         """Of a file, or of what is about to be written into it."""
         if content is not None:
             return cls(role, str(name), hashlib.sha256(content).hexdigest(), len(content))
@@ -51,16 +51,16 @@ class MadeFile:
 
 
 @dataclass(frozen=True)
-class Made:
-    """Of what a result was made."""
+class Provenance:
+    """Command, version and files of a result."""
 
     result: str  # name of its class
     by: str  # "shapegcode" and its version
     format: int  # see `FORMAT`
     command: str  # as it was typed, or the same for one program of several
-    files: tuple[MadeFile, ...]  # read and written
+    files: tuple[ProvenanceFile, ...]  # read and written
 
-    def file(self, role: str) -> MadeFile | None:
+    def file(self, role: str) -> ProvenanceFile | None:
         """The file with a role."""
         return next((each for each in self.files if each.role == role), None)
 
@@ -103,14 +103,20 @@ def sparse() -> dict[str, Any]:
 
 
 RENAMED: Mapping[str, Mapping[str, str]] = {
+    "BatchRow": {"said": "answer"},
     "BudgetOutcome": {"given_up": "left_unchanged"},
     "CalibratedParameter": {"told": "is_determined", "had": "previous_value"},
     "CalibrationRun": {"left_out_s": "cross_validated_s", "left_out_percent": "cross_validated_percent"},
     "CaseVerdict": {"starved_ms": "underrun_ms"},
-    "Conversion": {"rests_on": "parameter_sensitivity"},
+    "Conversion": {"rests_on": "parameter_sensitivity", "unmeasured_tried": "unverified_parameters_tested"},
     "CutOutcome": {"cure": "remedy"},
     "CycleTimeCalibration": {"not_told": "undetermined"},
     "FamilyScore": {"left_out_s": "cross_validated_s"},
+    "MachineStudy": {"decides": "parameter_sensitivity"},
+    "OpenValue": {"moved": "tested_value"},
+    "RapidsOutcome": {"kept": "left_unchanged"},
+    "Result": {"made": "provenance"},
+    "Sensitivity": {"moved": "tested_value", "moved_um": "tested_um"},
 }
 """By class: keys of the JSON and fields, as the version before named them, and as they are named."""
 
@@ -235,7 +241,7 @@ def schema(result: type) -> dict[str, Any]:
 
     Args:
         result: the class. One with `json_extra` (names to types) has those keys too, and where the command wrote
-            pictures and a program, their names under `plots` and `output`; under `made` of what it was made.
+            pictures and a program, their names under `plots` and `output`; under `provenance` command, version, files.
 
     Returns:
         The schema.
@@ -257,7 +263,7 @@ def _object(
     shown = {field.name: hints[field.name] for field in dataclasses.fields(cls) if not field.metadata.get("hidden")}
     shown |= getattr(cls, "json_extra", {})
     left_out = {field.name for field in dataclasses.fields(cls) if field.metadata.get("sparse")}
-    written: dict[str, Any] = {"plots": tuple[str, ...], "output": str, "made": Made} if files else {}
+    written: dict[str, Any] = {"plots": tuple[str, ...], "output": str, "provenance": Provenance} if files else {}
     properties = {}
     for name, hint in (shown | written).items():
         properties[name] = _of(arguments.get(hint, hint), definitions)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from shapegcode.results.json import Made
+    from shapegcode.results.json import Provenance
     from shapegcode.results.page.model import Figure, Light, Page, Script, Section
     from shapegcode.results.page.scene import Scene
 
@@ -83,11 +83,11 @@ class Result(Outcome):
         """The main figures at the top of its page; usually none."""
         return ()
 
-    def page_sections(self, made: Made | None = None) -> tuple[Section, ...]:
+    def page_sections(self, provenance: Provenance | None = None) -> tuple[Section, ...]:
         """Sections of its page between verdict and provenance.
 
         Args:
-            made: of what the result was made; None: it is not known.
+            provenance: command, version and files of the result; None: it is not known.
 
         Returns:
             Tables and pictures, unless the class has more to show.
@@ -100,7 +100,7 @@ class Result(Outcome):
         self,
         *,
         motion: bool = True,
-        made: Made | None = None,
+        provenance: Provenance | None = None,
         problems: Sequence[str] = (),
         on_progress: Callable[[float], None] = lambda _done: None,
     ) -> Page:
@@ -108,7 +108,7 @@ class Result(Outcome):
 
         Args:
             motion: simulate the programs again for the picture that one can turn; else the page has none.
-            made: of what the result was made; None: from Python, it is not known.
+            provenance: command, version and files of the result; None: from Python, it is not known.
             problems: what is not as it should be with the page, such as a program that was changed since.
             on_progress: called with the share that is done.
 
@@ -125,9 +125,9 @@ class Result(Outcome):
             self,
             title=self.page_title,
             light=self.light,
-            sections=self.page_sections(made),
+            sections=self.page_sections(provenance),
             scene=None if simulated is None else simulated.scene(on_progress),
-            made=made,
+            provenance=provenance,
             problems=problems,
         )
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from shapegcode._core import ArgumentError
 from shapegcode.io.data_file import DataFile
-from shapegcode.results.json import FORMAT, Made, current_keys
+from shapegcode.results.json import FORMAT, Provenance, current_keys
 from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.result import Result
 
@@ -93,34 +93,37 @@ def load_result(path: str | Path) -> Result:
         raise ArgumentError(f"{path}: {error}") from None
 
 
-def made_of(report: Mapping[str, Any]) -> Made:
-    """Of what a result was made."""
-    if "error" in report and "made" not in report:
+def provenance_in(report: Mapping[str, Any]) -> Provenance:
+    """Command, version and files of a result."""
+    report = current_keys(Result, report)
+    if "error" in report and "provenance" not in report:
         raise ArgumentError(f"the command failed for this program: {report['error']}")
-    if "made" not in report:
+    if "provenance" not in report:
         raise ArgumentError(
-            "key made is missing: the JSON was written by an older version or by to_dict(); run the command again "
-            "with --json"
+            "key provenance is missing: the JSON was written by an older version or by to_dict(); run the command "
+            "again with --json"
         )
-    made: Made = _value(Made, report["made"], "made")
-    if made.format != FORMAT:
-        raise ArgumentError(f"made.format = {made.format}: written by {made.by}; this version reads format {FORMAT}")
-    return made
+    provenance: Provenance = _value(Provenance, report["provenance"], "provenance")
+    if provenance.format != FORMAT:
+        raise ArgumentError(
+            f"provenance.format = {provenance.format}: written by {provenance.by}; this version reads format {FORMAT}"
+        )
+    return provenance
 
 
 def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingProxyType({})) -> Result:
     """A result from its JSON."""
-    made = made_of(report)
+    provenance = provenance_in(report)
     package = importlib.import_module("shapegcode")  # every kind of result is public
-    cls = getattr(package, made.result) if made.result in package.__all__ else None
+    cls = getattr(package, provenance.result) if provenance.result in package.__all__ else None
     if not (isinstance(cls, type) and issubclass(cls, Result)):
-        raise ArgumentError(f"made.result = {made.result}: not a result that this version knows")
+        raise ArgumentError(f"provenance.result = {provenance.result}: not a result that this version knows")
     report = current_keys(cls, report)
-    beside = {*cls.json_extra, "made", "plots", "output", "program_address"}
+    beside = {*cls.json_extra, "provenance", "plots", "output", "program_address"}
     names = {field.name for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
     known = names | beside
     if unknown := sorted(report.keys() - known):
-        raise ArgumentError(f"key {unknown[0]} is not one of a {made.result}: written by {made.by}")
+        raise ArgumentError(f"key {unknown[0]} is not one of a {provenance.result}: written by {provenance.by}")
     hidden = {name: value for name, value in kept.items() if name in known and value is not None}
     own = {key: value for key, value in report.items() if key in names}
     result: Result = _from_json(cls(**(dict(_fields(cls, own, "", {})) | hidden)))
@@ -199,10 +202,10 @@ def _object(cls: Any, arguments: Sequence[Any], data: Any, where: str, bound: Ma
     return _from_json(cls(**dict(_fields(cls, data, where, own))))
 
 
-def _from_json(made: Any) -> Any:
-    if isinstance(made, Outcome):
-        object.__setattr__(made, "from_json", True)
-    return made
+def _from_json(value: Any) -> Any:
+    if isinstance(value, Outcome):
+        object.__setattr__(value, "from_json", True)
+    return value
 
 
 def _fields(cls: Any, data: Mapping[str, Any], where: str, bound: Mapping[Any, Any]) -> Iterator[tuple[str, Any]]:
@@ -225,11 +228,11 @@ def _fields(cls: Any, data: Mapping[str, Any], where: str, bound: Mapping[Any, A
 
 def _from_properties(cls: Any, data: Mapping[str, Any], where: str) -> Mapping[str, Any]:
     """Hidden fields that follow from properties in the JSON: of a class with `hidden_from_json(data)`."""
-    made = getattr(cls, "hidden_from_json", None)
-    if made is None:
+    read = getattr(cls, "hidden_from_json", None)
+    if read is None:
         return {}
     try:
-        found: Mapping[str, Any] = made(data)
+        found: Mapping[str, Any] = read(data)
     except (KeyError, TypeError, ValueError) as error:
         raise ArgumentError(f"{where}: {error} is missing or not what it should be") from None
     return found

@@ -38,7 +38,7 @@ def plot_tornado(study: MachineStudy, ax: Axes | None = None) -> Axes:
     Returns:
         The panel.
     """
-    rows = study.decides[:_BARS]
+    rows = study.parameter_sensitivity[:_BARS]
     panel = plot.axes(
         ax, size_inch=(9.0, 1.6 + 0.4 * len(rows)),
         title=f"What decides the verdict: {Path(study.program).name} on {study.machine}",
@@ -106,7 +106,7 @@ def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
     Returns:
         The uppermost panel.
     """
-    key = study.decides[0].key
+    key = study.parameter_sensitivity[0].key
     curves = [bins for bins in study.curves if bins.key == key and bins.measure != SHARE][:_PANELS]
     curves = curves or [bins for bins in study.curves if bins.key == key]
     panels = plot.column(

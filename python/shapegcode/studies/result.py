@@ -58,7 +58,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Decides:
+class ParameterInfluence:
     """What a value does to the verdict."""
 
     key: str  # of the value
@@ -122,7 +122,7 @@ class MachineStudy(Result):
         within_interval: of the probability that this estimates, 95 %; of a grid it means nothing.
         at_least: what the probability should be.
         quantities: measures over all draws.
-        decides: values by what they do to the verdict, the one that decides first.
+        parameter_sensitivity: values by what they do to the verdict, the one that decides first.
         curves: measures over each value, for pictures.
         refused: draws without a text.
         warnings: caution, before you run.
@@ -143,7 +143,7 @@ class MachineStudy(Result):
     within_interval: tuple[float, float]
     at_least: float
     quantities: tuple[Quantity, ...]
-    decides: tuple[Decides, ...]
+    parameter_sensitivity: tuple[ParameterInfluence, ...]
     curves: tuple[Bins, ...]
     refused: tuple[RefusedDraws, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -161,7 +161,7 @@ class MachineStudy(Result):
         low, high = self.within_interval
         sure = "" if self.sampling == "grid" else f" (95 % interval {low * 100:.1f} to {high * 100:.1f} %)"
         what = "of the grid stays" if self.sampling == "grid" else "of the machines stay"
-        most = f"; {self.decides[0].key} decides" if self.decides else ""
+        most = f"; {self.parameter_sensitivity[0].key} decides" if self.parameter_sensitivity else ""
         return f"{self.within * 100:.1f} % {what} within tolerance{sure}, asked for {self.at_least * 100:g} %{most}"
 
     @property
@@ -171,12 +171,12 @@ class MachineStudy(Result):
             return (
                 f"convert {self.program} for {self.machine}: it stays within tolerance in spite of the uncertainties."
             )
-        if not self.decides:
+        if not self.parameter_sensitivity:
             return "see why samples were refused."
-        key = self.decides[0].key
+        key = self.parameter_sensitivity[0].key
         known = next(each.known for each in self.varied if each.key == key)
         if known:
-            least = f"choose {key} where the share of the limit is least ({self.decides[0].low_at})"
+            least = f"choose {key} where the share of the limit is least ({self.parameter_sensitivity[0].low_at})"
             return f"{least}, or by shapegcode optimize with the same file."
         return f"measure {key} more closely, or let shapegcode optimize choose a more robust shaper."
 
@@ -236,7 +236,8 @@ class MachineStudy(Result):
         tables = [
             Table(f"{self.n} draws, {self.conversions} conversion{'s' * (self.conversions != 1)}", measures,
                   self.quantities),
-            Table("what decides the verdict: median share of the limit over each value", deciding, self.decides),
+            Table("what decides the verdict: median share of the limit over each value", deciding,
+                  self.parameter_sensitivity),
         ]  # fmt: skip
         if self.refused:
             why = (Column("values", text=True), Column("draws"), Column("why", text=True))

@@ -33,8 +33,8 @@ from shapegcode.studies.result import (
     PERCENT,
     BinQuantiles,
     Bins,
-    Decides,
     MachineStudy,
+    ParameterInfluence,
     Quantity,
     RefusedDraws,
     VariedKey,
@@ -246,7 +246,7 @@ def _result(
         within_interval=interval_of(good, run.count),
         at_least=at_least,
         quantities=tuple(quantity(name, values, run.nominal[name]) for name, values in measured.items()),
-        decides=decides(run.varied, columns, shares, indices=whole, seed=seed),
+        parameter_sensitivity=parameter_sensitivity(run.varied, columns, shares, indices=whole, seed=seed),
         curves=tuple(
             Bins(each.key, name, bins_of(each, column, values), not isinstance(each.distribution, Listed))
             for each, column in zip(run.varied, columns, strict=True)
@@ -315,16 +315,18 @@ def _bin(at: float, name: str, values: FloatArray) -> BinQuantiles:
     return BinQuantiles(at, name, *np.percentile(values, (5.0, 50.0, 95.0)).tolist())
 
 
-def decides(
+def parameter_sensitivity(
     varied: Sequence[Varied], columns: Sequence[Sequence[object]], shares: FloatArray, *, indices: bool, seed: int
-) -> tuple[Decides, ...]:
+) -> tuple[ParameterInfluence, ...]:
     """Which value moves the share of the limit most."""
     found = _indices(varied, shares, seed) if indices else {}
     rows = []
     for each, column in zip(varied, columns, strict=True):
         bins = bins_of(each, column, shares)
         low, high = min(bins, key=lambda one: one.median), max(bins, key=lambda one: one.median)
-        rows.append(Decides(each.key, low.median, high.median, low.name, high.name, *found.get(each.key, ())))
+        rows.append(
+            ParameterInfluence(each.key, low.median, high.median, low.name, high.name, *found.get(each.key, ()))
+        )
     rank = (lambda row: row.total or 0.0) if found else (lambda row: row.high - row.low)
     return tuple(sorted(rows, key=rank, reverse=True))
 

@@ -116,7 +116,7 @@ class _RapidShaper:
         outcome = RapidsOutcome(
             found=found,
             shaped=len(shaped),
-            kept={reason: count for reason, count in sorted(kept.items()) if count},
+            left_unchanged={reason: count for reason, count in sorted(kept.items()) if count},
             time_saved_s=math.fsum(gap.saved_s() for gap in open_gaps),
             settle_band_um=self.machine.tolerance.residual_floor_um,
             blocks=sum(choice.shaped.blocks for choice in shaped if choice.shaped is not None),

@@ -10,7 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from shapegcode.results.json import Made, plain, this_version
+from shapegcode.results.json import Provenance, plain, this_version
 from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.page.model import (
     Figure,
@@ -112,16 +112,18 @@ def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Sectio
         yield Section("no-pictures", "Pictures that are not here", (Text((left_out,)),), printed=False)
 
 
-def made_section(made: Made) -> Section:
+def provenance_section(provenance: Provenance) -> Section:
     """Command, version and files with their hashes."""
-    rows = [("by", made.by)]
-    rows += [("command", made.command)] if made.command else []
+    rows = [("by", provenance.by)]
+    rows += [("command", provenance.command)] if provenance.command else []
     rows += [
         (each.role, f"{each.name}, {each.size_bytes} bytes, SHA-256 {each.sha256 or 'not known'}")
-        for each in made.files
+        for each in provenance.files
     ]
     how = "The hash of a file changes with every byte of it: compare it before you rely on this page."
-    return Section("made", "What this was made of", (Notes(tuple(rows)),), how=how, folded=True, printed=False)
+    return Section(
+        "provenance", "Command, version and files", (Notes(tuple(rows)),), how=how, folded=True, printed=False
+    )
 
 
 def page_of(
@@ -131,15 +133,15 @@ def page_of(
     light: tuple[Light, str],
     sections: Sequence[Section],
     scene: Scene | None = None,
-    made: Made | None = None,
+    provenance: Provenance | None = None,
     problems: Sequence[str] = (),
 ) -> Page:
     """The page of a result."""
     report: dict[str, Any] = result.to_json()
-    if made is not None:
-        report["made"] = plain(made)
-        sections = (*sections, made_section(made))
-        scene = _named(scene, made)
+    if provenance is not None:
+        report["provenance"] = plain(provenance)
+        sections = (*sections, provenance_section(provenance))
+        scene = _named(scene, provenance)
     above = next((rank + 1 for rank, section in enumerate(sections) if section.key == "next"), 0)
     return Page(
         title=title,
@@ -154,9 +156,9 @@ def page_of(
     )
 
 
-def _named(scene: Scene | None, made: Made) -> Scene | None:
+def _named(scene: Scene | None, provenance: Provenance) -> Scene | None:
     """With the name of the file that was written; while it was made it had none."""
-    output = made.file("output")
+    output = provenance.file("output")
     if scene is None or output is None or len(scene.variants) < 2:
         return scene
     *others, last = scene.variants
@@ -165,8 +167,8 @@ def _named(scene: Scene | None, made: Made) -> Scene | None:
 
 def raw_page(report: Mapping[str, Any], why: str) -> Page:
     """The page of a result that cannot be read back: its JSON as it stands."""
-    made = report.get("made")
-    by = made.get("by", "another version") if isinstance(made, dict) else "another version"
+    provenance = report.get("provenance", report.get("made"))
+    by = provenance.get("by", "another version") if isinstance(provenance, dict) else "another version"
     return Page(
         title="A result as its JSON has it",
         light="amber",

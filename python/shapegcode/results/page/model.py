@@ -181,7 +181,7 @@ class Page:
     verdict: str  # the answer in one sentence
     reason: str  # why the light has this colour
     sections: tuple[Section, ...]  # from top to bottom; the scene stands behind the first `before_scene` of them
-    report: Mapping[str, Any]  # the JSON of the result, with `made` where its files are known
+    report: Mapping[str, Any]  # the JSON of the result, with `provenance` where its files are known
     scene: Scene | None = None  # motion to look at; None: there is none
     before_scene: int = 1  # how many sections stand above the scene
     # what is not as it should be with the page itself, such as a program that was changed since
