@@ -246,8 +246,8 @@ def test_full_standard_output(folder: Path) -> None:
     [
         ("max_feed_mm_per_min = 15000.0", "max_feed_mm_per_min = nan", ("max_feed_mm_per_min = nan", "finite")),
         ("max_feed_mm_per_min = 15000.0", "max_feed_mm_per_min = inf", ("max_feed_mm_per_min = inf", "finite")),
-        ("max_acceleration_mm_s2 = 5000.0", "max_acceleration_mm_s2 = -1.0", ("= -1.0", "greater than 0")),
-        ("max_acceleration_mm_s2 = 5000.0", "max_acceleration_mm_s2 = 0", ("= 0", "greater than 0")),
+        ("max_acceleration_mm_s2 = 5000.0", "max_acceleration_mm_s2 = -1.0", ("= -1.0", "must be 1 or more")),
+        ("max_acceleration_mm_s2 = 5000.0", "max_acceleration_mm_s2 = 0", ("= 0", "must be 1 or more")),
         ("frequency_hz = 46.0", "frequency_hz = -46.0", ("frequency_hz = -46.0", "greater than 0")),
         ("damping_ratio = 0.02", "damping_ratio = 1.5", ("damping_ratio = 1.5", "1")),
         ("interpolation_period_s = 0.001", "interpolation_period_s = nan", ("interpolation_period_s = nan", "finite")),

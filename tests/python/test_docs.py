@@ -47,6 +47,16 @@ def test_every_link_leads_somewhere(page: Path) -> None:
     assert dead == []
 
 
+def test_architecture_names_files_that_exist() -> None:
+    """A file or folder with a path in ARCHITECTURE.md, but for those that its recipes would add."""
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([a-z_]+(?:/[a-z_0-9]+)+(?:\.[a-z]+)?)`", text))
+    folders = [ROOT / name for name in ("python", "cpp", "tests", "docs", "bindings", "integrations")]
+    there = [f"/{file.relative_to(ROOT)}" for folder in folders for file in folder.rglob("*")]
+    missing = {name for name in named if not any(f"/{name}" in file for file in there)}
+    assert missing == {"balance/result.py", "balance/balance.py", "cli/balance.py"}
+
+
 def test_every_page_is_in_the_contents(tmp_path: Path) -> None:
     """Of the book as it is laid out, with the pages that come from the code; each page in one place."""
     place = tmp_path / "book"

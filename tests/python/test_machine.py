@@ -115,7 +115,7 @@ def test_other_values_are_checked_as_those_of_a_file() -> None:
         machine.with_values({"tolerance.contour_um": -5, "shaping.famly": "zvd"})
     assert str(caught.value).splitlines() == [
         'VX500: shaping.famly = "zvd": unknown key; did you mean family?',
-        "VX500: tolerance.contour_um = -5: must be greater than 0 (unit: µm)",
+        "VX500: tolerance.contour_um = -5: must be 0.001 or more (unit: µm)",
     ]
     with pytest.raises(MachineError, match=r"^here: name.x = 0.5: no such key$"):
         machine.with_values("name.x", 0.5, source="here")
@@ -242,12 +242,17 @@ def test_no_number_may_be_nan_or_infinite(key: str, number: str) -> None:
         (
             "max_feed_mm_per_min = 5000",
             "max_feed_mm_per_min = -5",
-            "4: axes.x.max_feed_mm_per_min = -5: must be greater than 0 (unit: mm/min)",
+            "4: axes.x.max_feed_mm_per_min = -5: must be 1 or more (unit: mm/min)",
         ),
         (
             "max_feed_mm_per_min = 5000",
             "max_feed_mm_per_min = 0",
-            "4: axes.x.max_feed_mm_per_min = 0: must be greater than 0 (unit: mm/min)",
+            "4: axes.x.max_feed_mm_per_min = 0: must be 1 or more (unit: mm/min)",
+        ),
+        (
+            "max_acceleration_mm_s2 = 1000",
+            "max_acceleration_mm_s2 = 1e300",  # a conversion with it did not end
+            "6: axes.x.max_acceleration_mm_s2 = 1e+300: must be 1000000.0 or less (unit: mm/s²)",
         ),
         (
             "max_feed_mm_per_min = 5000",

@@ -248,10 +248,16 @@ def _along(axis: int) -> tuple[float, float, float]:
 class Axis(TomlTable):
     """Limits of one axis; all three tables are required."""
 
-    max_feed_mm_per_min: Positive = key("largest cutting feed of this axis", fanuc="1430")
-    rapid_mm_per_min: Positive = key("rapid traverse (G00)", fanuc="1420")
-    max_acceleration_mm_s2: Positive = key("largest acceleration while cutting", fanuc="1660")
-    max_jerk_mm_s3: Positive | None = key("largest jerk while cutting; left out: not limited", default=None)
+    max_feed_mm_per_min: Annotated[Positive, Field(ge=1, le=10_000_000)] = key(
+        "largest cutting feed of this axis", fanuc="1430"
+    )
+    rapid_mm_per_min: Annotated[Positive, Field(ge=1, le=10_000_000)] = key("rapid traverse (G00)", fanuc="1420")
+    max_acceleration_mm_s2: Annotated[Positive, Field(ge=1, le=1_000_000)] = key(
+        "largest acceleration while cutting", fanuc="1660"
+    )
+    max_jerk_mm_s3: Annotated[Positive, Field(ge=10, le=10**10)] | None = key(
+        "largest jerk while cutting; left out: not limited", default=None
+    )
     modes: Annotated[tuple[AxisMode, ...], Field(max_length=_MAX_MODES)] = key(
         "vibration modes, one table each; none: the axis is taken as rigid", default=()
     )

@@ -122,7 +122,9 @@ class Controller(TomlTable):
         'settings of kind = "klipper"; left out: the control\'s own defaults', default=None
     )
     grbl: GrblPlanner | None = key('settings of kind = "grbl"; left out: the control\'s own defaults', default=None)
-    interpolation_period_s: Annotated[Positive, Field(le=0.1)] = key("time between two set-points", assumed=0.001)
+    interpolation_period_s: Annotated[Positive, Field(ge=1e-5, le=0.1)] = key(
+        "time between two set-points", assumed=0.001
+    )
     block_time_s: Annotated[NonNegative, Field(le=1)] = key(
         "shortest time in which the control can execute a block; emitted blocks are not shorter", assumed=0.005
     )

@@ -405,7 +405,7 @@ _Override = Annotated[Positive, Field(le=254)]
 class Tolerance(TomlTable):
     """When an emitted program is good: outside these limits the conversion says so and exits with 1."""
 
-    contour_um: Positive = key(
+    contour_um: Annotated[Positive, Field(ge=0.001, le=1e6)] = key(
         "largest deviation from the programmed path of what shaping.contour names: the response, or the command",
         default=20.0,
     )
