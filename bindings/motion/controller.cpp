@@ -112,7 +112,7 @@ void register_answers(py::module_& module) {
       .value("queue_full", PushResult::queue_full, "Nothing was taken: push it again later.")
       .value("not_connected", PushResult::not_connected,
              "It does not start where the one before ended, or an arc misses its end (1e-6 mm).")
-      .value("no_length", PushResult::no_length, "It moves no axis.")
+      .value("no_length", PushResult::no_length, "It moves no axis by more than 1e-9 mm or degrees.")
       .value("no_feed", PushResult::no_feed, "A feed that is not above zero, or not finite.")
       .value("not_finite", PushResult::not_finite, "A position that is not finite.")
       .value("wrong_axes", PushResult::wrong_axes, "Not as many following axes as the control has.")

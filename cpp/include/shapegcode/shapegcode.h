@@ -44,7 +44,7 @@ typedef enum shapegcode_status {
   SHAPEGCODE_OK = 0,
   SHAPEGCODE_QUEUE_FULL = 1,          ///< push it again later
   SHAPEGCODE_NOT_CONNECTED = 2,       ///< it does not start where the one before ended
-  SHAPEGCODE_NO_LENGTH = 3,           ///< it moves no axis
+  SHAPEGCODE_NO_LENGTH = 3,           ///< it moves no axis by more than 1e-9 mm or degrees
   SHAPEGCODE_NO_FEED = 4,             ///< a feed that is not above zero, or not finite
   SHAPEGCODE_NOT_FINITE = 5,          ///< a position, centre or sweep is no number
   SHAPEGCODE_WRONG_AXES = 6,          ///< not as many following axes as the settings have

@@ -10,8 +10,7 @@ namespace {
 
 // A corner that may be passed no faster is a stop.
 constexpr double crawl_mm_per_s = 1e-2;
-// What is no travel of X, Y and Z, and a share of what another axis travels that hardly is one.
-constexpr double no_travel_mm = 1e-9;
+// A share of what another axis travels that hardly is travel of X, Y and Z.
 constexpr double hardly_moves = 0.1;
 
 }  // namespace
@@ -87,7 +86,6 @@ PushResult Intake::copy(const Segment& segment, std::span<const double> followin
     longest = std::max(longest, std::abs(planned.rate[axis]));
   }
   if (!(segment.length_mm > 0.0)) {
-    if (longest <= 0.0) return PushResult::no_length;
     planned.segment.end_mm = segment.start_mm;
     planned.segment.kind = SegmentKind::line;
   }
@@ -95,6 +93,7 @@ PushResult Intake::copy(const Segment& segment, std::span<const double> followin
   if (planned.segment.kind != SegmentKind::arc && segment.length_mm < hardly_moves * longest) {
     planned.segment.length_mm = longest;
   }
+  if (planned.segment.length_mm <= no_travel_mm) return PushResult::no_length;
   for (double& rate : planned.rate) rate /= planned.segment.length_mm;
   entry = planned;
   return PushResult::accepted;

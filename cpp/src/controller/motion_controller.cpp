@@ -29,7 +29,7 @@ const char* text_of(PushResult result) noexcept {
     case PushResult::not_connected:
       return "the segment does not start where the one before ended";
     case PushResult::no_length:
-      return "the segment has no length";
+      return "the segment moves no axis by more than 1e-9 mm";
     case PushResult::no_feed:
       return "the feed is not above zero";
     case PushResult::not_finite:

@@ -33,8 +33,6 @@ constexpr int plans = 4;
 constexpr double least_ratio = 0.01;
 // A lower override is approached from above.
 constexpr double below_feed = 0.9995;
-// As near as that to the end of a segment is its end, mm.
-constexpr double at_end_mm = 1e-9;
 // Stations for each segment of the window, and at least.
 constexpr std::size_t stations_of_segment = 16;
 constexpr std::size_t least_stations = 2048;
@@ -196,7 +194,7 @@ std::optional<PathPoint> OnlinePlanner::next_start(std::uint64_t pushed) noexcep
   PathPoint from = last_->at(static_cast<std::ptrdiff_t>(start_)).point;
   const bool rests = from.state.speed <= 0.0;
   if (from.segment >= pushed) return std::nullopt;
-  if (from.offset >= (*ring_)[from.segment].segment.length_mm - at_end_mm) {
+  if (from.offset >= (*ring_)[from.segment].segment.length_mm - no_travel_mm) {
     if (from.segment + 1 >= pushed) return std::nullopt;
     from.offset = std::max(0.0, from.offset - (*ring_)[from.segment].segment.length_mm);
     PlannedSegment& next = (*ring_)[++from.segment];
@@ -334,7 +332,7 @@ void OnlinePlanner::add(Section& section, std::size_t index, const PathMotion& m
   now.line = entry.segment.line;
   now.rate_of = entry.rate_of;
   const double length = entry.segment.length_mm;
-  if (motion.at_end() && now.point.offset >= length - at_end_mm) {
+  if (motion.at_end() && now.point.offset >= length - no_travel_mm) {
     // To the last bit, whatever distances round to.
     std::copy_n(entry.segment.end_mm.data(), axis_count, now.position.begin());
     for (std::size_t i = axis_count; i < plan_.axes(); ++i) now.position[i] = entry.end[i];
@@ -397,7 +395,7 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
 void OnlinePlanner::give_out(Section& section, const PathPoint& from, std::uint64_t pushed) noexcept {
   const PlannedPoint& rest = section.at(static_cast<std::ptrdiff_t>(section.whole_count));
   const PlannedSegment& entry = (*ring_)[rest.point.segment];
-  const bool at_end = rest.point.offset >= entry.segment.length_mm - at_end_mm;
+  const bool at_end = rest.point.offset >= entry.segment.length_mm - no_travel_mm;
   section.done = rest.point.segment + (at_end ? 1 : 0);
   section.runs_out = motion_.at_end() && at_end && section.done == pushed && !entry.segment.stop_at_end;
   fixed_ = std::max(fixed_, plan_.fix(from.segment, rest.point.segment, rest.point.offset, published_ + 1));

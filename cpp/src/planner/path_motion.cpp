@@ -31,8 +31,6 @@ constexpr double next_excess = 1.5;
 constexpr double last_excess = 16.0;
 // Where in a period the jerk is looked at, by its length.
 constexpr std::array<double, 4> jerk_looked_at{0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0};
-// How near an end is it.
-constexpr double at_end_mm = 1e-9;
 // A speed, and what a period makes of it, that is none, mm/s.
 constexpr double no_speed = 1e-10;
 
@@ -347,7 +345,7 @@ void PathMotion::come_to_standstill() noexcept {
 
 void PathMotion::come_to_rest() noexcept {
   come_to_standstill();
-  if (plan_->ends_in_stop(station_) && offset_ >= plan_->station(station_).length - at_end_mm) {
+  if (plan_->ends_in_stop(station_) && offset_ >= plan_->station(station_).length - no_travel_mm) {
     ++station_;
     offset_ = 0.0;
   }
@@ -383,7 +381,7 @@ void PathMotion::follow() noexcept {
     const double left = plan_->station(station_).length - offset_;
     if (plan_->ends_in_stop(station_)) {
       // A landing begins with a period; none was found where the end is reached.
-      return left <= at_end_mm ? come_to_rest() : move(0.0, rest);
+      return left <= no_travel_mm ? come_to_rest() : move(0.0, rest);
     }
     const PathState state{state_.speed * state_.speed, state_.acceleration};
     const double c = course(left, state);

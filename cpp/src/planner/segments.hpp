@@ -18,6 +18,8 @@ inline constexpr std::size_t max_path_axes = 9;
 using AxisValues = std::array<double, max_path_axes>;
 
 inline constexpr double no_limit = std::numeric_limits<double>::infinity();
+/// Nothing moves by so little; as near as that to the end of a segment is its end.
+inline constexpr double no_travel_mm = 1e-9;
 
 struct PlannedSegment {
   Segment segment;
