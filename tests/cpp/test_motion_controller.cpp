@@ -384,3 +384,100 @@ TEST_CASE("a motion of many metres ends") {
   CHECK(run.last == Activity::idle);
   CHECK(run.set_points.back()[0] == at);
 }
+
+TEST_CASE("an emergency stop in any period keeps the emergency acceleration, with as much as the axes have as well") {
+  for (const double ratio : {1.0, 1.2, 2.0}) {
+    Activity activity = Activity::moving;
+    for (int at = 2; activity == Activity::moving; at += 3) {
+      CAPTURE(at);
+      ControllerSettings settings = limited();
+      settings.plans_in_step = true;
+      const double allowed = ratio * max_acceleration;
+      settings.emergency_acceleration.assign(axis_count, allowed);
+      MotionController control(settings);
+      REQUIRE(control.push(make_line({0, 0, 0}, {9, 3, 0}, 140.0)) == PushResult::accepted);
+      REQUIRE(control.push(make_line({9, 3, 0}, {9, 9, 0}, 140.0)) == PushResult::accepted);
+      Vector3 point;
+      Differences differences(axis_count, period_s);
+      for (int k = 0; k < at; ++k) {
+        activity = control.step(values_of(point));
+        differences.add(values_of(point));
+      }
+      control.emergency_stop();
+      for (int k = 0; k < 1000 && control.step(values_of(point)) != Activity::aborted; ++k) {
+        differences.add(values_of(point));
+      }
+      differences.add(values_of(point));
+      // With no more than the path is planned with: in a corner nearly so.
+      CHECK(differences.acceleration() <= (ratio > 1.0 ? 1.001 : 1.02) * allowed);
+    }
+  }
+}
+
+TEST_CASE("segments that nothing moves by have no length; a stop behind them is reached, each of two at one place") {
+  ControllerSettings settings = limited();
+  settings.plans_in_step = true;
+  MotionController control(settings);
+  CHECK(control.push(make_line({0, 0, 0}, {5e-10, 0, 0}, 10.0)) == PushResult::no_length);
+  CHECK(control.push(make_line({0, 0, 0}, {2e-9, 0, 0}, 10.0)) == PushResult::accepted);
+  CHECK(control.push_stop() == PushResult::accepted);
+  CHECK(control.push_event({1, 0}) == PushResult::accepted);
+  CHECK(control.push_stop() == PushResult::accepted);
+  CHECK(control.push_event({2, 0}) == PushResult::accepted);
+  CHECK(control.push(make_line({2e-9, 0, 0}, {5, 0, 0}, 50.0)) == PushResult::accepted);
+  Vector3 point;
+  ControllerEvent event;
+  for (std::uint32_t stop = 0; stop < 2; ++stop) {
+    CAPTURE(stop);
+    Activity activity = Activity::moving;
+    for (int k = 0; k < 1000 && activity != Activity::held; ++k) activity = control.step(values_of(point));
+    REQUIRE(activity == Activity::held);
+    CHECK_FALSE(control.next_event(event));
+    control.resume();
+    control.step(values_of(point));
+    REQUIRE(control.next_event(event));
+    CHECK(event.id == stop + 1);
+  }
+  CHECK(run_until_idle(control, 10'000).set_points.back() == Vector3(5, 0, 0));
+}
+
+TEST_CASE("a gap that is accepted is no jump, however short the period") {
+  for (const double t : {1e-3, 1e-4}) {
+    ControllerSettings settings = limited();
+    settings.period_s = t;
+    settings.plans_in_step = true;
+    MotionController control(settings);
+    REQUIRE(control.push(make_line({0, 0, 0}, {5, 0, 0}, 100.0)) == PushResult::accepted);
+    REQUIRE(control.push(make_line({5, 9e-7, 0}, {8, 2, 0}, 100.0)) == PushResult::accepted);
+    const Segment arc = make_arc({8, 2 + 9e-7, 0}, {10, 4, 0}, {8, 4, 0}, 0.5 * std::numbers::pi, 2, 100.0);
+    REQUIRE(control.push(arc) == PushResult::accepted);
+    Differences differences(axis_count, t);
+    Vector3 point;
+    Activity activity = Activity::moving;
+    int periods = 0;
+    for (; periods < 60'000 && activity != Activity::idle; ++periods) {
+      activity = control.step(values_of(point));
+      differences.add(values_of(point));
+    }
+    CHECK(activity == Activity::idle);
+    CHECK(point == Vector3(10, 4, 0));
+    CHECK(differences.acceleration() <= 1.001 * max_acceleration);
+    CHECK(differences.jerk() <= 1.001 * max_jerk);
+  }
+}
+
+TEST_CASE("a motion that strays from its plan in a sharp corner is planned anew from where it rests") {
+  ControllerSettings settings = limited();
+  settings.plans_in_step = true;
+  settings.limits.max_feed_mm_per_s.setConstant(450.77);
+  settings.limits.max_acceleration_mm_per_s2.setConstant(9614.6);
+  settings.limits.max_jerk_mm_per_s3.setConstant(1627582.0);
+  settings.contour_tolerance_mm = 0.003;
+  settings.shaper = Fir({0, 10, 11}, {0.5157, 0.06, 0.4243});
+  MotionController control(settings);
+  const Vector3 corner(-3.87823935, 1.07668667, 0.0);
+  const Vector3 end(-2.87823935, 1.07668667, 0.0);
+  REQUIRE(control.push(make_line({0, 0, 0}, corner, 252.0)) == PushResult::accepted);
+  REQUIRE(control.push(make_line(corner, end, 50.0)) == PushResult::accepted);
+  CHECK(run_until_idle(control, 4000).set_points.back() == end);
+}

@@ -429,3 +429,23 @@ def test_one_program_in_a_file(tmp_path: Path) -> None:
     ):
         done = run(tmp_path, "time", "loop.ngc", "-m", "vx500", "--program", choice)
         assert done.returncode == 2 and message in done.stderr
+
+
+def test_numbers_without_a_point_stay_whole_units_in_what_is_emitted(tmp_path: Path) -> None:
+    """Where the machine file reads X20 as increments, LinuxCNC's X20 gets its point: it was emitted as .02 mm."""
+    program = "G21 G17 G90 G94\nT1 M6\nS5000 M3\nG0 X0 Y0 Z5\nG1 Z-1 F200\nG1 X20 F50\nY20\nG2 X40 I10\nG0 Z50\nM2\n"
+    (tmp_path / "p.ngc").write_text(program)
+    machine = sg.Machine.load("vx500").with_values(
+        {"controller.calculator_decimal_point": False, "controller.dialect": "linuxcnc"}
+    )
+    conversion = sg.convert(tmp_path / "p.ngc", machine)
+    assert conversion.ok
+    text = conversion.text.decode()
+    assert re.search(r"(?<![A-Z(])[XYZIJKF]-?\d+(?![\d.])", re.sub(r"\(.*?\)", "", text)) is None
+    assert re.search(r"Z50\.", text) and re.search(r"Y20\.", text)
+
+
+@pytest.mark.parametrize("comment", ["; DIALECT KLIPPER", "(DIALECT ISG KERNEL BECKHOFF TWINCAT CNC TF5200)"])
+def test_what_is_emitted_for_a_control_that_is_not_read_is_refused_by_its_name(comment: str) -> None:
+    with pytest.raises(sg.ProgramError, match=r"2:1: emitted for .*: keep the original"):
+        sg.Program.from_text(f"%\n{comment}\nG21G90\nG01X1.F100.\nM30\n%\n", sg.Machine.load("vx500"))

@@ -102,6 +102,17 @@ residual_floor_um = 0
     assert machine.tolerance.residual_floor_um == 0
 
 
+@pytest.mark.parametrize("kind", ["linuxcnc", "klipper", "grbl"])
+def test_controls_without_increments_read_whole_units(kind: str) -> None:
+    """X100 is 100 mm for LinuxCNC, Klipper and GRBL, and .1 mm for a FANUC control with 3401#0 = 0."""
+    assert not Machine.from_toml(MINIMAL).controller.calculator_decimal_point
+    own = MINIMAL + f'[controller]\nkind = "{kind}"\n'
+    assert Machine.from_toml(own).controller.calculator_decimal_point
+    (message,) = problems(own + "calculator_decimal_point = false\n")
+    assert f'with kind = "{kind}" X10 is 10 mm or inch' in message
+    assert Machine.from_toml(MINIMAL).with_values("controller.kind", kind).controller.calculator_decimal_point
+
+
 def test_other_values_are_checked_as_those_of_a_file() -> None:
     machine = Machine.load("vx500")
     other = machine.with_values({"tolerance.contour_um": 5, "axes.x.modes.1.damping_ratio": 0.03, "name": "B"})

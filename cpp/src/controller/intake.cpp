@@ -33,7 +33,8 @@ void Intake::restart(std::span<const double> position) noexcept {
   last_ = PlannedSegment{};
   for (int i = 0; i < axis_count; ++i) last_.segment.end_mm[i] = position[static_cast<std::size_t>(i)];
   std::copy(position.begin() + axis_count, position.end(), last_.end.begin() + axis_count);
-  has_last_ = rests_ = waits_ = false;
+  has_last_ = rests_ = false;
+  waits_ = 0;
   dwell_ = 0;
 }
 
@@ -52,7 +53,7 @@ PushResult Intake::take(const Segment& segment, std::span<const double> followin
   entry.dwell = dwell_;
   entry.waits = waits_;
   rests_ = is_bound;
-  waits_ = false;
+  waits_ = 0;
   dwell_ = 0;
   last_ = entry;
   has_last_ = true;
@@ -71,12 +72,16 @@ PushResult Intake::copy(const Segment& segment, std::span<const double> followin
   if (!finite) return PushResult::not_finite;
   if (!(segment.feed_mm_per_s > 0.0) || !std::isfinite(segment.feed_mm_per_s)) return PushResult::no_feed;
   if ((segment.start_mm - last_.segment.end_mm).norm() > largest_gap_mm) return PushResult::not_connected;
-  // Its last set-point is its end: a sweep that leads elsewhere would be a jump there.
-  if (arc && std::abs(missing_sweep_rad(segment)) * segment.end_radius_mm > largest_gap_mm) {
-    return PushResult::not_connected;
-  }
+  const double missing_mm = arc ? std::abs(missing_sweep_rad(segment)) * segment.end_radius_mm : 0.0;
+  if (missing_mm > largest_gap_mm) return PushResult::not_connected;
   PlannedSegment planned;
   planned.segment = segment;
+  // A gap, there or at the end of a sweep, would be a jump within a period.
+  if (segment.start_mm != last_.segment.end_mm || missing_mm > no_travel_mm) {
+    planned.segment = begun_at(segment, last_.segment.end_mm);
+    const bool turns = planned.segment.start_radius_mm > 0.0 && planned.segment.sweep_rad * segment.sweep_rad > 0.0;
+    if (arc && !turns) return PushResult::not_connected;
+  }
   double longest = 0.0;
   for (std::size_t i = 0; i < n_following_; ++i) {
     const std::size_t axis = axis_count + i;
@@ -86,11 +91,12 @@ PushResult Intake::copy(const Segment& segment, std::span<const double> followin
     longest = std::max(longest, std::abs(planned.rate[axis]));
   }
   if (!(segment.length_mm > 0.0)) {
-    planned.segment.end_mm = segment.start_mm;
+    planned.segment.length_mm = 0.0;
+    planned.segment.end_mm = planned.segment.start_mm;
     planned.segment.kind = SegmentKind::line;
   }
   // Where X, Y and Z hardly move, what moves is the path.
-  if (planned.segment.kind != SegmentKind::arc && segment.length_mm < hardly_moves * longest) {
+  if (planned.segment.kind != SegmentKind::arc && planned.segment.length_mm < hardly_moves * longest) {
     planned.segment.length_mm = longest;
   }
   if (planned.segment.length_mm <= no_travel_mm) return PushResult::no_length;

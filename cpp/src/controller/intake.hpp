@@ -22,8 +22,11 @@ class Intake {
     dwell_ += periods;
     rests_ = true;
   }
-  /// Until the motion is let go.
-  void wait() noexcept { waits_ = rests_ = true; }
+  /// The next segment rests until so many stops are over.
+  void wait(std::uint64_t stops) noexcept {
+    waits_ = stops;
+    rests_ = true;
+  }
   /// Fills an entry of the queue; unless it says `accepted`, nothing has happened.
   PushResult take(const Segment& segment, std::span<const double> following_end, const SegmentRules& rules,
                   PlannedSegment& entry) noexcept;
@@ -41,7 +44,8 @@ class Intake {
   PlannedSegment last_;
   bool has_last_ = false;
   std::uint32_t dwell_ = 0;  // before the next one
-  bool rests_ = false, waits_ = false;
+  bool rests_ = false;
+  std::uint64_t waits_ = 0;
 };
 
 }  // namespace shapegcode

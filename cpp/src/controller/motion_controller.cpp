@@ -142,7 +142,7 @@ class MotionController::Implementation {
     if (const PushResult closed = closed_to_pushes(); closed != PushResult::accepted) return closed;
     const std::uint64_t head = head_.load(std::memory_order_relaxed);
     if (!stops_.push(head, {})) return PushResult::queue_full;
-    intake_.wait();
+    intake_.wait(stops_.pushed());
     rests_at_.store(head, std::memory_order_relaxed);
     return PushResult::accepted;
   }
@@ -166,10 +166,9 @@ class MotionController::Implementation {
     // Either this is seen by flushed(), or the flush is seen here.
     is_planning_.store(true, std::memory_order_seq_cst);
     const Flush flush = flush_.load(std::memory_order_seq_cst);
-    const bool worked =
-        (flush == Flush::none || flush == Flush::over) &&
-        planner_.plan(head_.load(std::memory_order_acquire), planned_ratios(), settled_.load(std::memory_order_relaxed),
-                      released_.load(std::memory_order_relaxed));
+    const bool worked = (flush == Flush::none || flush == Flush::over) &&
+                        planner_.plan(head_.load(std::memory_order_acquire), planned_ratios(),
+                                      settled_.load(std::memory_order_relaxed), stops_.taken());
     is_planning_.store(false, std::memory_order_release);
     return worked;
   }
@@ -224,8 +223,10 @@ class MotionController::Implementation {
   }
   void resume() noexcept {
     hold_.store(false, std::memory_order_relaxed);
-    const std::uint64_t waits = waits_before_.load(std::memory_order_relaxed);
-    if (waits > released_.load(std::memory_order_relaxed)) released_.store(waits, std::memory_order_relaxed);
+    const std::uint64_t reached = stops_reached_.load(std::memory_order_relaxed);
+    if (reached > stops_resumed_.load(std::memory_order_relaxed)) {
+      stops_resumed_.store(reached, std::memory_order_relaxed);
+    }
     // What is asked for from now on would be dropped by the step that leads back.
     if (abort_.load(std::memory_order_relaxed) || flush_.load(std::memory_order_relaxed) != Flush::none) return;
     jog_.close();
@@ -384,7 +385,7 @@ class MotionController::Implementation {
       return Jog::Mode::open;
     }
     const bool is_open = flush == Flush::asked || hold_.load(std::memory_order_relaxed) ||
-                         abort_.load(std::memory_order_relaxed) || waits_before_.load(std::memory_order_relaxed) > 0;
+                         abort_.load(std::memory_order_relaxed) || stops_reached_.load(std::memory_order_relaxed) > 0;
     if (is_open) return Jog::Mode::open;
     return jog_.is_beside() || retrace_.is_beside() ? Jog::Mode::returns : Jog::Mode::closed;
   }
@@ -467,7 +468,7 @@ class MotionController::Implementation {
     std::ranges::fill(passed_, Passed{0.0, segment, line, true});
     events_.drop_before(events_from_);
     stops_.drop_before(stops_from_);
-    waits_before_.store(0, std::memory_order_relaxed);
+    stops_reached_.store(0, std::memory_order_relaxed);
   }
 
   [[nodiscard]] static Activity rest_of(bool aborts, bool holds) noexcept {
@@ -520,15 +521,15 @@ class MotionController::Implementation {
     return runs_out ? Activity::starved : Activity::moving;
   }
 
-  // A stop that was pushed is over when it was reached and resumed.
+  // A stop that was pushed is over when it was reached and resumed: each one of several at the same place.
   bool waits_at_stop(bool settled) noexcept {
     const auto* next = stops_.first();
-    if (next != nullptr && released_.load(std::memory_order_relaxed) > next->segment) {
+    if (next != nullptr && stops_resumed_.load(std::memory_order_relaxed) > stops_.taken()) {
       stops_.drop();
       next = stops_.first();
     }
     const bool waits = next != nullptr && settled && has_reached(next->segment);
-    waits_before_.store(waits ? next->segment + 1 : 0, std::memory_order_relaxed);
+    stops_reached_.store(waits ? stops_.taken() + 1 : 0, std::memory_order_relaxed);
     return waits;
   }
 
@@ -624,10 +625,10 @@ class MotionController::Implementation {
   };
   struct Nothing {};
   PlaceQueue<Event> events_;
-  PlaceQueue<Nothing> stops_;                   // that were pushed
-  std::atomic<std::uint64_t> rests_at_{0};      // a dwell or stop is behind the segment before this one
-  std::atomic<std::uint64_t> released_{0};      // segments before this one do not wait
-  std::atomic<std::uint64_t> waits_before_{0};  // the segment that waits, plus 1; 0: none
+  PlaceQueue<Nothing> stops_;               // that were pushed
+  std::atomic<std::uint64_t> rests_at_{0};  // a dwell or stop is behind the segment before this one
+  // Stops, counted as they were pushed: up to the one at which it waits, 0 if it does not; and those that are over.
+  std::atomic<std::uint64_t> stops_reached_{0}, stops_resumed_{0};
   std::size_t delay_;
   std::vector<Passed> passed_;  // as many periods as the filters last
   ControllerState state_;

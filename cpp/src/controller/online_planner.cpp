@@ -116,10 +116,10 @@ std::ptrdiff_t OnlinePlanner::periods_ahead() const noexcept {
          static_cast<std::ptrdiff_t>(current.first_period + reader.index);
 }
 
-bool OnlinePlanner::plan(std::uint64_t pushed, const FeedRatios& ratios, bool settled, std::uint64_t released) {
+bool OnlinePlanner::plan(std::uint64_t pushed, const FeedRatios& ratios, bool settled, std::uint64_t stops_over) {
   bool has_worked = false;
   settled_ = settled;
-  released_ = released;
+  stops_over_ = stops_over;
   while (true) {
     follow_reader();
     if (periods_ahead() > rules_.lead_periods) return has_worked;
@@ -142,7 +142,7 @@ bool OnlinePlanner::begins_bound(const PathPoint& point) const noexcept {
 }
 
 bool OnlinePlanner::waits_at(const PathPoint& point) const noexcept {
-  return point.offset <= 0.0 && (*ring_)[point.segment].waits && point.segment >= released_;
+  return point.offset <= 0.0 && (*ring_)[point.segment].waits > stops_over_;
 }
 
 bool OnlinePlanner::wants_plan(const PathPoint& from, std::uint64_t pushed) const noexcept {
@@ -238,7 +238,7 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const F
   const double feed = here.programmed * here.feed_share * ratios.of(here);
   const bool is_faster = from.state.speed > std::min(here.max_speed, feed) * kept_feed;
   const FeedRatios planned_ratios = is_faster ? larger(ratios, ratios_) : ratios;
-  bool makes_plan = !has_motion_ || planned_ratios != ratios_ || wants_plan(from, pushed);
+  bool makes_plan = !has_motion_ || motion_.has_strayed() || planned_ratios != ratios_ || wants_plan(from, pushed);
   pushed_before_ = pushed;
   join(section);
   if (rests && begins_bound(from)) {
@@ -310,6 +310,7 @@ bool OnlinePlanner::fill(Section& section, double max_speed, int& settle) noexce
       if (motion_.at_stop()) settle = motion_.at_end() ? rules_.settling_periods : rest_at(motion_.point());
     }
     add(section, n++, motion_);
+    if (motion_.has_strayed()) break;  // the next section begins there, with a plan of its own
   }
   section.count = n;
   PathMotion stop = motion_;
@@ -353,6 +354,7 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
   const bool is_moving = begin.point.state.speed > 0.0;
   const std::ptrdiff_t reduced_from = is_moving ? static_cast<std::ptrdiff_t>(shortest_section * length_) : 0;
   const std::ptrdiff_t end = last + (at(last).point.state.speed > 0.0 ? 0 : 3);
+  std::uint64_t reduced = 0;  // segments before this one have been reduced already
   for (std::ptrdiff_t k = 1; k <= end; ++k) {
     double beyond = 0.0;
     const PlannedPoint& now = at(k);
@@ -380,7 +382,9 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
     const std::uint64_t from = at(std::max<std::ptrdiff_t>(k - 4, 0)).point.segment;
     const std::uint64_t behind = std::min(planned_, at(k + 1).point.segment + 2);
     const std::uint64_t least = is_moving ? begin.point.segment + 1 : first_;
-    for (std::uint64_t i = std::max(least, from - std::min<std::uint64_t>(from, 1)); i < behind; ++i) {
+    const std::uint64_t begin_reduced = std::max({least, reduced, from - std::min<std::uint64_t>(from, 1)});
+    reduced = std::max(reduced, behind);
+    for (std::uint64_t i = begin_reduced; i < behind; ++i) {
       PlannedSegment& less = (*ring_)[i];
       if (is_faster) less.feed_share *= feed / speed;
       if (beyond > kept) less.limit_share *= std::max(most_less, 1.0 / beyond);

@@ -32,9 +32,9 @@ class OnlinePlanner {
   void restart(std::uint64_t first, const AxisValues& position) noexcept;
 
   /// Plans until enough periods lie ahead. `pushed`: segments that are known; `ratios`: of the feeds, above 0;
-  /// `settled`: the filters behind have come to rest; `released`: segments before this one do not wait any more. Does
+  /// `settled`: the filters behind have come to rest; `stops_over`: stops of the queue that are over. Does
   /// not allocate. False: there was nothing to do.
-  bool plan(std::uint64_t pushed, const FeedRatios& ratios, bool settled, std::uint64_t released);
+  bool plan(std::uint64_t pushed, const FeedRatios& ratios, bool settled, std::uint64_t stops_over);
 
   [[nodiscard]] Sections& sections() noexcept { return sections_; }
   [[nodiscard]] const Sections& sections() const noexcept { return sections_; }
@@ -77,7 +77,7 @@ class OnlinePlanner {
   std::size_t start_ = 0;        // behind how many of its points the next one goes on
   std::size_t length_ = 1;       // periods of the next one
   bool settled_ = true;          // the filters behind
-  std::uint64_t released_ = 0;
+  std::uint64_t stops_over_ = 0;
   std::uint32_t failed_ = 0;  // the section behind which no motion was found, plus 1
   std::size_t retry_ = 0;
   double least_acceleration_ = 0.0, least_jerk_ = 0.0;

@@ -22,6 +22,7 @@ class PathBrake {
 
  private:
   [[nodiscard]] double hardest() const noexcept;
+  [[nodiscard]] double planned_speed(double distance) const noexcept;
   void go_to(double distance, double speed, double deceleration) noexcept;
 
   AxisValues acceleration_;

@@ -18,4 +18,7 @@ inline constexpr double largest_gap_mm = 1e-6;
   return std::remainder(end_rad - (arc.start_angle_rad + arc.sweep_rad), 2.0 * std::numbers::pi);
 }
 
+/// The same segment from a start that is within the largest gap of its own, to its end without a gap.
+[[nodiscard]] Segment begun_at(const Segment& segment, const Vector3& start) noexcept;
+
 }  // namespace shapegcode

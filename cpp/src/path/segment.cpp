@@ -7,6 +7,7 @@
 #include <string>
 
 #include "base/refuse.hpp"
+#include "path/arc_end.hpp"
 #include "path/arc_frame.hpp"
 #include "shapegcode/error.hpp"
 
@@ -114,6 +115,21 @@ Segment make_arc(const Vector3& start, const Vector3& end, const Vector3& centre
   const double travel = std::abs(sweep_rad) * mean_radius(segment);
   segment.length_mm = std::hypot(travel, end[normal] - start[normal]);
   return segment;
+}
+
+Segment begun_at(const Segment& segment, const Vector3& start) noexcept {
+  Segment begun = segment;
+  begun.start_mm = start;
+  begun.length_mm = (segment.end_mm - start).norm();
+  if (segment.kind != SegmentKind::arc) return begun;
+  const ArcFrame frame(segment.normal);
+  begun.start_radius_mm = frame.radius(start, segment.centre_mm);
+  begun.start_angle_rad = frame.angle_rad(start, segment.centre_mm);
+  begun.sweep_rad += std::remainder(segment.start_angle_rad - begun.start_angle_rad, 2.0 * std::numbers::pi);
+  begun.sweep_rad += missing_sweep_rad(begun);
+  const double travel = std::abs(begun.sweep_rad) * mean_radius(begun);
+  begun.length_mm = std::hypot(travel, segment.end_mm[segment.normal] - start[segment.normal]);
+  return begun;
 }
 
 Vector3 point_at(const Segment& segment, double s_mm) noexcept {

@@ -31,6 +31,8 @@ constexpr double next_excess = 1.5;
 constexpr double last_excess = 16.0;
 // Where in a period the jerk is looked at, by its length.
 constexpr std::array<double, 4> jerk_looked_at{0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0};
+// How far ahead of a motion that begins a stop is near, in periods at full speed.
+constexpr double periods_to_stop = 4.0;
 // A speed, and what a period makes of it, that is none, mm/s.
 constexpr double no_speed = 1e-10;
 
@@ -450,6 +452,11 @@ void PathMotion::advance(double max_speed) noexcept {
   after_period_ = derivatives_after(period_s_);
   after_two_ = derivatives_after(2.0 * period_s_);
   jerks_ = allowed();
+  if (at_rest()) {
+    // Not past a near stop, where the limits are far beyond what so short a motion can do.
+    const double period_mm = periods_to_stop * plan_->station(station_).speed_limit * period_s_;
+    jerks_.high = std::min(jerks_.high, 6.0 * to_stop(std::max(near, period_mm)) / std::pow(period_s_, 3));
+  }
   wish_ = jerks_.high;
   if (jerks_.low <= jerks_.high) {
     double jerk = 0.0;

@@ -33,6 +33,8 @@ class PathMotion {
   [[nodiscard]] bool at_stop() const noexcept {
     return at_rest() && (at_end() || (offset_ <= 0.0 && plan_->station(station_).stop));
   }
+  /// At rest between two stops: it did not follow the plan, which knows no way from there.
+  [[nodiscard]] bool has_strayed() const noexcept { return at_rest() && !at_stop() && (station_ > 0 || offset_ > 0.0); }
   [[nodiscard]] PathPoint point() const noexcept;
   /// How far behind a station of the plan.
   [[nodiscard]] double in_station() const noexcept { return offset_; }

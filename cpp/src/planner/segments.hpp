@@ -36,7 +36,7 @@ struct PlannedSegment {
   // The junction at its start.
   bool stop = false;               ///< the motion comes to rest there
   std::uint32_t dwell = 0;         ///< periods that it rests beside what filters behind need
-  bool waits = false;              ///< until it is let go
+  std::uint64_t waits = 0;         ///< until so many stops of the queue are over
   AxisValues turn{};               ///< jump of the direction, the first derivative by the path length
   AxisValues bend{};               ///< jump of the second derivative, 1/mm
   double turn_share = 0.0;         ///< of the tolerance, per mm of the half-width of its rounding

@@ -231,6 +231,7 @@ def _cycle_time_s(plan: ConversionPlan, shaped: Shaped, emitted_s: float, cuttin
 def _warnings(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> list[str]:
     program, machine, written = plan.program, plan.machine, shaped.written
     warnings = [*program.warnings, *written.kept_warnings, *machine_warnings(machine)]
+    warnings += _other_control(machine)
     warnings += [plan.grid.note] if plan.grid.note else []
     warnings += region_range_warnings(program.regions, machine)
     if plan.spending is not None and (sentence := plan.spending.warning(plan.grid)):
@@ -244,6 +245,23 @@ def _warnings(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> 
     warnings += text_warnings(program, written.placed, figures, machine, written.size, written.blocks)
     warnings += [why for _, _, why in ini_lines([place.blocks(shaped.emitted) for place in written.placed], machine)]
     return warnings + (shaped.rapids.warnings if shaped.rapids is not None else [])
+
+
+def _other_control(machine: Machine) -> list[str]:
+    """Where the program is written for another control than its planner is judged by."""
+    kind, name = machine.controller.kind, machine.emission.dialect
+    if kind == "grbl":
+        return [
+            "no dialect for GRBL: the program has words that GRBL does not read (O, M06, G43, G64 and others): "
+            "take them out with emission.words, and read every line before it is run"
+        ]
+    if (name if name in {"linuxcnc", "klipper"} else "fanuc") == kind:
+        return []
+    judged = {"fanuc": "a FANUC control's", "linuxcnc": "LinuxCNC's", "klipper": "Klipper's"}[kind]
+    return [
+        f'emission.dialect = "{name}", but the motion is judged by {judged} planner (controller.kind = "{kind}"): '
+        "residual vibration and time hold only if both are the control that runs the program"
+    ]
 
 
 def _used_shaper(grid: Grid) -> UsedShaper:

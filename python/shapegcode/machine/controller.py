@@ -272,7 +272,8 @@ class Controller(TomlTable):
         assumed=0.01,
     )
     calculator_decimal_point: Bool = key(
-        "X10 without a decimal point: 10 mm or inch if true, 10 least increments if false",
+        "X10 without a decimal point: 10 mm or inch if true, 10 least increments if false. LinuxCNC, Klipper and GRBL "
+        "(kind) know only the first: true where it is left out",
         fanuc="3401#0",
         default=False,
     )
@@ -325,6 +326,19 @@ class Controller(TomlTable):
         "its line instead of being simulated for hours",
         default=100_000.0,
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_increments(cls, data: Any) -> Any:
+        if isinstance(data, dict) and data.get("kind", "fanuc") != "fanuc":
+            return {"calculator_decimal_point": True} | data
+        return data
+
+    @model_validator(mode="after")
+    def _reads_whole_units(self) -> Self:
+        if self.kind != "fanuc" and not self.calculator_decimal_point:
+            raise ValueError(f'calculator_decimal_point = false: with kind = "{self.kind}" X10 is 10 mm or inch')
+        return self
 
     @model_validator(mode="after")
     def _has_its_rule(self) -> Self:

@@ -47,6 +47,7 @@ _MOVES_AND_ARCS = re.compile(rf"(?:[ \t]*(?:{_LINE}|{_ARC}))+", re.IGNORECASE)
 _LAST_WORD = {letter: re.compile(rf"{letter}[ \t]*({_NUMBER})", re.IGNORECASE) for letter in "XYZF"}
 _EVERY_WORD = {letter: re.compile(rf"{letter}[ \t]*([-+\d.]+)", re.IGNORECASE) for letter in "XYZ"}
 _BEGINS_WITH_G = re.compile(r"[ \t]*(?:N\d+[ \t]*)?G0?[0-3](?![\d.])", re.IGNORECASE)
+_POINTLESS = re.compile(r"([XYZIJKF][ \t]*[-+]?\d+)(?![\d.])", re.IGNORECASE)
 _G_CODE = re.compile(r"G0?([0-3])", re.IGNORECASE)
 # 1 to 99999, as FANUC has them.
 _N_WORD = re.compile(r"^[ \t]*/?[ \t]*N[ \t]*0*([1-9]\d{0,4})(?![\d.])", re.IGNORECASE | re.MULTILINE)
@@ -68,6 +69,8 @@ class _Interpreter:
         self._files: dict[str, SourceFile] = {}
         self._blocks: dict[tuple[int, int], Block] = {}
         self._plain = PlainProgram()
+        # The plain program is read with the machine's own setting too, once it is emitted.
+        self._adds_points = not machine.controller.calculator_decimal_point
         self._state = _first_state(machine, folder)
         self._runner = BlockRunner(self._state, self._plain)
         self._frames = [Frame(0, self._main)]
@@ -149,8 +152,10 @@ class _Interpreter:
         self._runner.sync()
         if self._runner.written_motion != modes.motion and _BEGINS_WITH_G.match(text) is None:
             self._runner.put(f"G{modes.motion // 10:02d}")
-        self._plain.put_lines(text, self._next + 1, self._file.index)
         self._follow(text, modes)
+        if self._adds_points:
+            text = _POINTLESS.sub(r"\1.", text)
+        self._plain.put_lines(text, self._next + 1, self._file.index)
         count = text.count("\n")
         self._next += count
         self._steps += count

@@ -154,6 +154,7 @@ _TURNS = re.compile(
     rb"G0*[23](?![\d.])[ \t]*+(?:[FIJKRXYZ][ \t]*+[-+\d.]++[ \t]*+)++P[ \t]*0*([2-9]|[1-9]\d+)(?![\d.])"
 )
 _PERCENT = re.compile(rb"(?m)^[ \t]*%[ \t\r]*$")
+_WRITTEN_FOR = re.compile(rb"(?m)^[ \t]*[;(] ?DIALECT (KLIPPER|ISG)\b")
 COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
 
 _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ...] = (
@@ -325,6 +326,13 @@ def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
 
 def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]:
     """The dialect of a program."""
+    if written := _WRITTEN_FOR.search(data[:LOOKED_AT_BYTES]):
+        control = {b"KLIPPER": "Klipper", b"ISG": "the ISG kernel"}[written[1]]
+        raise refusal(
+            source,
+            data.count(b"\n", 0, written.start()) + 1,
+            f"emitted for {control}, whose programs are written and not read: keep the original",
+        )
     stated = machine.controller.dialect
     # A machine of FANUC's kind and a program without foreign words: the usual case takes one look.
     expected = stated if stated != "auto" else machine.controller.kind
