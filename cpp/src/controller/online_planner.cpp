@@ -275,6 +275,14 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const F
       return true;
     }
     makes_plan = rests;
+    if (is_whole || !rests) continue;
+    // Too fast to stop again within a section.
+    for (std::uint64_t i = from.segment; i < std::min(planned_, from.segment + 2); ++i) {
+      PlannedSegment& less = (*ring_)[i];
+      if (less.limit_share < least_share) continue;
+      less.limit_share *= most_less;
+      less.feed_share *= most_less;
+    }
   }
   has_motion_ = false;
   failed_ = last_number_ + 1;
