@@ -447,7 +447,7 @@ Args:
     word: What belongs to it, below 2^64.
 
 Returns:
-    `accepted`, `queue_full` (as many may wait as segments), `aborted`.)")
+    `accepted`, `queue_full` (as many may wait as segments), `flushing`, `aborted`.)")
       .def(
           "push_dwell", [](PyController& self, double time_s) { return self.control().push_dwell(time_s); },
           py::arg("time_s"), R"(Rest behind the segment that was pushed last. A hold in it restarts it.
@@ -456,7 +456,7 @@ Args:
     time_s: For so long the set-points rest, 0 to 1e6.
 
 Returns:
-    `accepted`, `no_time`, `aborted`.)")
+    `accepted`, `no_time`, `flushing`, `aborted`.)")
       .def(
           "push_stop", [](PyController& self) { return self.control().push_stop(); },
           "A programmed stop (M00) behind the segment that was pushed last: at rest there it is held until resume().")

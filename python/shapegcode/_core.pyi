@@ -542,6 +542,8 @@ class Segment:
     def chords_within(self, tolerance_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         How many equal chords of an arc lie within a tolerance of it; 1 for a line.
+        
+        Raises ArgumentError if the tolerance is not above 0.
         """
     def point_at(self, s_mm: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
@@ -1180,7 +1182,7 @@ class PushResult:
     
       not_connected : It does not start where the one before ended, or an arc misses its end (1e-6 mm).
     
-      no_length : It moves no axis.
+      no_length : It moves no axis by more than 1e-9 mm or degrees.
     
       no_feed : A feed that is not above zero, or not finite.
     
@@ -1884,7 +1886,7 @@ class MotionController:
             time_s: For so long the set-points rest, 0 to 1e6.
         
         Returns:
-            `accepted`, `no_time`, `aborted`.
+            `accepted`, `no_time`, `flushing`, `aborted`.
         """
     def push_event(self, id: typing.SupportsInt | typing.SupportsIndex, word: typing.SupportsInt | typing.SupportsIndex = 0) -> PushResult:
         """
@@ -1895,7 +1897,7 @@ class MotionController:
             word: What belongs to it, below 2^64.
         
         Returns:
-            `accepted`, `queue_full` (as many may wait as segments), `aborted`.
+            `accepted`, `queue_full` (as many may wait as segments), `flushing`, `aborted`.
         """
     def push_line(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, *, rules: SegmentRules | None = None, line: typing.SupportsInt | typing.SupportsIndex = 0, stop_at_end: bool = False) -> PushResult:
         """

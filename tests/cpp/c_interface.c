@@ -268,6 +268,17 @@ static void following_axis(void) {
   CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
 }
 
+static void axis_that_is_not_there(void) {
+  shapegcode_settings* settings = plain_settings();
+  shapegcode_controller* control = NULL;
+  char message[200];
+  CHECK(shapegcode_settings_set(settings, SHAPEGCODE_FOLLOWING_AXES, 1.0) == SHAPEGCODE_OK);
+  CHECK(shapegcode_settings_set_axis(settings, SHAPEGCODE_MAX_FEED, 4, 7.0) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_create(settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(control == NULL && strstr(message, "axis 4") != NULL);
+  CHECK(shapegcode_settings_destroy(settings) == SHAPEGCODE_OK);
+}
+
 static void abort_and_restart(void) {
   shapegcode_controller* control = made(plain_settings());
   const double far_away[3] = {100, 0, 0};
@@ -499,6 +510,7 @@ int main(void) {
   probing();
   arcs();
   following_axis();
+  axis_that_is_not_there();
   beside_the_path();
   other_shapers();
   abort_and_restart();

@@ -184,6 +184,13 @@ double highest_acceleration(const ControllerSettings& control, std::size_t axis)
 ControllerSettings settings_of(const shapegcode_settings& given) {
   ControllerSettings control = given.control;
   const std::size_t n = axis_count + given.following;
+  for (std::size_t i = n; i < given.axes.size(); ++i) {
+    if (given.axes[i].is_set) {
+      throw Error(ErrorKind::argument, detail::message("axis {} is set, but the control has {} axes: "
+                                                       "SHAPEGCODE_FOLLOWING_AXES",
+                                                       i, n));
+    }
+  }
   const std::span axes = std::span(given.axes).first(n);
   for (const AxisNumbers& axis : axes.subspan(axis_count)) control.following.push_back(axis.following);
   const bool shapes_each = std::ranges::any_of(axes, [](const AxisNumbers& axis) { return axis.shaper.has_value(); });
@@ -244,6 +251,7 @@ shapegcode_status shapegcode_settings_set_axis(shapegcode_settings* settings, in
   }
   if (target == nullptr) return SHAPEGCODE_ERROR_ARGUMENT;
   *target = value;
+  numbers.is_set = true;
   return SHAPEGCODE_OK;
 }
 
@@ -255,7 +263,9 @@ shapegcode_status shapegcode_settings_set_shaper(shapegcode_settings* settings, 
     if (axis < 0) {
       settings->control.shaper = fir_of(*shaper);
     } else {
-      settings->axes[static_cast<std::size_t>(axis)].shaper = fir_of(*shaper);
+      AxisNumbers& numbers = settings->axes[static_cast<std::size_t>(axis)];
+      numbers.shaper = fir_of(*shaper);
+      numbers.is_set = true;
     }
   });
 }

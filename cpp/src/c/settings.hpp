@@ -20,6 +20,7 @@ struct AxisNumbers {
   OffsetLimits offset;
   std::optional<double> emergency_acceleration;
   std::optional<Fir> shaper;
+  bool is_set = false;
 };
 
 }  // namespace shapegcode::c

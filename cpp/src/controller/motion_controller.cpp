@@ -77,7 +77,8 @@ const char* text_of(JogResult result) noexcept {
     case JogResult::accepted:
       return "accepted";
     case JogResult::path_moves:
-      return "an axis is jogged while the path is held, flushed or aborted and rests";
+      return "refused: the path moves; an axis is jogged, or the path retraced, only while it rests held, flushed or "
+             "aborted";
     case JogResult::no_axis:
       return "there is no such axis";
     case JogResult::not_finite:
