@@ -138,10 +138,14 @@ def test_what_names_no_file_is_an_error_of_arguments(given: object) -> None:
         sg.convert(given, "vx500")  # type: ignore[arg-type]
 
 
-def test_set_points_that_cannot_be_counted() -> None:
-    machine = sg.Machine.load("vx500").with_values("axes.x.max_acceleration_mm_s2", 1e-300)
-    with pytest.raises(sg.ArgumentError, match="a path takes far too many set-points"):
-        sg.simulate(PROGRAMS / "PARALLEL.NC", machine)
+def test_more_set_points_than_there_is_room_for() -> None:
+    """The slowest machine that a file can describe, and a long way."""
+    slow = sg.Machine.load("vx500").with_values(
+        {"axes.x.max_feed_mm_per_min": 1.0, "controller.interpolation_period_s": 1e-5}
+    )
+    program = "%\nO1\nG21G17G90G94\nG00X0.Y0.Z5.\nG01X900.F5000.\nM30\n%\n"
+    with pytest.raises(sg.ArgumentError, match="set-points"):
+        sg.simulate(program, slow)
 
 
 @pytest.mark.parametrize("bomb", TOML_BOMBS)
