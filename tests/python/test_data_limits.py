@@ -17,7 +17,6 @@ import pytest
 from scipy.io import savemat, wavfile
 
 import shapegcode as sg
-from acceptance import PROGRAMS
 from command import run
 from faults import RECORD_BOMBS, TOML_BOMBS, command, sound
 

@@ -630,3 +630,19 @@ def test_option_of_the_function_and_the_line_of_a_caution() -> None:
 def test_a_comment_that_would_act_on_linuxcnc() -> None:
     assert b"(NOTE MSG, A NOTE)" in converted("linuxcnc").text
     assert b"(MSG, A NOTE)" in converted("haas").text
+
+
+def test_cuts_left_unchanged_keep_the_path_tolerance_of_a_linuxcnc_program(tmp_path: Path) -> None:
+    """G64 P0.2 around them; a shaped cut has P0.001 Q0 of its own, and gives the program's back."""
+    program = (
+        "G21 G90 G17 G64 P0.2\nG0 X0 Y0 Z5\nG1 Z0 F6000\nX50\nY50\nX0\nG0 Z5\n"
+        "X100\nG1 Z0 F100\nX101 F20\nX102\nG0 Z5\nM2\n"
+    )
+    (tmp_path / "part.ngc").write_text(program)
+    machine = sg.Machine.load("vx500").with_values(
+        {"controller.kind": "linuxcnc", "emission.dialect": "linuxcnc", "price.cut_time_percent": 300.0}
+    )
+    for leave, expected in (((), ["P0.2", "P0.001Q0", "P0.001Q0", "P0.2"]), (((1, 13),), ["P0.2"])):
+        conversion = sg.convert(tmp_path / "part.ngc", machine, leave=leave, max_time_increase_percent=300.0)
+        assert conversion.nothing_shaped == bool(leave)
+        assert re.findall(r"G64(P[\d.]+(?:Q[\d.]+)?)", conversion.text.decode()) == expected

@@ -108,6 +108,7 @@ def test_controls_without_increments_read_whole_units(kind: str) -> None:
     assert not Machine.from_toml(MINIMAL).controller.calculator_decimal_point
     own = MINIMAL + f'[controller]\nkind = "{kind}"\n'
     assert Machine.from_toml(own).controller.calculator_decimal_point
+    assert Machine.from_toml(own).controller.program_memory_bytes == 4 * 10**9  # a disk
     (message,) = problems(own + "calculator_decimal_point = false\n")
     assert f'with kind = "{kind}" X10 is 10 mm or inch' in message
     assert Machine.from_toml(MINIMAL).with_values("controller.kind", kind).controller.calculator_decimal_point

@@ -220,10 +220,11 @@ class Conversion(ProgramFigures, Result):
         if worst_stay and best.is_shaped:
             beside = "; the worst cuts are left unchanged, lines {} to {} are better by ".format(*best.lines)
             beside += f"{best.gain_um:.1f} µm"
+        shown = f"residual vibration {axis.upper()} {vibration.original[axis]:.1f} → {vibration.emitted[axis]:.1f} µm, "
+        if shown.count(" 0.0 ") == 2:
+            shown = ""  # the gain is in the contour
         return (
-            f"{verdict}: residual vibration {axis.upper()} "
-            f"{vibration.original[axis]:.1f} → {vibration.emitted[axis]:.1f} µm, "
-            f"contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}"
+            f"{verdict}: {shown}contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}"
             f"{self._share}{beside}"
         )
 

@@ -202,6 +202,11 @@ class _Translator:
         foreign = self._original.foreign
         same_control = foreign is not None and foreign.dialect == machine.emission.dialect
         self._names = foreign.settings.names if foreign is not None and same_control else {}
+        # Cuts that are left unchanged keep the path tolerance of the program.
+        self._tolerance = foreign.settings.path_tolerance_mm if foreign is not None and same_control else None
+        self._begins = {first for _, (first, _), _ in shaped}
+        self._ends = {last for _, (_, last), _ in shaped}
+        self._is_shaped = False
         self._linear: dict[int, list[str]] = {}
         if machine.emission.feed_form == "linear":
             for blocks, _, _ in shaped:
@@ -240,7 +245,20 @@ class _Translator:
         )
 
     def lines(self, number: int, line: str) -> list[str]:
-        """What becomes of a line."""
+        """What becomes of a line; around a shaped cut its own path tolerance."""
+        if self._tolerance is None or not {number} & (self._begins | self._ends):
+            return self._line(number, line)
+        before, behind = list[str](), list[str]()
+        if number in self._begins:
+            self._is_shaped = True
+            before = [self._filled(self._dialect.becomes["G64"])]
+        written = self._line(number, line)
+        if number in self._ends:
+            self._is_shaped = False
+            behind = [self._filled(self._dialect.becomes["G64"])] if self.state.path == "G64" else []
+        return [*before, *written, *behind]
+
+    def _line(self, number: int, line: str) -> list[str]:
         state = self.state
         if number in self._linear:
             return self._linear[number]
@@ -493,9 +511,12 @@ class _Translator:
         return ""
 
     def _filled(self, text: str) -> str:
-        return text.replace(
-            "{blend}", f"{_BLEND_MM / MM_PER_INCH:.5f}" if self.state.unit == "G20" else f"{_BLEND_MM:g}"
-        )
+        unit_mm = MM_PER_INCH if self.state.unit == "G20" else 1.0
+        if "{blend}" in text and self._tolerance is not None and not self._is_shaped:
+            named = zip("PQ", self._tolerance, strict=True)
+            words = (f"{name}{each / unit_mm:.6f}".rstrip("0") for name, each in named if each is not None)
+            return "G64" + "".join(words)
+        return text.replace("{blend}", f"{_BLEND_MM / unit_mm:.5f}" if unit_mm > 1.0 else f"{_BLEND_MM:g}")
 
     def _split(
         self, number: int, codes: Sequence[str], words: Sequence[tuple[str, str]], out: Sequence[str]

@@ -30,6 +30,9 @@ PLANNER_NAMES = {"fanuc": "FANUC", "linuxcnc": "LinuxCNC", "klipper": "Klipper",
 """Kinds of controls for people."""
 
 
+_NO_MEMORY_LIMIT = 4 * 10**9  # bytes
+
+
 class LinuxcncPlanner(TomlTable):
     """What the INI file and the program say of the motion; its period is interpolation_period_s."""
 
@@ -253,7 +256,9 @@ class Controller(TomlTable):
         assumed="linear",
     )
     program_memory_bytes: Annotated[int, Strict(), Field(gt=0)] = key(
-        "memory for programs; a larger output gets a warning", assumed=262_144
+        "memory for programs; a larger output gets a warning. With kind other than FANUC's 4 GB where it is left out: "
+        "they read from a disk",
+        assumed=262_144,
     )
     dnc_baud: Count = key(
         "speed of the serial line when programs are drip fed; 0: not drip fed", fanuc="0103", default=0
@@ -329,9 +334,9 @@ class Controller(TomlTable):
 
     @model_validator(mode="before")
     @classmethod
-    def _without_increments(cls, data: Any) -> Any:
+    def _of_a_computer(cls, data: Any) -> Any:
         if isinstance(data, dict) and data.get("kind", "fanuc") != "fanuc":
-            return {"calculator_decimal_point": True} | data
+            return {"calculator_decimal_point": True, "program_memory_bytes": _NO_MEMORY_LIMIT} | data
         return data
 
     @model_validator(mode="after")

@@ -104,7 +104,10 @@ class _Interpreter:
             )
         if not self._runner.ended:
             self._plain.put("M30", self._main.count)
-        settings = ForeignSettings(peck_clearance_mm=PECK_CLEARANCE_MM)
+        blends = self._runner.path_tolerances
+        settings = ForeignSettings(
+            peck_clearance_mm=PECK_CLEARANCE_MM, path_tolerance_mm=next(iter(blends)) if len(blends) == 1 else None
+        )
         if (table := self._state.table) is not None:
             unit = f"lengths and diameters in {table.units} (input.machine_unit, or the INI file)"
             self._plain.note(1, f"{table.file}: {len(table.tools)} tools, {unit}")

@@ -39,6 +39,7 @@ class BlockRunner:
         self.written_feed = 0.0
         self.ended = False
         self.offsets = Offsets(state, self.put)
+        self.path_tolerances: set[tuple[float | None, float | None]] = set()  # (P, Q) of G64, mm
 
     def put(self, text: str) -> None:
         """Write one line; the first block of a line of the source takes its N word."""
@@ -199,11 +200,15 @@ class BlockRunner:
                 "block: read as G64",
                 "G61",
             )
-        elif "p" in values:
+            self.path_tolerances |= {(None, None), (0.0, 0.0)}  # more than one
+        else:
+            p, q = (values[name] * self.state.unit_mm if name in values else None for name in "pq")
+            self.path_tolerances.add((p, q))
+        if code == 640 and "p" in values:
             blend = values["p"] * self.state.unit_mm
             self.note(
                 f"G64 P: blends leave the path by up to {blend:g} mm (FANUC's G64 has no P); the planner model takes "
-                "it from controller.linuxcnc.blend_tolerance_mm",
+                "it from controller.linuxcnc.blend_tolerance_mm, for the original and for what is left unchanged",
                 "G64 P",
             )
         return "G64"

@@ -40,6 +40,8 @@ class ForeignSettings:
     calculator_decimal_point: bool | None = True  # whether X10 is 10 mm; None: as the machine file says
     # writes a program of another file that it calls (text, name) in FANUC's words; None: it calls none
     called_text: Callable[[str, str], str] | None = None
+    # LinuxCNC: the one (P, Q) of all its G64, mm, None for a word that is left out; None: there are several, or none
+    path_tolerance_mm: tuple[float | None, float | None] | None = None
     # words that stand for others of the source, for who writes for that control again: {"T901": 'T="MILL"'}
     names: Mapping[str, str] = field(default_factory=dict)
 
