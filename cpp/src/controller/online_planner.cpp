@@ -42,6 +42,8 @@ constexpr double least_points = 512.0;
 constexpr double most_points = 16384.0;
 constexpr double highest_speed = 1000.0;
 
+Vector3 xyz(const PlannedPoint& point) noexcept { return {point.position[0], point.position[1], point.position[2]}; }
+
 std::size_t points_of(const PlanningRules& rules) noexcept {
   double longest_s = 0.0;
   for (std::size_t i = 0; i < rules.limits.axes; ++i) {
@@ -59,7 +61,9 @@ std::size_t points_of(const PlanningRules& rules) noexcept {
 OnlinePlanner::OnlinePlanner(SegmentRing& ring, const PlanningRules& rules)
     : ring_(&ring),
       rules_(rules),
-      sections_(points_of(rules), rules.lead_periods > 0 ? sections_ahead + spare_sections : spare_sections + 1),
+      contour_(rules.chains, rules.filtered_mm, points_of(rules)),
+      sections_(points_of(rules), rules.lead_periods > 0 ? sections_ahead + spare_sections : spare_sections + 1,
+                contour_.duration()),
       plan_(ring, planned_limits(rules.limits, rules.period_s), rules.period_s,
             std::max(least_stations, stations_of_segment * rules.window), rules.max_across),
       motion_(plan_, rules.period_s) {
@@ -219,6 +223,10 @@ void OnlinePlanner::join(Section& section) const noexcept {
     const std::size_t back = last_->is_bound && start_ > 0 ? 0 : i;
     section.before[i] = last_->at(static_cast<std::ptrdiff_t>(start_) - static_cast<std::ptrdiff_t>(back));
   }
+  for (std::size_t i = 0; i < section.past.size(); ++i) {
+    const std::size_t back = last_->is_bound && start_ > 0 ? 0 : i;
+    section.past[i] = back < start_ ? xyz(last_->points[start_ - back - 1]) : last_->past[back - start_];
+  }
 }
 
 bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const FeedRatios& asked) {
@@ -361,7 +369,9 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
   const PlannedPoint& begin = section.before[0];
   const bool is_moving = begin.point.state.speed > 0.0;
   const std::ptrdiff_t reduced_from = is_moving ? static_cast<std::ptrdiff_t>(shortest_section * length_) : 0;
-  const std::ptrdiff_t end = last + (at(last).point.state.speed > 0.0 ? 0 : 3);
+  const auto held = static_cast<std::ptrdiff_t>(contour_.duration());
+  const std::ptrdiff_t end = last + (at(last).point.state.speed > 0.0 ? 0 : std::max<std::ptrdiff_t>(3, held));
+  contour_.begin(section.past);
   std::uint64_t reduced = 0;  // segments before this one have been reduced already
   for (std::ptrdiff_t k = 1; k <= end; ++k) {
     double beyond = 0.0;
@@ -378,6 +388,7 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
                          std::abs(p0 - 2.0 * p1 + p2) / (t * t * rules_.limits.acceleration[i]),
                          (std::abs(p0 - 3.0 * p1 + 3.0 * p2 - p3) / (t * t * t) - noise) / rules_.limits.jerk[i]});
     }
+    if (contour_.is_on()) beyond = std::max(beyond, contour_.add(xyz(now)));
     const PlannedSegment& entry = (*ring_)[now.point.segment];
     const PlannedSegment& last_entry = (*ring_)[before.point.segment];
     const double feed = std::max(ratios_.of(entry) * entry.programmed, ratios_.of(last_entry) * last_entry.programmed);
@@ -387,7 +398,7 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
     if (!reduces) return false;
     keeps = false;
     if (k <= reduced_from) continue;
-    const std::uint64_t from = at(std::max<std::ptrdiff_t>(k - 4, 0)).point.segment;
+    const std::uint64_t from = at(std::max<std::ptrdiff_t>(k - std::max<std::ptrdiff_t>(4, held), 0)).point.segment;
     const std::uint64_t behind = std::min(planned_, at(k + 1).point.segment + 2);
     const std::uint64_t least = is_moving ? begin.point.segment + 1 : first_;
     const std::uint64_t begin_reduced = std::max({least, reduced, from - std::min<std::uint64_t>(from, 1)});
@@ -399,7 +410,7 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
       // What is still beyond them when little is planned is run from rest to rest.
       if (less.limit_share < least_share && !less.is_fixed && !plan_.is_covered(i)) less.stop = true;
     }
-    k += 4;
+    if (!contour_.is_on()) k += 4;
   }
   return keeps;
 }

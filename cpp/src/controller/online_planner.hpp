@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
+#include "controller/contour_check.hpp"
 #include "controller/sections.hpp"
 #include "planner/path_motion.hpp"
 #include "planner/path_plan.hpp"
@@ -20,6 +22,9 @@ struct PlanningRules {
   std::size_t window = 128;      ///< segments that are planned ahead
   int lead_periods = 0;          ///< that are planned before they are run
   int settling_periods = 0;      ///< rest at a stop: what the filters behind hold
+  /// Filters behind, and how far these may take the set-points from their path.
+  std::vector<FilterStages> chains;
+  double filtered_mm = no_limit;
 };
 
 /// Plans the motion over a ring of segments. A section that does not keep the limits at every set-point is never given
@@ -62,6 +67,7 @@ class OnlinePlanner {
 
   SegmentRing* ring_;
   PlanningRules rules_;
+  ContourCheck contour_;
   Sections sections_;
   PathPlan plan_;
   PathMotion motion_;                      // on the plan, at the end of the last section

@@ -12,6 +12,7 @@ void Sections::restart(const PlannedPoint& point) noexcept {
   rest.done = point.point.segment;
   rest.runs_out = rest.is_bound = false;
   rest.before.fill(point);
+  std::ranges::fill(rest.past, Vector3(point.position[0], point.position[1], point.position[2]));
   slot_of_.fill(0);
   current_ = 0;
   next_ = 1;

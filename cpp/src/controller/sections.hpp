@@ -37,6 +37,8 @@ struct Section {
   AxisValues low{}, high{};  ///< of the positions
   /// Points before the first, newest first.
   std::array<PlannedPoint, 3> before{};
+  /// Where these and those before them are, newest first: as many as filters behind hold.
+  std::vector<Vector3> past;
   std::vector<PlannedPoint> points;
 
   /// The point after so many periods; up to three before the first one.
@@ -49,9 +51,12 @@ struct Section {
 /// that comes too late for that is dropped, and the stop is run.
 class Sections {
  public:
-  /// `capacity`: points of a section; `count`: sections that there is room for, at most 16.
-  Sections(std::size_t capacity, std::size_t count) : slots_(count) {
-    for (Section& section : slots_) section.points.resize(capacity);
+  /// `capacity`: points of a section; `count`: sections that there is room for, at most 16; `past`: positions before.
+  Sections(std::size_t capacity, std::size_t count, std::size_t past = 0) : slots_(count) {
+    for (Section& section : slots_) {
+      section.points.resize(capacity);
+      section.past.resize(past, Vector3::Zero());
+    }
   }
   /// At rest at a point; neither thread is at work.
   void restart(const PlannedPoint& point) noexcept;

@@ -30,6 +30,34 @@ constexpr double fade_third = 60.0;
 // Places of a fade where it is looked at.
 constexpr int fade_places = 8;
 
+double largest_mean(const std::vector<Fir>& chains) {
+  double mean = 0.0;
+  for (const Fir& chain : chains) mean = std::max(mean, chain.mean_samples());
+  return mean;
+}
+
+// As late as the slowest of them, or a straight path would not stay straight: a delay by whole samples and a share of
+// one, which leaves every zero of the shaper.
+void align(std::vector<Fir>& shapers) {
+  const double mean = largest_mean(shapers);
+  for (Fir& shaper : shapers) {
+    const double later = mean - shaper.mean_samples();
+    const int whole = static_cast<int>(std::floor(later));
+    const double share = later - whole;
+    if (later < tap_rounding) continue;
+    const bool is_whole = share < tap_rounding;
+    const Fir late = convolved(shaper, is_whole ? Fir({whole}, {1.0}) : Fir({whole, whole + 1}, {1.0 - share, share}));
+    std::vector<int> delays;
+    std::vector<double> taps;
+    for (std::size_t k = 0; k < late.taps().size(); ++k) {
+      if (late.taps()[k] == 0.0) continue;
+      delays.push_back(late.delays()[k]);
+      taps.push_back(late.taps()[k]);
+    }
+    shaper = Fir(std::move(delays), std::move(taps));
+  }
+}
+
 // One shaper for all axes, or one for each.
 template <typename Shapers>
 std::vector<Fir> each_of(const Shapers& shapers, int n_axes) {
@@ -39,6 +67,7 @@ std::vector<Fir> each_of(const Shapers& shapers, int n_axes) {
     detail::refuse("{} shapers for {} axes: one for all, or one for each", each.size(), n_axes);
   }
   for (Fir& fir : each) fir = scaled_to_one(fir);
+  align(each);
   return each;
 }
 
@@ -46,12 +75,6 @@ std::vector<Fir> each_of(const Shapers& shapers, int n_axes) {
 std::vector<Fir> shapers_of(const ControllerSettings& settings, int n_axes) {
   if (const auto* following = std::get_if<FollowingFir>(&settings.shaper)) return following->fir().set();
   return each_of(settings.shaper, n_axes);
-}
-
-double largest_mean(const std::vector<Fir>& chains) {
-  double mean = 0.0;
-  for (const Fir& chain : chains) mean = std::max(mean, chain.mean_samples());
-  return mean;
 }
 
 // The second difference over `delay` samples, scaled so that an arc comes out of both with its own radius.
@@ -101,6 +124,7 @@ SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
     following_ = *following;
     varying_.emplace_back(following->fir(), static_cast<int>(orders) * n_axes);
   }
+  FilterStages stages;
   if (settings.contour_correction && variance > 0.0) {
     correction_delay_ = std::max(1, static_cast<int>(std::ceil(2.0 * std::sqrt(variance))));
     std::vector<Fir> corrections;
@@ -111,13 +135,17 @@ SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
       if (!following_ || corrections.empty()) corrections.push_back(fir);
     }
     chain_.emplace_back(corrections, n_axes);
+    stages.push_back(std::move(corrections));
   }
   for (const Fir& chain : chains) measure(chain, settings.period_s);
   means_ = {largest_mean(chains)};
   if (length > 1) {
     chain_.emplace_back(std::vector{average}, n_axes);
     chain_.emplace_back(std::vector{average}, n_axes);
+    stages.insert(stages.end(), 2, {average});
   }
+  stages.push_back(shapers);
+  if (!following_) chains_.push_back(std::move(stages));
   if (following_) {
     const double fastest = settings.limits.max_feed_mm_per_s[following_->axis()];
     change_ = cost_of_change(chains, following_->position_mm(), settings.period_s, fastest);
@@ -127,11 +155,12 @@ SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
   } else {
     shapers_.emplace_back(shapers, n_axes);
   }
-  if (!settings.other_shapers.empty()) add_others(settings, smoothing, std::move(chains), n_axes);
+  if (!settings.other_shapers.empty()) add_others(settings, average, std::move(chains), n_axes);
 }
 
-void SetPointFilters::add_others(const ControllerSettings& settings, const Fir& smoothing, std::vector<Fir> first,
+void SetPointFilters::add_others(const ControllerSettings& settings, const Fir& average, std::vector<Fir> first,
                                  int n_axes) {
+  const Fir smoothing = convolved(average, average);
   if (following_) detail::refuse("shapers to exchange beside one that follows an axis");
   if (settings.contour_correction) detail::refuse("shapers to exchange beside a contour correction");
   require_above_zero(settings.fade_time_s, "time of a fade", "s");
@@ -145,6 +174,7 @@ void SetPointFilters::add_others(const ControllerSettings& settings, const Fir& 
     for (const Fir& shaper : shapers) chains.push_back(convolved(smoothing, shaper));
     for (const Fir& chain : chains) measure(chain, settings.period_s);
     means_.push_back(largest_mean(chains));
+    chains_.push_back({{average}, {average}, shapers});
     for (const std::vector<Fir>& set : sets) measure_fade(set, chains, settings.period_s);
     sets.push_back(std::move(chains));
   }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/changing_shaper.hpp"
+#include "controller/contour_check.hpp"
 #include "shapegcode/controller.hpp"
 
 namespace shapegcode {
@@ -50,6 +51,8 @@ class SetPointFilters {
   [[nodiscard]] const ChangeCost& change() const noexcept { return change_; }
   /// The moments that say what it cuts off.
   [[nodiscard]] const FilterTolerance& tolerance() const noexcept { return tolerance_; }
+  /// The whole chain with each shaper that does not follow an axis.
+  [[nodiscard]] const std::vector<FilterStages>& chains() const noexcept { return chains_; }
 
  private:
   static constexpr std::size_t orders = 3;  // position, velocity, acceleration
@@ -66,7 +69,7 @@ class SetPointFilters {
   };
 
   void measure(const Fir& chain, double period_s);
-  void add_others(const ControllerSettings& settings, const Fir& smoothing, std::vector<Fir> first, int n_axes);
+  void add_others(const ControllerSettings& settings, const Fir& average, std::vector<Fir> first, int n_axes);
   void measure_fade(const std::vector<Fir>& one, const std::vector<Fir>& other, double period_s);
   void step_shapers(std::span<double> values) noexcept;
 
@@ -90,6 +93,7 @@ class SetPointFilters {
   double gain_ = 1.0;
   ChangeCost change_;
   FilterTolerance tolerance_;
+  std::vector<FilterStages> chains_;
 };
 
 }  // namespace shapegcode

@@ -228,6 +228,10 @@ PlanningRules planning_rules_of(const ControllerSettings& settings, const SetPoi
   rules.window = settings.window;
   rules.lead_periods = settings.plans_in_step ? 0 : settings.lead_periods;
   rules.settling_periods = filters.duration_samples();
+  if (filters.duration_samples() > 0 && std::isfinite(settings.contour_tolerance_mm)) {
+    rules.chains = filters.chains();
+    rules.filtered_mm = settings.contour_tolerance_mm - path_tolerance_of(settings, filters);
+  }
   return rules;
 }
 
