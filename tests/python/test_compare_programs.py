@@ -367,3 +367,48 @@ def test_the_command(tmp_path: Path) -> None:
         assert refused.returncode == 2 and said in refused.stderr, refused.stderr
     assert run(tmp_path, "compare", "a.nc", "none.nc").returncode == 2
     assert run(tmp_path, "compare", "a.nc", "missing.nc").returncode == 2
+
+
+HEAD, TAIL = "%\nO1\nG21 G17 G90 G94 G40\nG00 X0 Y0 Z5.\n", "G00 Z50.\nM30\n%\n"
+EXACT_STOPS = [
+    "G61\nG01 X20. F5000\nY20.\nG64\n",
+    "G01 X20. F5000\nY20.\nG61\nX0.\nG64\nG09 X30.\n",
+    "G61 G01 X20. F5000\nY20.\nG64\n",
+    "G61\nG01 X20. F5000\nG64\n",
+    "G61\nG01 X10. F600\nY10.\nX0\nG64\nY0\n",
+]
+
+
+def stops(text: str) -> list[tuple[float, ...]]:
+    """Where the tool comes to rest between cuts of absolute straight blocks, read word by word."""
+    at, found, modal, motion = {"X": 0.0, "Y": 0.0, "Z": 0.0}, [], 64, 0
+    for line in re.sub(r"\([^)]*\)", "", text).splitlines():
+        words = [(letter, float(number)) for letter, number in re.findall(r"([A-Z])(-?[\d.]+)", line.replace(" ", ""))]
+        codes = [number for letter, number in words if letter == "G"]
+        modal = next((code for code in codes if code in (61, 64)), modal)
+        motion = next((code for code in codes if code in (0, 1)), motion)
+        before = dict(at)
+        at.update((letter, number) for letter, number in words if letter in at)
+        if motion == 1 and at != before and (modal == 61 or 9 in codes):
+            found.append(tuple(at.values()))
+    return found
+
+
+@pytest.mark.parametrize("body", EXACT_STOPS)
+def test_exact_stop_mode_survives_shaping(body: str) -> None:
+    program = sg.Program.from_text(HEAD + body + TAIL, MACHINE)
+    conversion = sg.convert(program, MACHINE, shape_all=True)
+    assert conversion.proof is not None
+    assert not conversion.proof.refused
+    assert stops(conversion.text.decode()) == stops(HEAD + body + TAIL) != []
+
+
+def test_a_block_that_changes_to_g64_where_the_tool_is_cuts_nothing() -> None:
+    original = HEAD + "G61\nG01 X20. F5000.\nY20.\nG64\n" + TAIL
+    restated = "G61\nG64 G01 X{} Y0. Z5. F5000.\n{} X{}\nG61\n"
+    emitted = HEAD + restated.format("0.", "X10.\nG09", "20.") + "G64 X20.\nY10.\nG09 Y20.\nG61\nG64\n" + TAIL
+    assert compared(original, emitted, "blocks").ok
+    # One stop less, and a block that does move.
+    lost = compared(original, emitted.replace("G09 Y20.", "Y20."), "blocks")
+    assert [each.kind for each in lost.refused] == ["modal"]
+    assert not compared(original, emitted.replace("G64 X20.", "G64 X21."), "blocks").ok
