@@ -70,17 +70,19 @@ void register_compare(py::module_& module) {
   module.def(
       "compare_programs",
       [](const Program& original, const Program& emitted, const ReaderOptions& reader,
-         const std::vector<std::string>& emission_lines) {
+         const std::vector<std::string>& emission_lines, double joint_path_mm) {
         ComparisonOptions options;
         options.reader = reader;
         options.reader.load_program = nullptr;  // Python's, which is not called without its lock
         options.emission_lines = emission_lines;
+        options.joint_path_mm = joint_path_mm;
         const py::gil_scoped_release release;
         return compare_programs(original, emitted, options);
       },
       py::arg("original").none(false), py::arg("emitted").none(false), py::arg("reader"), py::arg("emission_lines"),
+      py::arg("joint_path_mm") = 0.0,
       "Compare two programs that were read with these options; `emission_lines`: capitals without blanks, lines that "
-      "do not end a cut.");
+      "do not end a cut; `joint_path_mm`: within it cuts of other lengths are the same, run through side by side.");
 }
 
 }  // namespace shapegcode::bindings

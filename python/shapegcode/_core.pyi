@@ -7090,9 +7090,9 @@ def busiest_per_s(durations_s: typing.Annotated[numpy.typing.ArrayLike, numpy.fl
     
     `durations_s`: of the blocks, s, (n,); `amounts`: what each of them needs, such as its characters, (n,); None: one of each; `stretch_s`: the window, s; all blocks together if they last less.
     """
-def compare_programs(original: ProgramText, emitted: ProgramText, reader: ReaderOptions, emission_lines: collections.abc.Sequence[str]) -> ProgramComparison:
+def compare_programs(original: ProgramText, emitted: ProgramText, reader: ReaderOptions, emission_lines: collections.abc.Sequence[str], joint_path_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> ProgramComparison:
     """
-    Compare two programs that were read with these options; `emission_lines`: capitals without blanks, lines that do not end a cut.
+    Compare two programs that were read with these options; `emission_lines`: capitals without blanks, lines that do not end a cut; `joint_path_mm`: within it cuts of other lengths are the same, run through side by side.
     """
 def contour_kernel(shaper: Fir, modes: collections.abc.Sequence[Mode], period_s: typing.SupportsFloat | typing.SupportsIndex, target: ContourTarget) -> list[float]:
     """

@@ -367,3 +367,136 @@ def test_the_command(tmp_path: Path) -> None:
         assert refused.returncode == 2 and said in refused.stderr, refused.stderr
     assert run(tmp_path, "compare", "a.nc", "none.nc").returncode == 2
     assert run(tmp_path, "compare", "a.nc", "missing.nc").returncode == 2
+
+
+HEAD, TAIL = "%\nO1\nG21 G17 G90 G94 G40\nG00 X0 Y0 Z5.\n", "G00 Z50.\nM30\n%\n"
+EXACT_STOPS = [
+    "G61\nG01 X20. F5000\nY20.\nG64\n",
+    "G01 X20. F5000\nY20.\nG61\nX0.\nG64\nG09 X30.\n",
+    "G61 G01 X20. F5000\nY20.\nG64\n",
+    "G61\nG01 X20. F5000\nG64\n",
+    "G61\nG01 X10. F600\nY10.\nX0\nG64\nY0\n",
+]
+
+
+def stops(text: str) -> list[tuple[float, ...]]:
+    """Where the tool comes to rest between cuts of absolute straight blocks, read word by word."""
+    at, found, modal, motion = {"X": 0.0, "Y": 0.0, "Z": 0.0}, [], 64, 0
+    for line in re.sub(r"\([^)]*\)", "", text).splitlines():
+        words = [(letter, float(number)) for letter, number in re.findall(r"([A-Z])(-?[\d.]+)", line.replace(" ", ""))]
+        codes = [number for letter, number in words if letter == "G"]
+        modal = next((code for code in codes if code in (61, 64)), modal)
+        motion = next((code for code in codes if code in (0, 1)), motion)
+        before = dict(at)
+        at.update((letter, number) for letter, number in words if letter in at)
+        if motion == 1 and at != before and (modal == 61 or 9 in codes):
+            found.append(tuple(at.values()))
+    return found
+
+
+@pytest.mark.parametrize("body", EXACT_STOPS)
+def test_exact_stop_mode_survives_shaping(body: str) -> None:
+    program = sg.Program.from_text(HEAD + body + TAIL, MACHINE)
+    conversion = sg.convert(program, MACHINE, shape_all=True)
+    assert conversion.proof is not None
+    assert not conversion.proof.refused
+    assert stops(conversion.text.decode()) == stops(HEAD + body + TAIL) != []
+
+
+def test_a_block_that_changes_to_g64_where_the_tool_is_cuts_nothing() -> None:
+    original = HEAD + "G61\nG01 X20. F5000.\nY20.\nG64\n" + TAIL
+    restated = "G61\nG64 G01 X{} Y0. Z5. F5000.\n{} X{}\nG61\n"
+    emitted = HEAD + restated.format("0.", "X10.\nG09", "20.") + "G64 X20.\nY10.\nG09 Y20.\nG61\nG64\n" + TAIL
+    assert compared(original, emitted, "blocks").ok
+    # One stop less, and a block that does move.
+    lost = compared(original, emitted.replace("G09 Y20.", "Y20."), "blocks")
+    assert [each.kind for each in lost.refused] == ["modal"]
+    assert not compared(original, emitted.replace("G64 X20.", "G64 X21."), "blocks").ok
+
+
+def cut_along(points: np.ndarray) -> str:
+    first, *rest = (f"X{x:.4f} Y{y:.4f}" for x, y in points)
+    return HEAD.replace("X0 Y0", first) + "G01 F3000.\n" + "\n".join(rest) + "\n" + TAIL
+
+
+def sawtooth(length_mm: float) -> np.ndarray:
+    """Blocks of .01 mm, 18 µm high."""
+    x = np.arange(0.0, length_mm + 0.005, 0.01)
+    return np.column_stack([x, np.tile([0.0, 0.003, 0.006, 0.009, 0.012, 0.015, 0.018], x.size)[: x.size]])
+
+
+def test_a_sawtooth_that_is_smoothed_is_the_same_cut() -> None:
+    ours = sawtooth(28.0)
+    length_mm = np.linalg.norm(np.diff(ours, axis=0), axis=1).sum()
+    assert length_mm - 28.0 > 0.1 * length_mm + 1.0
+    middle = [ours[0], (0.02, 0.009), (27.98, 0.009), ours[-1]]
+    result = compared(cut_along(ours), cut_along(np.array(middle)), "blocks,feeds,path=30um")
+    assert result.ok, list(result.refused)
+    assert 9.0 <= result.path_um <= 16.0
+    # The same way back, and less allowed than the tooth is away.
+    assert compared(cut_along(np.array(middle)), cut_along(ours), "blocks,feeds,path=30um").ok
+    assert not compared(cut_along(ours), cut_along(np.array(middle)), "blocks,feeds,path=5um").ok
+
+
+RASTER = np.array([(x, y) for y in range(0, 40, 4) for x in ((0, 30) if y % 8 == 0 else (30, 0))] + [(0.0, 0.0)], float)
+CIRCLE = np.array([(15.0 * np.cos(a), 15.0 * np.sin(a)) for a in np.linspace(0.0, 2.0 * np.pi, 100)])
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs"),
+    [
+        (RASTER, np.vstack([RASTER[:8], RASTER[12:]])),
+        (RASTER, np.vstack([RASTER[:2], RASTER])),
+        (CIRCLE, np.vstack([CIRCLE, CIRCLE[1:]])),
+        (np.vstack([CIRCLE, CIRCLE[1:]]), CIRCLE),
+        (CIRCLE, CIRCLE[::-1]),
+        (sawtooth(28.0), np.array([(0.0, 0.0), (28.0, 0.0), (0.0, 0.0), sawtooth(28.0)[-1]])),
+        (sawtooth(28.0), np.array([(0.0, 0.0), (15.0, 0.0), (8.0, 0.0), sawtooth(28.0)[-1]])),
+    ],
+    ids=["pass missing", "pass twice", "circle twice", "circle once", "circle backwards", "there and back", "one back"],
+)
+@pytest.mark.parametrize("allow", ["path=30um", "path=200um"])
+def test_no_length_excuses_a_missing_doubled_or_reversed_part(ours: np.ndarray, theirs: np.ndarray, allow: str) -> None:
+    assert not compared(cut_along(ours), cut_along(theirs), f"blocks,feeds,{allow}").ok
+
+
+def test_a_real_change_does_not_pass_the_proof_of_a_conversion() -> None:
+    from shapegcode.conversion.outcome import prove
+
+    missing = np.vstack([RASTER[:8], RASTER[12:]])
+    original, emitted = (sg.Program.from_text(cut_along(each), MACHINE) for each in (RASTER, missing))
+    assert [each.kind for each in prove(original, emitted, MACHINE, rapids_shaped=False).refused] == ["cuts"]
+
+
+def side_by_side_mm(ours: np.ndarray, theirs: np.ndarray, step_mm: float) -> float:
+    """Discrete Fréchet distance (Eiter and Mannila 1994) of dense points: at most a step above that of the lines."""
+    dense = []
+    for points in (ours, theirs):
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        at = np.union1d(along, np.arange(0.0, along[-1], step_mm))
+        dense.append(np.column_stack([np.interp(at, along, points[:, axis]) for axis in (0, 1)]))
+    gaps = np.linalg.norm(dense[0][:, None] - dense[1][None], axis=2)
+    best = np.maximum.accumulate(gaps[0])
+    for row in gaps[1:]:
+        entered = np.minimum(best, np.concatenate([[np.inf], best[:-1]]))
+        best = np.maximum(entered, row)
+        for k in range(1, best.size):
+            best[k] = max(row[k], min(entered[k], best[k - 1]))
+    return float(best[-1])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_paths_of_other_lengths_are_as_near_as_the_discrete_frechet_distance(seed: int) -> None:
+    draws = np.random.default_rng(seed)
+    # Back and forth along X too, so that the order in which the points come matters.
+    ours = np.column_stack([np.linspace(0.0, 3.0, 60), np.zeros(60)]) + draws.normal(0.0, 0.12, (60, 2))
+    theirs = np.column_stack([np.linspace(0.0, 3.0, 12), np.zeros(12)]) + draws.normal(0.0, 0.03, (12, 2))
+    ours, theirs = ours.round(3), theirs.round(3)
+    theirs[[0, -1]] = ours[[0, -1]]
+    lengths = [np.linalg.norm(np.diff(each, axis=0), axis=1).sum() for each in (ours, theirs)]
+    assert lengths[0] - lengths[1] > 0.1 * lengths[0] + 1.0
+    expected = side_by_side_mm(ours, theirs, 0.01)
+    for allowed_mm, is_same in ((expected + 0.001, True), (expected - 0.011, False)):
+        result = compared(cut_along(ours), cut_along(theirs), f"blocks,feeds,path={allowed_mm * 1e3:.3f}um")
+        assert result.ok == is_same
+        assert (result.count("cuts").unchanged == 1) == is_same

@@ -38,6 +38,7 @@ inline constexpr std::size_t compared_kinds = 20;
 struct ComparisonOptions {
   ReaderOptions reader;                     ///< with which both programs were read
   std::vector<std::string> emission_lines;  ///< capitals without blanks
+  double joint_path_mm = 0.0;               ///< cuts of other lengths are the same within it, run side by side
 };
 
 /// One thing that differs. Lines are those of the sources; 0: the program has nothing there.

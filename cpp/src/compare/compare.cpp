@@ -6,6 +6,8 @@
 #include <cmath>
 #include <future>
 #include <iterator>
+#include <map>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -50,7 +52,7 @@ struct SourceLine {
 class Comparer {
  public:
   Comparer(const Program& original, const Program& emitted, const ComparisonOptions& options)
-      : programs_{&original, &emitted} {
+      : programs_{&original, &emitted}, joint_path_mm_(options.joint_path_mm) {
     std::tie(events_[0], events_[1]) =
         both([&] { return read_events(original, options); }, [&] { return read_events(emitted, options); },
              std::max(original.move_count, emitted.move_count));
@@ -123,9 +125,20 @@ class Comparer {
   }
 
   // Whether they are meant to be the same cut: how far apart their paths are is another question.
-  static bool likely_same(const Cut& a, const Cut& b) {
+  [[nodiscard]] bool likely_same(const Cut& a, const Cut& b) const {
     return (a.start_mm - b.start_mm).norm() <= same_end_mm && (a.end_mm - b.end_mm).norm() <= same_end_mm &&
-           std::abs(a.length_mm - b.length_mm) <= likely_length_mm + likely_length * a.length_mm;
+           (likely_length_of(a, b) || joint_mm(a, b).has_value());
+  }
+
+  static bool likely_length_of(const Cut& a, const Cut& b) {
+    return std::abs(a.length_mm - b.length_mm) <= likely_length_mm + likely_length * a.length_mm;
+  }
+
+  // Many small corners that are cut may take away any share of a length: then the paths themselves decide.
+  [[nodiscard]] std::optional<double> joint_mm(const Cut& a, const Cut& b) const {
+    const auto [found, is_new] = joint_.try_emplace({&a, &b});
+    if (is_new) found->second = joint_distance_mm(a, b, joint_path_mm_);
+    return found->second;
   }
 
   // What has no partner in its place, but the same stands elsewhere.
@@ -279,17 +292,23 @@ class Comparer {
     if (!same_moves(ours, theirs)) {
       compare_paths(a, b);
     }
-    const bool same_length =
-        std::abs(ours.length_mm - theirs.length_mm) <= likely_length_mm + likely_length * ours.length_mm;
-    if (!same_length) {
+    const bool is_same = likely_length_of(ours, theirs) || joint_mm(ours, theirs).has_value();
+    if (!is_same) {
       add(ComparedKind::cuts, from, to, describe(0, a), describe(1, b));
     }
-    return same_length;
+    return is_same;
   }
 
   void compare_paths(const Event& a, const Event& b) {
     const Cut& ours = cut(0, a);
     const Cut& theirs = cut(1, b);
+    if (!likely_length_of(ours, theirs)) {
+      if (const auto joint = joint_mm(ours, theirs)) {
+        result_.path_mm = std::max(result_.path_mm, *joint);
+        add_path(source(0, a), source(1, b), a, *joint);
+        return;
+      }
+    }
     const auto [forth, back] = both([&] { return path_distance(ours, theirs); },
                                     [&] { return path_distance(theirs, ours); }, std::max(ours.moves, theirs.moves));
     const double distance = std::max(forth.distance_mm, back.distance_mm);
@@ -298,9 +317,13 @@ class Comparer {
       return;
     }
     const bool in_first = forth.distance_mm >= back.distance_mm;
-    add(ComparedKind::path, in_first ? source(0, forth.line) : source(0, a),
-        in_first ? source(1, b) : source(1, back.line), describe(0, a),
-        fmt::format("path within {:.3g} um", distance * 1e3), distance);
+    add_path(in_first ? source(0, forth.line) : source(0, a), in_first ? source(1, b) : source(1, back.line), a,
+             distance);
+  }
+
+  void add_path(const SourceLine& from, const SourceLine& to, const Event& a, double distance_mm) {
+    add(ComparedKind::path, from, to, describe(0, a), fmt::format("path within {:.3g} um", distance_mm * 1e3),
+        distance_mm);
   }
 
   void compare_modes(const Cut& ours, const Cut& theirs, const SourceLine& from, const SourceLine& to) {
@@ -371,6 +394,8 @@ class Comparer {
   std::vector<std::size_t> elsewhere_;                // of the first program, ascending
   std::pair<CutModes, CutModes> reported_modes_;
   double same_position_mm_ = 0.0;
+  double joint_path_mm_ = 0.0;
+  mutable std::map<std::pair<const Cut*, const Cut*>, std::optional<double>> joint_;
   ProgramComparison result_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compare/frechet.hpp"
 #include "shapegcode/measure/contour.hpp"
 
 namespace shapegcode::detail {
@@ -57,6 +58,23 @@ Path whole_path(const Cut& cut) {
     builder.add(move);
   }
   return builder.path();
+}
+
+// Arcs as chords that are as good as the arc.
+std::vector<Vector3> polyline(const Cut& cut, double chord_mm) {
+  std::vector<Vector3> points;
+  points.reserve(cut.moves + 1);
+  points.push_back(cut.start_mm);
+  Segment move;
+  for (Moves moves(cut); moves.next(move);) {
+    if (move.kind == SegmentKind::arc) {
+      const double radius_mm = std::max(move.start_radius_mm, chord_mm);
+      const auto parts = static_cast<int>(std::ceil(std::abs(move.sweep_rad) / std::sqrt(8.0 * chord_mm / radius_mm)));
+      for (int k = 1; k < parts; ++k) points.push_back(point_at(move, move.length_mm * k / parts));
+    }
+    points.push_back(move.end_mm);
+  }
+  return points;
 }
 
 // A section of one feed.
@@ -139,6 +157,26 @@ PathDistance path_distance(const Cut& moving, const Cut& still) {
     look(move.end_mm, from_start_mm, move.line);
   }
   return found;
+}
+
+std::optional<double> joint_distance_mm(const Cut& one, const Cut& other, double allowed_mm) {
+  constexpr double accuracy = 0.02;
+  if (!(allowed_mm > 0.0)) {
+    return std::nullopt;
+  }
+  const double chord_mm = 0.1 * accuracy * allowed_mm;
+  const std::vector<Vector3> ours = polyline(one, chord_mm);
+  const std::vector<Vector3> theirs = polyline(other, chord_mm);
+  if (!FrechetDecision(ours, theirs, allowed_mm).within()) {
+    return std::nullopt;
+  }
+  double low_mm = 0.0;
+  double high_mm = allowed_mm * (1.0 - 1e-9);  // no rounding of units puts it above what is allowed
+  while (high_mm - low_mm > accuracy * allowed_mm) {
+    const double middle_mm = 0.5 * (low_mm + high_mm);
+    (FrechetDecision(ours, theirs, middle_mm).within() ? high_mm : low_mm) = middle_mm;
+  }
+  return high_mm;
 }
 
 std::optional<FeedDifference> feed_difference(const Cut& original, const Cut& emitted) {

@@ -22,6 +22,10 @@ struct PathDistance {
 /// it is near another part of the path only, that far from the start where it should be, the part that is meant counts.
 [[nodiscard]] PathDistance path_distance(const Cut& moving, const Cut& still);
 
+/// The least distance within which both paths can be run through side by side, each only forwards (Frechet), to 2 %,
+/// if it is not above `allowed_mm`; nothing otherwise. Their lengths do not matter.
+[[nodiscard]] std::optional<double> joint_distance_mm(const Cut& one, const Cut& other, double allowed_mm);
+
 /// The first section whose programmed feed differs, as moves of either cut.
 struct FeedDifference {
   std::uint32_t original_line = 0;

@@ -121,6 +121,7 @@ def _length_um(word: str, length: str) -> float:
 _NOUNS = {"tools": "tool calls", "functions": "other functions", "cycles": "drilling blocks", "modal": "modal states"}
 _ALWAYS = ("rapids", "tools", "offsets")
 _SHOWN = 20
+_JOINT_TOLERANCES = 3.0  # a command may leave the path further than the response to it does
 
 
 @dataclass(frozen=True)
@@ -335,7 +336,11 @@ def compare(
     allowed = allow if isinstance(allow, Allowed) else Allowed.of(allow)
     (first, first_is_cut), (second, second_is_cut) = _read(original, machine), _read(emitted, machine)
     core = _core.compare_programs(
-        first.core, second.core, reader_options(machine), _emission_lines(machine, first.core.expanded_radii_mm)
+        first.core,
+        second.core,
+        reader_options(machine),
+        _emission_lines(machine, first.core.expanded_radii_mm),
+        _joint_path_um(allowed, machine) * 1e-3,
     )
     is_shaped = second.stamp is not None
     differences = [
@@ -367,6 +372,13 @@ def compare(
         differences=tuple(differences),
         allow=allowed.words,
     )
+
+
+def _joint_path_um(allowed: Allowed, machine: Machine) -> float:
+    """Distance within which cuts of other lengths are the same: a conversion allows any, and judges it later."""
+    if allowed.path_um < math.inf:
+        return allowed.path_um
+    return _JOINT_TOLERANCES * machine.tolerance.contour_um
 
 
 def _name(kind: _core.ComparedKind) -> str:

@@ -205,9 +205,12 @@ void Interpreter::keep_cut(const char* why, const Vector3& end, const std::array
     const double rate = state_.feed_mode != 93 ? feed_mm_per_s(0.0) : 0.0;
     const Segment segment =
         !plain && measurable ? cutting_segment(end) : make_line(state_.position_mm, end, rate, line_number_);
+    // A block that restates where the tool is, as a shaped cut in G61 begins with, is no cut of unknown path.
+    const bool stays = measurable && state_.motion == 1 && state_.compensation == 40 && state_.uncertain_groups == 0 &&
+                       segment.length_mm == 0.0;
     if (measurable && segment.feed_mm_per_s > 0.0 && segment.length_mm > 0.0) {
       add_move({segment, 0.0});
-    } else {
+    } else if (!stays) {
       program_.move_ends.push_back({line_number_, end, known_after});
     }
     state_.position_mm = end;
