@@ -18,6 +18,7 @@
 #include "shapegcode/controller.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/planner.hpp"
+#include "winding_path.hpp"
 
 using namespace shapegcode;
 using namespace shapegcode::tests;
@@ -482,48 +483,6 @@ TEST_CASE("a motion that strays from its plan in a sharp corner is planned anew 
   CHECK(run_until_idle(control, 4000).set_points.back() == end);
 }
 
-namespace {
-
-// Beyond the ends of the path only sideways: a correction overshoots there along it.
-double distance_to_line(const Vector3& point, const Vector3& begin, const Vector3& end, bool is_first, bool is_last) {
-  const Vector3 along = end - begin;
-  const double share =
-      std::clamp((point - begin).dot(along) / along.squaredNorm(), is_first ? -1e9 : 0.0, is_last ? 1e9 : 1.0);
-  return (point - begin - share * along).norm();
-}
-
-// Lines and arcs of any size one after another; the last one is short, so that the motion brakes out of a corner.
-std::vector<Segment> winding_path(std::mt19937_64& random) {
-  const auto between = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
-  std::vector<Segment> path;
-  Vector3 at = Vector3::Zero();
-  const double size = std::pow(10.0, between(-1.0, 1.0));
-  const int count = 2 + static_cast<int>(between(0.0, 6.0));
-  double heading = between(0.0, 6.28);
-  for (int i = 0; i < count; ++i) {
-    heading += between(-2.5, 2.5) * between(0.0, 1.0);
-    const double feed = between(20.0, 150.0);
-    if (between(0.0, 1.0) < 0.4) {
-      const double sweep = between(0.3, 4.0) * (between(0.0, 1.0) < 0.5 ? 1.0 : -1.0);
-      const double radius = size * between(0.3, 1.5) * (sweep > 0.0 ? 1.0 : -1.0);
-      const Vector3 centre = at + radius * Vector3(-std::sin(heading), std::cos(heading), 0.0);
-      const Vector3 from = at - centre;
-      const Vector3 end = centre + Vector3(from.x() * std::cos(sweep) - from.y() * std::sin(sweep),
-                                           from.x() * std::sin(sweep) + from.y() * std::cos(sweep), 0.0);
-      path.push_back(make_arc(at, end, centre, sweep, 2, feed));
-      heading += sweep;
-    } else {
-      const double length = size * (i + 1 < count ? between(0.2, 1.5) : between(0.05, 0.3));
-      path.push_back(make_line(at, at + length * Vector3(std::cos(heading), std::sin(heading), 0.0), feed));
-    }
-    at = path.back().end_mm;
-  }
-  path.back().stop_at_end = true;
-  return path;
-}
-
-}  // namespace
-
 TEST_CASE("what leaves the control is within the contour tolerance, with a shaper, one for each axis, a correction") {
   const Fir zv46({0, 10, 11}, {0.5157, 0.06, 0.4243});
   const std::vector<Fir> each{zv46, Fir({0, 5, 6}, {0.51, 0.22, 0.27}), Fir({0}, {1.0})};
@@ -531,7 +490,6 @@ TEST_CASE("what leaves the control is within the contour tolerance, with a shape
     for (const int kind : {0, 1, 2, 3}) {
       CAPTURE(seed);
       CAPTURE(kind);
-      std::mt19937_64 random(seed);
       ControllerSettings settings = limited();
       settings.limits.max_acceleration_mm_per_s2.setConstant(5000.0);
       settings.limits.max_jerk_mm_per_s3.setConstant(seed % 2 == 0 ? 2e5 : 1e6);
@@ -540,25 +498,9 @@ TEST_CASE("what leaves the control is within the contour tolerance, with a shape
       if (kind == 1 || kind == 3) settings.shaper = zv46;
       if (kind == 2) settings.shaper = each;
       settings.contour_correction = kind == 3;
-      MotionController control(settings);
-      std::vector<Vector3> programmed{Vector3::Zero()};
-      for (const Segment& segment : winding_path(random)) {
-        REQUIRE(control.push(segment) == PushResult::accepted);
-        const int parts = segment.kind == SegmentKind::arc ? 200 : 1;
-        for (int k = 1; k <= parts; ++k) programmed.push_back(point_at(segment, segment.length_mm * k / parts));
-      }
-      const Run run = run_until_idle(control, 100'000);
-      CHECK(run.last == Activity::idle);
-      double farthest = 0.0;
-      for (const Vector3& point : run.set_points) {
-        double nearest = MotionLimits::none;
-        for (std::size_t i = 1; i < programmed.size(); ++i) {
-          nearest = std::min(
-              nearest, distance_to_line(point, programmed[i - 1], programmed[i], i == 1, i + 1 == programmed.size()));
-        }
-        farthest = std::max(farthest, nearest);
-      }
-      CHECK(farthest <= 1.01 * settings.contour_tolerance_mm);
+      const WindingRun run = run_winding_path(settings, seed);
+      CHECK(run.ended);
+      CHECK(run.farthest_mm <= 1.01 * settings.contour_tolerance_mm);
     }
   }
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <span>
 
+#include <Eigen/Geometry>
+
 namespace shapegcode {
 namespace {
 

@@ -388,25 +388,29 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
                          std::abs(p0 - 2.0 * p1 + p2) / (t * t * rules_.limits.acceleration[i]),
                          (std::abs(p0 - 3.0 * p1 + 3.0 * p2 - p3) / (t * t * t) - noise) / rules_.limits.jerk[i]});
     }
-    if (contour_.is_on()) beyond = std::max(beyond, contour_.add(xyz(now)));
+    // What leaves the path behind the filters does so by the acceleration that these hold.
+    const double off_path = contour_.is_on() ? contour_.add(xyz(now)) : 0.0;
     const PlannedSegment& entry = (*ring_)[now.point.segment];
     const PlannedSegment& last_entry = (*ring_)[before.point.segment];
     const double feed = std::max(ratios_.of(entry) * entry.programmed, ratios_.of(last_entry) * last_entry.programmed);
     const double speed = now.point.state.speed;
     const bool is_faster = speed > before.point.state.speed && speed > kept_feed * feed;
-    if (beyond <= kept && !is_faster) continue;
+    const bool is_beyond = beyond > kept || is_faster;
+    if (!is_beyond && off_path <= kept) continue;
     if (!reduces) return false;
     keeps = false;
     if (k <= reduced_from) continue;
-    const std::uint64_t from = at(std::max<std::ptrdiff_t>(k - std::max<std::ptrdiff_t>(4, held), 0)).point.segment;
-    const std::uint64_t behind = std::min(planned_, at(k + 1).point.segment + 2);
+    const std::uint64_t first = at(std::max<std::ptrdiff_t>(k - (is_beyond ? 4 : held), 0)).point.segment;
+    const std::uint64_t from = is_beyond ? first - std::min<std::uint64_t>(first, 1) : first;
+    const std::uint64_t behind = std::min(planned_, is_beyond ? at(k + 1).point.segment + 2 : now.point.segment + 1);
     const std::uint64_t least = is_moving ? begin.point.segment + 1 : first_;
-    const std::uint64_t begin_reduced = std::max({least, reduced, from - std::min<std::uint64_t>(from, 1)});
+    const std::uint64_t begin_reduced = std::max({least, reduced, from});
     reduced = std::max(reduced, behind);
     for (std::uint64_t i = begin_reduced; i < behind; ++i) {
       PlannedSegment& less = (*ring_)[i];
       if (is_faster) less.feed_share *= feed / speed;
-      if (beyond > kept) less.limit_share *= std::max(most_less, 1.0 / beyond);
+      const double most = std::max(beyond, off_path);
+      if (most > kept) less.limit_share *= std::max(most_less, 1.0 / most);
       // What is still beyond them when little is planned is run from rest to rest.
       if (less.limit_share < least_share && !less.is_fixed && !plan_.is_covered(i)) less.stop = true;
     }

@@ -1,7 +1,9 @@
 #include "controller/settings.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "base/checks.hpp"
 #include "base/refuse.hpp"
@@ -211,6 +213,26 @@ AxisLimits axis_limits_of(const ControllerSettings& settings, const SetPointFilt
 
 }  // namespace
 
+namespace {
+
+// The largest difference between the variances of what X, Y and Z pass, in samples^2.
+double variances_apart(const std::vector<FilterStages>& chains) {
+  double apart = 0.0;
+  for (const FilterStages& stages : chains) {
+    std::array<double, axis_count> variances{};
+    for (const std::vector<Fir>& stage : stages) {
+      for (std::size_t i = 0; i < variances.size(); ++i) {
+        variances[i] += stage[stage.size() == 1 ? 0 : i].variance_samples2();
+      }
+    }
+    const auto [low, high] = std::ranges::minmax(variances);
+    apart = std::max(apart, high - low);
+  }
+  return apart;
+}
+
+}  // namespace
+
 PlanningRules planning_rules_of(const ControllerSettings& settings, const SetPointFilters& filters) {
   if (filters.duration_samples() > 0) {
     require(settings.contour_tolerance_mm > 0.0, "contour tolerance with smoothing or shaper",
@@ -231,6 +253,12 @@ PlanningRules planning_rules_of(const ControllerSettings& settings, const SetPoi
   if (filters.duration_samples() > 0 && std::isfinite(settings.contour_tolerance_mm)) {
     rules.chains = filters.chains();
     rules.filtered_mm = settings.contour_tolerance_mm - path_tolerance_of(settings, filters);
+    // Filters of two axes whose variances differ by d take a straight path at 45 degrees aside by a d / sqrt(8).
+    const double apart_s2 = variances_apart(rules.chains) * settings.period_s * settings.period_s;
+    const double most = std::sqrt(8.0) * rules.filtered_mm / apart_s2;
+    for (std::size_t i = 0; apart_s2 > 0.0 && i < axis_count; ++i) {
+      rules.limits.acceleration[i] = std::min(rules.limits.acceleration[i], most);
+    }
   }
   return rules;
 }

@@ -1,0 +1,46 @@
+// How far winding paths are left behind shapers, and what that costs: `filtered_contour PATHS`.
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+#include <vector>
+
+#include "winding_path.hpp"
+
+using namespace shapegcode;
+
+int main(int count, char** words) {
+  const auto paths = static_cast<std::uint64_t>(count > 1 ? std::atoi(words[1]) : 40);
+  const Fir zv46({0, 10, 11}, {0.5157, 0.06, 0.4243});
+  const std::vector<std::pair<const char*, ControllerShaper>> shapers{
+      {"none", Fir({0}, {1.0})},
+      {"ZV 46 Hz", zv46},
+      {"of X, Y, Z", std::vector<Fir>{zv46, Fir({0, 5, 6}, {0.51, 0.22, 0.27}), Fir({0}, {1.0})}}};
+  std::printf("acceleration  tolerance  shaper      farthest / tolerance  beyond it  mean time s\n");
+  for (const double acceleration : {1000.0, 2000.0, 5000.0}) {
+    for (const double tolerance_mm : {0.005, 0.02, 0.05}) {
+      for (const auto& [name, shaper] : shapers) {
+        double farthest = 0.0;
+        double time_s = 0.0;
+        int beyond = 0;
+        for (std::uint64_t seed = 0; seed < paths; ++seed) {
+          ControllerSettings settings;
+          settings.limits.law = AccelerationLaw::jerk_limited;
+          settings.limits.max_feed_mm_per_s.setConstant(200.0);
+          settings.limits.max_acceleration_mm_per_s2.setConstant(acceleration);
+          settings.limits.max_jerk_mm_per_s3.setConstant(acceleration * (seed % 2 == 0 ? 40.0 : 200.0));
+          settings.contour_tolerance_mm = tolerance_mm;
+          settings.shaper = shaper;
+          settings.plans_in_step = true;
+          const tests::WindingRun run = tests::run_winding_path(settings, seed);
+          farthest = std::max(farthest, run.farthest_mm / tolerance_mm);
+          time_s += run.time_s / static_cast<double>(paths);
+          beyond += !run.ended || run.farthest_mm > 1.01 * tolerance_mm ? 1 : 0;
+        }
+        std::printf("%12.0f  %9.3f  %-10s  %20.3f  %9d  %11.3f\n", acceleration, tolerance_mm, name, farthest, beyond,
+                    time_s);
+      }
+    }
+  }
+}
