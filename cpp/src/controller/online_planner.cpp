@@ -229,6 +229,24 @@ void OnlinePlanner::join(Section& section) const noexcept {
   }
 }
 
+// It is too fast to stop again within a section.
+void OnlinePlanner::begin_with_less(std::uint64_t segment) noexcept {
+  for (std::uint64_t i = segment; i < std::min(planned_, segment + 2); ++i) {
+    PlannedSegment& less = (*ring_)[i];
+    if (less.limit_share < least_share) continue;
+    less.limit_share *= most_less;
+    less.feed_share *= most_less;
+  }
+}
+
+// Periods of rest that are left before the motion begins.
+void OnlinePlanner::rest_first(const PathPoint& from) noexcept {
+  const bool is_settled = settled_ && periods_ahead() <= 0;
+  const bool is_stop = (*ring_)[from.segment].stop && from.offset <= 0.0;
+  const int needed = is_stop ? rest_at(from) - (is_settled ? rules_.settling_periods : 0) : 0;
+  settle_ = !has_motion_ || motion_.at_end() ? needed : std::min(settle_, needed);
+}
+
 bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const FeedRatios& asked) {
   const std::optional<PathPoint> start = next_start(pushed);
   if (!start) return false;
@@ -238,11 +256,7 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const F
   // What is multiplied with 0 is not begun, and planned with little where it is still ahead.
   if (rests && asked.of(here) <= 0.0) return false;
   const FeedRatios ratios = larger(asked, {least_ratio, least_ratio, least_ratio});
-  if (rests) {
-    const bool is_settled = settled_ && periods_ahead() <= 0;
-    const int needed = !here.stop || from.offset > 0.0 ? 0 : rest_at(from) - (is_settled ? rules_.settling_periods : 0);
-    settle_ = !has_motion_ || motion_.at_end() ? needed : std::min(settle_, needed);
-  }
+  if (rests) rest_first(from);
   const double feed = here.programmed * here.feed_share * ratios.of(here);
   const bool is_faster = from.state.speed > std::min(here.max_speed, feed) * kept_feed;
   const FeedRatios planned_ratios = is_faster ? larger(ratios, ratios_) : ratios;
@@ -283,14 +297,7 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const F
       return true;
     }
     makes_plan = rests;
-    if (is_whole || !rests) continue;
-    // Too fast to stop again within a section.
-    for (std::uint64_t i = from.segment; i < std::min(planned_, from.segment + 2); ++i) {
-      PlannedSegment& less = (*ring_)[i];
-      if (less.limit_share < least_share) continue;
-      less.limit_share *= most_less;
-      less.feed_share *= most_less;
-    }
+    if (rests && !is_whole) begin_with_less(from.segment);
   }
   has_motion_ = false;
   failed_ = last_number_ + 1;

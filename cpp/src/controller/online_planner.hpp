@@ -55,6 +55,8 @@ class OnlinePlanner {
   std::uint64_t look_ahead(const PathPoint& from, std::uint64_t pushed, const FeedRatios& ratios) noexcept;
   std::optional<PathPoint> next_start(std::uint64_t pushed) noexcept;
   void join(Section& section) const noexcept;
+  void begin_with_less(std::uint64_t segment) noexcept;
+  void rest_first(const PathPoint& from) noexcept;
   bool next_section(Section& section, std::uint64_t pushed, const FeedRatios& ratios);
   void bind_to_spindle(Section& section, const PathPoint& from, std::uint64_t pushed) noexcept;
   [[nodiscard]] bool begins_bound(const PathPoint& point) const noexcept;
