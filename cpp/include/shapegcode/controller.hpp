@@ -130,7 +130,7 @@ enum class PushResult : std::uint8_t {
   queue_full,     ///< nothing was taken: push it again later
   not_connected,  ///< it does not start where the one before ended, or the sweep of an arc misses its end (1e-6 mm)
   no_length,      ///< no axis moves by more than 1e-9 mm or degrees
-  no_feed,  ///< a feed that is not above zero, or not finite
+  no_feed,        ///< a feed that is not above zero, or not finite
   not_finite,
   wrong_axes,     ///< not as many following axes as the settings have
   aborted,        ///< after abort() nothing is taken until restart()
