@@ -17,6 +17,8 @@ constexpr int halvings_to_speed = 28;
 constexpr int landings = 96;
 constexpr double landing_lengths = 40.0;
 constexpr double longest_landing = 1e6;
+// A landing before the last interval is tried within so many times what a stop takes from there.
+constexpr double landing_stops = 2.0;
 // A landing wherever it ends is tried when so much braking is ahead, as a multiple of what ends with the jerk limit.
 constexpr double most_ahead = 4.0;
 constexpr double shortest_share = 1.2;
@@ -38,6 +40,9 @@ constexpr double no_speed = 1e-10;
 
 // Where nothing is left by a little, what is too slow is taken: it is the upper bound that leads beyond the limits.
 double nearest(const Range& range, double value) noexcept { return std::min(range.high, std::max(range.low, value)); }
+
+// Whether a speed is above that of an interval, beyond rounding.
+bool is_above(double speed, const Station& station) noexcept { return speed > station.speed_limit * (1.0 + rounding); }
 
 // Distance and speed after a time on s'' = a + c s.
 void go(PathState state, double c, double t, double& travel, double& speed) noexcept {
@@ -231,6 +236,8 @@ double PathMotion::wished(double max_speed) const noexcept {
 bool PathMotion::keeps_limits(const Landing& landing, double excess) const noexcept {
   AlongPath state = state_;
   double travel = 0.0;
+  // A motion that is too fast already, or has to end whatever it costs, at least gets no faster.
+  const bool is_too_fast = excess > 1.0 || is_above(state_.speed, plan_->station(station_));
   for (std::size_t part = 0; part < landing.jerk.size(); ++part) {
     const double jerk = landing.jerk[part];
     for (int n = 0; n < landing.periods[part]; ++n) {
@@ -239,7 +246,7 @@ bool PathMotion::keeps_limits(const Landing& landing, double excess) const noexc
       const Place place = place_at(travel);
       if (!place.planned) return true;  // the last of it is slow
       const Station& station = plan_->station(place.station);
-      if (state.speed > state_.speed && state.speed * state.speed > station.squared_limit()) return false;
+      if ((!is_too_fast || state.speed > state_.speed) && is_above(state.speed, station)) return false;
       const AxisLimits limits = plan_->limits_at(station).share(excess * (1.0 + landing_rounding));
       const Derivatives path = plan_->derivatives(station, place.offset);
       if (!keeps(limits, path, state, jerk)) return false;
@@ -257,6 +264,16 @@ bool PathMotion::holds(const Landing& landing, double most_jerk, double steepest
     if (state.speed < -rounding || std::abs(state.acceleration) > steepest) return false;
   }
   return keeps_limits(landing, excess);
+}
+
+// Distance to a stop as if the acceleration had to be built up: what brakes for a corner far from a stop does not land.
+double PathMotion::stop_from_here() const noexcept {
+  const Station& here = plan_->station(station_);
+  const Derivatives path = path_here();
+  const double a = plan_->steepest(here, path);
+  const double jerk = plan_->highest_jerk(here, path);
+  const double v = state_.speed;
+  return 0.5 * v * (v / a + std::min(2.0 * std::sqrt(v / jerk), 2.0 * a / jerk));
 }
 
 // The shortest landing after `travel` mm within the limits times `excess`.
@@ -444,7 +461,7 @@ void PathMotion::advance(double max_speed) noexcept {
   const double near = landing_lengths * plan_->stopping_length();
   const double travel = to_stop(near);
   const bool last = plan_->ends_in_stop(station_);
-  if (last || (travel <= near && state_.acceleration < 0.0)) {
+  if (last || (travel <= near && state_.acceleration < 0.0 && travel <= landing_stops * stop_from_here())) {
     if (land(travel, 1.0)) return fly_on();
   }
   stops_ = max_speed <= 0.0;

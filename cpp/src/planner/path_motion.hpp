@@ -71,6 +71,7 @@ class PathMotion {
   [[nodiscard]] double wished(double max_speed) const noexcept;
   [[nodiscard]] bool keeps_limits(const Landing& landing, double excess) const noexcept;
   [[nodiscard]] bool holds(const Landing& landing, double most_jerk, double steepest, double excess) const noexcept;
+  [[nodiscard]] double stop_from_here() const noexcept;
   bool land(double travel, double excess) noexcept;
   bool land_anywhere() noexcept;
   void fly_on() noexcept;
