@@ -85,7 +85,8 @@ struct ControllerSettings {
   std::vector<AxisShapers> other_shapers;
   double fade_time_s = 0.5;
   /// Take back, to the second order, what smoothing and shaper cut off arcs. Costs `correction_delay()` periods, and of
-  /// every limit what the correction may need for itself.
+  /// every limit what the correction may need for itself. At a start and an exact stop it overshoots along the path, by
+  /// 1 to 15 um at 1 000 to 5 000 mm/s2 with a ZV shaper of 46 Hz; the contour tolerance does not limit that.
   bool contour_correction = false;
   /// Segments that the look-ahead sees (8 at least), and those that may wait in all; the second is rounded up to a
   /// power of two, and holds the window.
