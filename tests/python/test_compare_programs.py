@@ -465,7 +465,19 @@ def test_a_real_change_does_not_pass_the_proof_of_a_conversion() -> None:
 
     missing = np.vstack([RASTER[:8], RASTER[12:]])
     original, emitted = (sg.Program.from_text(cut_along(each), MACHINE) for each in (RASTER, missing))
-    assert [each.kind for each in prove(original, emitted, MACHINE, rapids_shaped=False).refused] == ["cuts"]
+    assert [each.kind for each in prove(original, emitted, MACHINE, rapids_shaped=False).refused] == ["path", "cuts"]
+
+
+@pytest.mark.parametrize("step_mm", [0.3, 1.0, 4.0])
+def test_two_passes_of_sixty_are_missed_by_the_proof_of_a_conversion(step_mm: float) -> None:
+    from shapegcode.conversion.outcome import prove
+
+    passes = [(x, step_mm * y) for y in range(60) for x in ((0.0, 30.0) if y % 2 == 0 else (30.0, 0.0))]
+    whole = np.array(passes)
+    missing = np.vstack([whole[:40], whole[44:]])
+    original, emitted = (sg.Program.from_text(cut_along(each), MACHINE) for each in (whole, missing))
+    assert not prove(original, original, MACHINE, rapids_shaped=False).refused
+    assert [each.kind for each in prove(original, emitted, MACHINE, rapids_shaped=False).refused] == ["path"]
 
 
 def side_by_side_mm(ours: np.ndarray, theirs: np.ndarray, step_mm: float) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import partial
 
@@ -38,6 +37,9 @@ from shapegcode.verdict.figures import (
     UsedShaper,
 )
 from shapegcode.verdict.judge import RegionFigures, rapid_vibration_um, simulate_unchanged, unshaped_regions
+
+_PATH_TOLERANCES = 10.0
+_PATH_UM = 200.0
 
 
 @dataclass(frozen=True)
@@ -287,11 +289,16 @@ def _used_shaper(grid: Grid) -> UsedShaper:
 
 
 def prove(original: Program, emitted: Program, machine: Machine, *, rapids_shaped: bool) -> ChangeProof:
-    """Compare an emitted program with its original; what shaping changes is allowed: the verdict judges the path."""
+    """Compare an emitted program with its original; what shaping changes is allowed.
+
+    The verdict judges how far the response leaves the path. A shaped command leaves it further (up to three tolerances
+    in the conversions of the tests): what is beyond `_PATH_TOLERANCES` and `_PATH_UM` is a part that was left out.
+    """
     kinds = {"feeds", "blocks", "calls"}
     kinds |= {"shaped-rapids"} if rapids_shaped else set()
     kinds |= {"compensation"} if original.core.expanded_radii_mm else set()
-    found = compare(original, emitted, machine, allow=Allowed(frozenset(kinds), math.inf))
+    path_um = max(_PATH_TOLERANCES * machine.tolerance.contour_um, _PATH_UM)
+    found = compare(original, emitted, machine, allow=Allowed(frozenset(kinds), path_um))
     # Without header comments nothing says that lines of emission.* are the converter's own.
     refused = tuple(each for each in found.refused if machine.emission.header or each.kind != "emission")
     return ChangeProof(found.answer, found.counts, found.path_um, refused)
