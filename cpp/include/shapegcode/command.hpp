@@ -103,8 +103,8 @@ struct ShapingOptions {
   /// One shaper for each of X, Y and Z (taps in whole block periods, of one mean delay) instead of the common one;
   /// empty: none. Without a target they distort the path.
   std::vector<Fir> axis_shapers;
-  /// Shapers along an axis (taps in whole block periods, positions as in the path) in place of the one shaper, for
-  /// modes that vary with position by `mode_tables`.
+  /// Shapers along an axis (taps in whole block periods, positions as in the path) instead of the one shaper, for modes
+  /// that vary with position by `mode_tables`.
   std::optional<FollowingFir> following;
   AxisModeTables mode_tables;
   double least_feed_mm_per_s = 0.0;  ///< lowest feed of the controller: no motion is slowed below it for the tolerance
@@ -129,7 +129,7 @@ struct ShapedCommand {
 
 /// Duration of a region at a contour tolerance.
 struct PlannedTolerance {
-  double duration_s = 0.0;    ///< of the shaped command, before any filter behind it
+  double duration_s = 0.0;    ///< of the shaped command, before any filter after it
   double deviation_mm = 0.0;  ///< largest, of the target; 0 without a target
 };
 
@@ -147,7 +147,7 @@ class RegionShaper {
   ~RegionShaper();
 
   /// Next part of at most `periods` periods; false after the last one, and `part` is then unchanged.
-  /// `part.segment_periods` holds all marks of the motions begun so far.
+  /// `part.segment_periods` contains all marks of the motions begun so far.
   [[nodiscard]] bool next(ShapedCommand& part, std::uint32_t periods);
   /// Call before the first part. If the region is one motion from rest to rest, next() then returns parts while the
   /// search for the feed still measures them, as if its first plan kept the tolerance. If it does not, next() returns

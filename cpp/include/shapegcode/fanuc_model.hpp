@@ -94,7 +94,7 @@ class BlockInterpolator {
   double speed_mm_per_s_ = 0.0;
   double on_line_until_s_ = 0.0;
   double elapsed_s_ = 0.0;   // since the open block began
-  double duration_s_ = 0.0;  // of the open block and a pause behind it
+  double duration_s_ = 0.0;  // of the open block and a pause after it
   std::size_t paused_block_ = 0;
   double pause_s_ = 0.0;
   bool started_ = false;

@@ -229,7 +229,7 @@ typedef enum shapegcode_feed_of {
   SHAPEGCODE_FEED_OF_TIME = 3       ///< inverse time: the segment lasts one over the feed, s or revolutions
 } shapegcode_feed_of;
 
-/// How a segment is run. Always begin with shapegcode_rules_init().
+/// Rules for running a segment. Always begin with shapegcode_rules_init().
 typedef struct shapegcode_rules {
   uint64_t struct_size;     ///< written by shapegcode_rules_init(); the size of the struct for the library
   uint32_t line;            ///< shown by the state while the segment runs

@@ -77,7 +77,7 @@ class ContourTracker {
   static constexpr std::size_t slots = 16;
   static constexpr std::size_t no_segment = std::numeric_limits<std::size_t>::max();
 
-  /// What a search needs of one segment.
+  /// Data of one segment for a search.
   struct NearSegment {
     Vector3 start;
     Vector3 direction;  // unit; of the neighbour if the segment has no length
@@ -86,9 +86,9 @@ class ContourTracker {
     double next_s;     // of the next segment's start
     std::int32_t arc;  // -1 for a line
     bool has_side;     // the direction is not along Z
-    double across2;    // of the direction: the square of what is not along Z
+    double across2;    // square of the direction's component perpendicular to Z
   };
-  /// The segment last asked for of those that share its slot.
+  /// The last requested segment of those that share its slot.
   struct Slot {
     std::size_t index = no_segment;
     NearSegment of{};
@@ -121,13 +121,13 @@ class ContourTracker {
     std::size_t index;
     double s;  // of the foot, from the path's start
   };
-  /// Lines in a row that all run nearly as the segment in their midst does.
+  /// Successive lines with nearly the direction of the segment in their middle.
   struct Straight {
     std::size_t about = no_segment;
     Vector3 direction = Vector3::Zero();              // of that segment
     std::size_t first = 0, last = 0;                  // segments
     double begin = 0.0, end = 0.0;                    // mm from the path's start; infinite where the path ends
-    bool turns_before = false, turns_behind = false;  // what lies beside them does not run so
+    bool turns_before = false, turns_behind = false;  // the neighbours have another direction
   };
 
   [[nodiscard]] Foot foot_on(const NearSegment& part, const Vector3& p, const Window& window) const noexcept;
@@ -136,16 +136,16 @@ class ContourTracker {
   [[nodiscard]] static double refined_foot(const Arc& arc, const Vector3& p, const Polar& polar, const Turns& turns,
                                            double u) noexcept;
   [[nodiscard]] static Foot arc_point_foot(const Arc& arc, double u, const Vector3& p) noexcept;
-  /// Whether no point of so many segments lies within the root of `limit2` from `p`.
+  /// Whether no point of `size` segments lies within the root of `limit2` of `p`.
   [[nodiscard]] bool is_beyond(std::size_t first, std::size_t size, const Vector3& p, double limit2) const noexcept;
-  /// How many segments from `first` on, or before `end`, need not be looked at one by one; 0: none.
+  /// Number of segments from `first` on, or before `end`, that can be skipped as a group; 0: none.
   [[nodiscard]] std::size_t group_from(std::size_t first, const Vector3& p, double limit2) const noexcept;
   [[nodiscard]] std::size_t group_before(std::size_t end, const Vector3& p, double limit2) const noexcept;
-  /// `bound`: says how far the foot may lie from the path's start; asked where it matters.
+  /// `bound`: returns the largest distance of the foot from the path's start; called only if needed.
   template <typename Bound>
   double follow(const Vector3& p, const Bound& bound) noexcept;
   double follow_any(const Vector3& p, double move, const Window& window, double bound) noexcept;
-  /// Whether all of the path within the window, and the next segment, runs nearly as the present one.
+  /// Whether the path within the window and the next segment have nearly the present direction.
   [[nodiscard]] bool runs_straight(const Window& window) noexcept;
   void straighten() noexcept;
   [[nodiscard]] bool runs_along(std::size_t index) const noexcept;
@@ -155,7 +155,7 @@ class ContourTracker {
   [[nodiscard]] Vector3 start_tangent(std::size_t index) const noexcept;
   [[nodiscard]] Vector3 end_tangent(std::size_t index) const noexcept;
 
-  /// The path as a search wants it; constant, so that copies of a tracker share it.
+  /// The path prepared for searches; constant, so that copies of a tracker share it.
   struct Geometry {
     Path path;
     SteadyColumn<std::int32_t> arc_of;  // -1 for a line
@@ -175,17 +175,18 @@ class ContourTracker {
   [[nodiscard]] NearSegment bare_segment_of(std::size_t i) const noexcept;
 
   std::shared_ptr<const Geometry> geometry_;
-  mutable std::array<Slot, slots> slots_{};  // segments around the point, worked out once
+  mutable std::array<Slot, slots> slots_{};  // segments around the point, computed once
   Vector3 last_ = Vector3::Zero();
   std::size_t cursor_ = 0;
   double s_ = 0.0;
-  double furthest_ = 0.0;      // largest s_ of late: a point that moves back from there may be on the return leg
+  double furthest_ = 0.0;      // largest recent s_: a point that moves back from there may be on the return leg
   double deviation_ = 0.0;     // unsigned, of the last sample
   double lateral_ = 0.0;       // of the last sample: 1 left, -1 right, 0 neither
   double height_ = 0.0;        // of the last sample above its foot
   std::uint32_t growing_ = 0;  // samples since the deviation began to grow
   Straight straight_;
-  Window near_{std::numeric_limits<double>::infinity(), 0.0};  // for which it runs straight about the present segment
+  Window near_{std::numeric_limits<double>::infinity(),
+               0.0};  // in which the path is straight around the present segment
 };
 
 /// Orbit error of every arc of a path: area between the moving point's track and the programmed arc, divided by the
@@ -239,7 +240,7 @@ class CornerReach {
   struct Corner {
     Vector3 point;
     double s = 0.0;         // from the path's start
-    double best2 = 0.0;     // squared distance to the track; infinite before the point was near
+    double best2 = 0.0;     // squared distance to the track; infinite until the point has been near
     std::uint32_t tag = 0;  // of the sample at the end of the nearest segment of track
   };
 
@@ -272,8 +273,8 @@ class CornerReach {
   void step_corners(const Vector3& p, double foot_mm, std::uint32_t tag) noexcept;
 
   std::vector<Corner> corners_;
-  double idle_until_mm_ = 0.0;  // no corner is near before a foot so far from the path's start
-  std::size_t first_ = 0;       // corners [first_, next_) are near enough to be looked at
+  double idle_until_mm_ = 0.0;  // no corner is near before the foot is this far from the path's start
+  std::size_t first_ = 0;       // corners [first_, next_) are near enough to be examined
   std::size_t next_ = 0;
   double largest2_ = 0.0;
   Vector3 last_ = Vector3::Zero();
