@@ -40,7 +40,8 @@ struct FitOptions {
   /// Longest block. 1: all blocks have the same duration, so that any time a control adds to a block at another feed
   /// override is the same for all, and lengthens the motion evenly.
   std::uint32_t most_periods = std::numeric_limits<std::uint32_t>::max();
-  /// Distance per interpolation period up to which blocks may be longer than that: up to it a control adds no more.
+  /// Blocks may be longer if the command moves no further than this per interpolation period: the time that a control
+  /// adds has no significant effect there.
   double equal_above_increments = 1.0;
   /// Likewise blocks this far from both ends of a section at constant velocity: their vibration decays before the end.
   /// 0: none.
