@@ -9,7 +9,7 @@
 
 namespace shapegcode {
 
-/// Values in a row, in blocks: they grow without being copied, and take no more room than they need, to a block.
+/// A growing array stored in blocks: it grows without copying its values, and unused memory is less than one block.
 template <typename Value>
 class Column {
  public:
@@ -25,17 +25,17 @@ class Column {
     return blocks_[i / block_size][i % block_size];
   }
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  /// Gives back the room that no value takes: of a short column it may be as much again.
+  /// Frees the unused memory: in a short column it may be as much as the used.
   void fit() {
     if (!blocks_.empty()) blocks_.back().shrink_to_fit();
   }
-  /// Gives the room of the values before `i` back; they must not be read again.
+  /// Frees the memory of the values before `i`; they must not be read again.
   void forget_before(std::size_t i) noexcept {
     for (; forgotten_ < i / block_size; ++forgotten_) std::vector<Value>().swap(blocks_[forgotten_]);
   }
 
  private:
-  // Large enough that what is given back goes back to the system at once, and never to other blocks' neighbours.
+  // Large enough that freed memory returns to the operating system at once.
   static constexpr std::size_t block_size = std::bit_ceil((std::size_t{1} << 20U) / sizeof(Value));
 
   std::vector<std::vector<Value>> blocks_;
@@ -43,7 +43,7 @@ class Column {
   std::size_t forgotten_ = 0;  // blocks
 };
 
-/// The same of values that seldom change: a block in which all are one, to the bit, takes the room of one.
+/// The same for values that seldom change: a block of identical values, to the bit, takes the memory of one.
 template <typename Value>
 class SteadyColumn {
  public:

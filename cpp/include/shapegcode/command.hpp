@@ -15,27 +15,26 @@
 
 namespace shapegcode {
 
-/// What shall follow the programmed path.
+/// Which motion is to follow the programmed path.
 enum class ContourTarget {
-  none,      ///< nothing: the path is shaped as it is
+  none,      ///< none: shaping without contour compensation
   command,   ///< the shaped command
-  response,  ///< the plant's response to it: the part
+  response,  ///< the plant's response to it, which cuts the part
 };
 
-/// What plans the command of a run before it is shaped.
+/// What plans the command of a motion from rest to rest before it is shaped.
 enum class CommandPlanner : std::uint8_t {
   look_ahead,    ///< `plan_speed`: ramps along the path, corners passed slowly
   time_optimal,  ///< `time_optimal_motion`: corners rounded within the contour tolerance, jerk of every axis kept
 };
 
-/// Kernel, at delays 0, 1, ... samples of `period_s`, from a command before shaping to what shall follow the path: the
-/// shaper's own taps, or its taps followed by an axis' modes under a command that is linear between samples. A shaper
-/// that cancels the modes leaves a kernel hardly longer than itself; the tail of one that does not is cut where less
-/// than 1e-4 of it is left, or at four times the shaper, and the outer taps mended so that sum and mean delay
-/// are the shaper's.
-/// `of`: the axis that follows, with its modes, and the axis whose command is shaped: where that is another one, the
-/// kernel is what modes do that it excites, and empty without any. Throws Error(argument) as ModalPlant does. Source:
-/// this project.
+/// The kernel from a command before shaping to the motion that is to follow the path, at delays 0, 1, ... samples of
+/// `period_s`: the shaper's taps alone, or followed by an axis' modes under a command that is linear between samples.
+/// If the shaper cancels the modes, the kernel is hardly longer than the shaper. Otherwise its tail is cut off where
+/// less than 1e-4 of it remains, or at four times the shaper, and the outer taps are adjusted to keep the shaper's sum
+/// and mean delay. `of`: the axis that moves, with its modes, and the axis whose command is shaped. If they differ, the
+/// kernel is the response of the modes that the commanded axis excites, and empty without any. Throws Error(argument)
+/// as ModalPlant does. Source: this project.
 struct KernelAxes {
   std::size_t moved = 0;
   std::size_t commanded = 0;
@@ -45,13 +44,12 @@ struct KernelAxes {
 
 /// Finds, for one axis, the correction c of a command before shaping that brings the shaped command (or the plant's
 /// response to it) back to the programmed path: it minimises |e + f*c|^2 + sum_k w_k (c_k - 2 c_{k-1} + c_{k-2})^2,
-/// where f is the kernel from the command before shaping to what shall follow the path and e the deviation without
-/// correction.
+/// where f is that kernel (see contour_kernel) and e the deviation without correction.
 ///
-/// The error is counted as far as the correction reaches, so the normal matrix is a banded Toeplitz matrix whatever the
-/// length of the window: its Cholesky factor is worked out once, until its rows no longer change, and every window then
-/// costs two substitutions. Unequal weights cost a factorisation of their own. What is solved window by window is
-/// carried on: corrections already given out stay as they are, and the next window starts from them.
+/// The error is summed as far as the correction acts, so the normal matrix is a banded Toeplitz matrix whatever the
+/// length of the window. Its Cholesky factor is computed once, until its rows no longer change; every window then costs
+/// two substitutions. Unequal weights need a separate factorisation. Windows are solved one after the other:
+/// corrections already applied stay fixed, and the next window starts from them.
 class ContourSolver {
  public:
   /// `kernel`: taps at delays 0, 1, ... samples, sum other than 0; `smoothness` > 0: the weight w. Throws
@@ -62,10 +60,10 @@ class ContourSolver {
   [[nodiscard]] std::size_t reach() const noexcept { return kernel_.size() - 1; }
   [[nodiscard]] const std::vector<double>& kernel() const noexcept { return kernel_; }
 
-  /// Corrections of one window. `correction` holds reach()+2 values that stay (what was given out before the window,
-  /// zero where nothing was) and then the m unknowns; `error` e at the m unknowns and at the reach() samples behind
-  /// them, without any correction. `stiffness`: empty, or m+2 factors of the smoothness, one per second difference.
-  /// Throws Error(argument) on sizes that do not fit. O(m*reach), with stiffness O(m*reach^2).
+  /// Corrections of one window. `correction` holds reach()+2 fixed values (corrections before the window, or zero) and
+  /// then the m unknowns. `error` is e without any correction, at the m unknowns and at the reach() samples after them.
+  /// `stiffness`: empty, or m+2 factors of the smoothness, one per second difference. Throws Error(argument) on sizes
+  /// that do not fit. O(m*reach), with stiffness O(m*reach^2).
   void solve(std::span<const double> error, std::span<double> correction, std::span<const double> stiffness = {});
 
  private:
@@ -80,7 +78,7 @@ class ContourSolver {
   /// Rows of the factor, band_+1 values each: l(i, i-band_) ... l(i, i-1), 1/l(i, i).
   std::vector<double> factor_;
   std::size_t factor_rows_ = 0;
-  bool is_settled_ = false;  // the last row stands for all that follow
+  bool is_settled_ = false;  // the last row is valid for all later ones
   std::vector<double> work_;
   std::vector<double> own_factor_;  // with stiffness
 };
@@ -88,35 +86,33 @@ class ContourSolver {
 /// How a region is turned into a shaped command on the block grid.
 struct ShapingOptions {
   MotionLimits limits;
-  /// The time-optimal one asks for feed, acceleration and jerk of every axis in `limits`; their rules for corners do
-  /// not count for it.
+  /// The time-optimal planner needs feed, acceleration and jerk of every axis in `limits` and ignores its corner rules.
   CommandPlanner planner = CommandPlanner::look_ahead;
-  FilterTolerance tolerance;  ///< of the shaper with what follows it
+  FilterTolerance tolerance;  ///< for the shaper and the filters after it
   double block_period_s = 0.005;
   double interpolation_period_s = 0.001;
   double plunge_axis_angle_rad = 0.26;  ///< see forced_stops
   double plunge_corner_angle_rad = 0.78;
-  /// Ascending indices of segments, above 0, before which the command comes to rest too, as at a forced stop.
+  /// Ascending indices of segments, above 0, before which the command also stops, as at a forced stop.
   std::vector<std::uint32_t> further_stops;
-  double rest_at_stop_s = 0.0;  ///< pause at a forced stop, so that a filter behind the program runs out
-  /// What is brought back to the path behind the shaper. With a target, `tolerance.contour_tolerance_mm` is kept by the
-  /// highest feed that does; without one, `tolerance` bounds the speed at corners and on arcs.
+  double rest_at_stop_s = 0.0;  ///< pause at a forced stop, until the control's filter is at rest
+  /// Which motion contour compensation brings back to the path. With a target, the feed is the highest that keeps
+  /// `tolerance.contour_tolerance_mm`; without one, `tolerance` bounds the speed at corners and on arcs.
   ContourTarget target = ContourTarget::none;
-  AxisModes modes;  ///< of the response; nothing else is done with them
-  /// One shaper for each of X, Y and Z (taps in whole block periods, of one mean delay) in place of the common one;
+  AxisModes modes;  ///< used for the response only
+  /// One shaper for each of X, Y and Z (taps in whole block periods, of one mean delay) instead of the common one;
   /// empty: none. Without a target they distort the path.
   std::vector<Fir> axis_shapers;
-  /// Shapers along an axis (taps in whole block periods, positions as in the path) in place of the one shaper, for
-  /// modes that vary with position by `mode_tables`.
+  /// Shapers along an axis (taps in whole block periods, positions as in the path) instead of the one shaper, for modes
+  /// that vary with position by `mode_tables`.
   std::optional<FollowingFir> following;
   AxisModeTables mode_tables;
-  double least_feed_mm_per_s = 0.0;  ///< what the controller can run: no run is slowed below it for the tolerance
-  /// Share by which the shaped command may run faster along the path than programmed, > 0. The correction of the
-  /// contour keeps to it; what a slower programmed feed asks is asked so early that the shaper has passed it on in
-  /// time.
+  double least_feed_mm_per_s = 0.0;  ///< lowest feed of the controller: no motion is slowed below it for the tolerance
+  /// Ratio by which the shaped command may exceed the programmed feed along the path, > 0. The contour correction keeps
+  /// it. The speed is lowered for a slower programmed feed early enough that the shaper's output reaches it in time.
   double feed_excess_ratio = MotionLimits::none;
-  /// Weight of the correction's second differences on half the block grid. Less of it follows the path more closely and
-  /// asks for more beside the modes' frequencies, which shows where these are off: docs/concepts/contour.md.
+  /// Weight of the correction's second differences on half the block grid. A smaller weight follows the path more
+  /// closely and excites more at frequencies beside the modes: docs/concepts/contour.md.
   double contour_smoothness = 0.4;
 };
 
@@ -128,21 +124,21 @@ struct ShapedCommand {
   std::vector<std::int8_t> arc_normal;  ///< (n) see fit_blocks
   std::vector<std::uint32_t> run_ends;  ///< periods, of this part, at which the command is at rest
   std::vector<std::uint32_t>
-      segment_periods;  ///< per marked segment: period of the region in which its begin is reached
+      segment_periods;  ///< per marked segment: period of the region in which its start is reached
 };
 
-/// What a region takes at a contour tolerance.
+/// Duration of a region at a contour tolerance.
 struct PlannedTolerance {
-  double duration_s = 0.0;    ///< of the shaped command, before any filter behind it
-  double deviation_mm = 0.0;  ///< largest, of what shall follow the path; 0 without a target
+  double duration_s = 0.0;    ///< of the shaped command, before any filter after it
+  double deviation_mm = 0.0;  ///< largest, of the target; 0 without a target
 };
 
-/// Splits the path at forced stops, plans each run from rest to rest, samples it at half the block period, shapes it
-/// with `shaper` (taps in whole block periods, common to all axes) and puts the runs behind one another. Parts of a
-/// bounded number of periods, so that memory does not grow with the region.
+/// Splits the path at forced stops and plans each motion from rest to rest. Samples each at half the block period,
+/// shapes it with `shaper` (taps in whole block periods, common to all axes) and joins them. The output comes in parts
+/// of a bounded number of periods, so that memory does not grow with the region.
 class RegionShaper {
  public:
-  /// `marked_segments`: ascending indices (up to path->size()) whose begin in time is wanted. Throws Error(argument) if
+  /// `marked_segments`: ascending indices (up to path->size()) whose start time is wanted. Throws Error(argument) if
   /// the block period is not a whole multiple of the interpolation period, and as the planner and the filter do.
   RegionShaper(std::shared_ptr<const Path> path, const Fir& shaper, std::span<const std::uint32_t> marked_segments,
                ShapingOptions options);
@@ -150,24 +146,24 @@ class RegionShaper {
   RegionShaper& operator=(RegionShaper&&) noexcept;
   ~RegionShaper();
 
-  /// Next part of at most `periods` periods; false once the region was given out, and `part` is then left alone.
-  /// `part.segment_periods` then holds all marks of the runs that were begun.
+  /// Next part of at most `periods` periods; false after the last one, and `part` is then unchanged.
+  /// `part.segment_periods` contains all marks of the motions begun so far.
   [[nodiscard]] bool next(ShapedCommand& part, std::uint32_t periods);
-  /// To be called before the first part: parts are then given out while the search for the feed still measures them,
-  /// where the region is one run, as if its first plan kept the tolerance. Where that turns out to be wrong, next()
-  /// gives false and is_withdrawn() holds: all that was given out is void.
+  /// Call before the first part. If the region is one motion from rest to rest, next() then returns parts while the
+  /// search for the feed still measures them, as if its first plan kept the tolerance. If it does not, next() returns
+  /// false and is_withdrawn() is true: all parts returned so far are invalid.
   void begin_early() noexcept;
   [[nodiscard]] bool is_withdrawn() const noexcept;
-  /// Gives the region out from its begin again, with the feed that the search then finds; false, and nothing done, if
-  /// no part was given out early.
+  /// Restarts the region from its beginning, with the feed that the search then finds; false, and nothing done, if no
+  /// part was returned early.
   bool restart();
-  /// Largest deviation in mm of what the target says shall follow the path, as far as the runs given out tell.
+  /// Largest deviation of the target from the path in mm, over the motions returned so far.
   [[nodiscard]] double largest_deviation_mm() const noexcept;
-  /// Whether any run given out is slower than without a tolerance; without a target always.
+  /// Whether any motion returned so far is slower than without a tolerance; always true without a target.
   [[nodiscard]] bool is_slowed() const noexcept;
-  /// How much of the region was given out, 0 to 1: by segments, within a run by its periods.
+  /// Progress in the region, 0 to 1: by segments, within a motion by its periods.
   [[nodiscard]] double share() const noexcept;
-  /// Junctions that no speed passes within the tolerance: stops beside the forced ones.
+  /// Number of stops besides the forced ones: junctions that exceed the tolerance at every speed.
   [[nodiscard]] std::uint32_t stops() const noexcept;
 
  private:
@@ -180,9 +176,9 @@ class RegionShaper {
   std::unique_ptr<State> state_;
 };
 
-/// The time of a region at several contour tolerances, without giving it out. Each search for the feed starts from the
-/// speeds of the tolerance before, so descending tolerances cost few rounds each; infinity: nothing is slowed. They
-/// replace `options.tolerance.contour_tolerance_mm`. Throws as RegionShaper does.
+/// The time of a region at several contour tolerances, without its command. Each search for the feed starts from the
+/// speeds of the previous tolerance, so descending tolerances need few rounds each; infinity: nothing is slowed. The
+/// tolerances replace `options.tolerance.contour_tolerance_mm`. Throws as RegionShaper does.
 [[nodiscard]] std::vector<PlannedTolerance> plan_tolerances(const std::shared_ptr<const Path>& path, const Fir& shaper,
                                                             const ShapingOptions& options,
                                                             std::span<const double> tolerances_mm);

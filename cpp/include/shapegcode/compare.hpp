@@ -10,9 +10,9 @@
 
 namespace shapegcode {
 
-/// What is compared of two programs, and what a difference is of.
+/// Kinds of program contents that are compared; also the kind of a difference.
 enum class ComparedKind : std::uint8_t {
-  cuts,           ///< runs of cutting moves that nothing else interrupts
+  cuts,           ///< sequences of cutting moves without interruption
   rapids,         ///< G00, and moves in machine coordinates: G28, G30, G53
   tools,          ///< T, M06
   spindle,        ///< S, M03, M04, M05, M19
@@ -23,13 +23,13 @@ enum class ComparedKind : std::uint8_t {
   functions,      ///< other M codes, other G codes of the control, moves of further axes, macro statements
   dwells,         ///< G04
   stops,          ///< M00, M01, M02, M30, M99
-  modal,          ///< modal state at the begin of a cut, exact stops in it
+  modal,          ///< modal state at the start of a cut, exact stops in it
   feeds,          ///< of a cut or a drilling cycle
   blocks,         ///< how many blocks a cut has
   path,           ///< distance of the paths of a cut
-  order,          ///< the same stands elsewhere
-  shaped_rapids,  ///< cutting moves, marked as such, in place of a rapid
-  emission,       ///< lines that the machine file has written around shaped cuts
+  order,          ///< the same contents in another order
+  shaped_rapids,  ///< cutting moves, marked as such, instead of a rapid
+  emission,       ///< lines around shaped cuts that the machine file requests
   units,          ///< G20 or G21
   end,            ///< one program ends early
 };
@@ -38,15 +38,15 @@ inline constexpr std::size_t compared_kinds = 20;
 struct ComparisonOptions {
   ReaderOptions reader;                     ///< with which both programs were read
   std::vector<std::string> emission_lines;  ///< capitals without blanks
-  double joint_path_mm = 0.0;               ///< cuts of other lengths are the same within it, run side by side
+  double joint_path_mm = 0.0;               ///< cuts of different lengths are equal within it, compared in parallel
 };
 
-/// One thing that differs. Lines are those of the sources; 0: the program has nothing there.
+/// One difference. Lines are those of the sources; 0: the program has nothing there.
 struct ProgramDifference {
   ComparedKind kind = ComparedKind::cuts;
   std::uint32_t original_line = 0;
   std::uint32_t emitted_line = 0;
-  std::string original;  ///< what it has, with the file where that is a called one; empty: nothing
+  std::string original;  ///< its contents, with the file if that is a called one; empty: none
   std::string emitted;
   double distance_mm = 0.0;  ///< of paths
 };
@@ -59,12 +59,13 @@ struct KindCount {
 
 struct ProgramComparison {
   std::array<KindCount, compared_kinds> counts;
-  double path_mm = 0.0;  ///< largest distance of the paths of a cut that both have, seen from either
+  double path_mm = 0.0;  ///< largest distance between the paths of a cut in both programs, in either direction
   std::vector<ProgramDifference> differences;
 };
 
-/// Compares two programs by their words and canonical moves; both are aligned by what they do, not by their lines. Of a
-/// cut that both have the paths are followed along each other, and the largest distance of each from the other counts.
+/// Compares two programs by their words and canonical moves; both are aligned by their effects, not by their lines. For
+/// a cut in both programs the paths are followed along each other, and the largest distance of each from the other
+/// counts.
 [[nodiscard]] ProgramComparison compare_programs(const Program& original, const Program& emitted,
                                                  const ComparisonOptions& options);
 

@@ -7,11 +7,11 @@
 
 namespace shapegcode {
 
-/// Which part of the input an Error speaks of; the Python binding maps each kind to one exception class.
+/// The kind of input that an Error concerns; the Python binding maps each kind to one exception class.
 enum class ErrorKind : std::uint8_t {
   program,   ///< the CNC program text: carries line and column
   design,    ///< a shaper that does not exist, or not on this grid
-  argument,  ///< a value handed to a function is outside its stated range
+  argument,  ///< an argument of a function is outside its stated range
   numeric,   ///< a solver failed; the message carries its flag
 };
 
@@ -27,7 +27,7 @@ class Error : public std::runtime_error {
   [[nodiscard]] std::uint32_t line() const noexcept { return line_; }
   [[nodiscard]] std::uint32_t column() const noexcept { return column_; }
   [[nodiscard]] int alarm() const noexcept { return alarm_; }
-  /// Name of the text the line belongs to; empty: the program that was handed over.
+  /// Name of the file of the line; empty: the program passed to the function.
   [[nodiscard]] const std::string& file() const noexcept { return file_; }
   void set_file(std::string name) { file_ = std::move(name); }
 

@@ -5,15 +5,15 @@
 
 namespace shapegcode {
 
-/// One vibration mode as it moves one axis, base-excited by the command of that axis or of others.
+/// One vibration mode that moves one axis, base-excited by the command of that axis or of others.
 struct Mode {
   double frequency_hz = 0.0;   ///< undamped natural frequency
   double damping_ratio = 0.0;  ///< 0 <= zeta < 1
-  double participation = 1.0;  ///< share of this mode's relative deflection in the response
-  /// Shares of the accelerations of X, Y and Z that excite it; all zero: that of the axis which it moves, whole.
+  double participation = 1.0;  ///< factor of this mode's relative deflection in the response
+  /// Factors of the accelerations of X, Y and Z that excite it; all zero: the axis which it moves, with factor one.
   std::array<double, 3> excited_by{};
 
-  /// Whether axes of its own excite it, not the one which it moves.
+  /// Whether `excited_by` states the exciting axes.
   [[nodiscard]] constexpr bool crosses() const noexcept {
     return excited_by[0] != 0.0 || excited_by[1] != 0.0 || excited_by[2] != 0.0;
   }

@@ -18,7 +18,7 @@ namespace shapegcode {
 struct SpeedPhase {
   double start_s = 0.0;  ///< time at which it begins
   double duration_s = 0.0;
-  double distance_mm = 0.0;  ///< along the path at its begin
+  double distance_mm = 0.0;  ///< along the path at its start
   double speed_mm_per_s = 0.0;
   double acceleration_mm_per_s2 = 0.0;
 
@@ -59,29 +59,30 @@ class SpeedProfile {
   double jerk_time_s_ = 0.0;
 };
 
-/// Speeds that a path may have beside its limits, mm/s; infinity where there is none.
+/// Additional speed limits of a path, mm/s; infinity: none.
 struct SpeedCaps {
   std::vector<float> on_segment;   ///< of each segment
-  std::vector<float> at_junction;  ///< [i]: where segment i is entered
+  std::vector<float> at_junction;  ///< [i]: at the start of segment i
 };
 
 /// Tangential speed profile over a whole path from rest to rest: every segment at most at its feed, every limit kept,
-/// deceleration ended where a slower segment begins. O(n). Throws Error(argument) on a limit that is not positive
-/// or a segment without feed, or caps that are not one per segment. `filter`: what follows, and its tolerance.
+/// deceleration completed where a slower segment begins. O(n). Throws Error(argument) on a limit that is not positive
+/// or a segment without feed, or caps that are not one per segment. `filter`: the filter after the interpolation, and
+/// its tolerance.
 ///
 /// Forward and backward passes over the segments' boundary speeds (the planner of grbl and of LinuxCNC, in v^2); then,
-/// under the constant-time law, ramps are stretched to the time constant where a neighbouring steady section leaves
-/// room. A jerk time smooths distance over time by a moving average of that length; the slow sections around corners
-/// are lengthened by half of it on both sides, so that smoothing does not raise the speed at the corner.
+/// under the constant-time law, ramps are lengthened to the time constant if a neighbouring section of constant speed
+/// is long enough. A jerk time smooths distance over time by a moving average of that length; the slow sections around
+/// corners are lengthened by half of it on both sides, so that smoothing does not raise the speed at the corner.
 ///
-/// Behind a jerk time the acceleration of an axis may exceed its limit where segments of different direction meet at
-/// speed (there the corner limits bound what happens), and jerk on arcs is not bounded.
+/// With a jerk time the acceleration of an axis may exceed its limit where segments of different direction meet at
+/// speed (only the corner limits apply there), and jerk on arcs is not bounded.
 [[nodiscard]] SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const FilterTolerance& filter = {},
                                       const SpeedCaps* caps = nullptr);
 
 /// Set-points of a path under a speed profile, one per interpolation period, from the start (first step) to the end.
-/// `step` is the real-time form: no allocation, no exception, no lock, work bounded by the segments and phases that one
-/// period passes over. `interpolate` is the batch form and made of the same steps.
+/// `step` is the real-time form: no allocation, no exception, no lock, work bounded by the segments and phases within
+/// one period. `interpolate` is the batch form and uses the same steps.
 class Interpolator {
  public:
   /// `delay_s` >= 0: rest at the start before the motion begins; need not be a multiple of the period. Throws
@@ -89,15 +90,14 @@ class Interpolator {
   Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile, double period_s,
                double delay_s = 0.0);
 
-  /// Next set-point, X, Y and Z. False once the last set-point was given; it then stays at the end.
+  /// Next set-point, X, Y and Z. False after the last one; the position then stays at the end.
   bool step(std::span<double> out) noexcept { return step_into(out, *this); }
   bool step(Vector3& position) noexcept { return step(position, 1); }
-  /// The set-point so many periods on, to the last bit what the last of as many steps gives; the path is looked at
-  /// once.
+  /// The set-point `periods` later, identical to the last of that many steps; the path is evaluated once.
   bool step(Vector3& position, std::size_t periods) noexcept;
-  /// Distance along the path at the set-point last given.
+  /// Distance along the path at the last set-point.
   [[nodiscard]] double distance_mm() const noexcept { return distance_mm_; }
-  /// Segment of the set-point last given.
+  /// Segment of the last set-point.
   [[nodiscard]] std::size_t segment() const noexcept { return path_cursor_; }
   [[nodiscard]] const Segment& on() const noexcept { return on_; }
   /// Number of set-points from start to end.

@@ -16,8 +16,8 @@ namespace shapegcode {
 
 enum class SegmentKind : std::uint8_t { rapid, line, arc };
 
-/// One canonical move in mm. An arc turns about the axis `normal` (0 = X, 1 = Y, 2 = Z) and may climb along it; a start
-/// and end radius that differ within the controller's tolerance are joined by a linear change of radius over the sweep.
+/// One canonical move in mm. An arc turns about the axis `normal` (0 = X, 1 = Y, 2 = Z) and may climb along it; if
+/// start and end radius differ within the controller's tolerance, the radius changes linearly over the sweep.
 struct Segment {
   Vector3 start_mm = Vector3::Zero();
   Vector3 end_mm = Vector3::Zero();
@@ -56,13 +56,13 @@ struct Segment {
 /// Unit tangent at distance `s_mm`; zero vector for a segment without length.
 [[nodiscard]] Vector3 tangent_at(const Segment& segment, double s_mm) noexcept;
 
-/// How many equal chords of an arc lie within a tolerance of it; 1 for a line.
+/// Number of equal chords that approximate an arc within a tolerance; 1 for a line.
 [[nodiscard]] double chords_within(const Segment& segment, double tolerance_mm) noexcept;
 
 /// Curvature 1/mm: 0 for a line, R/(R^2+p^2) for a helix with pitch p mm/rad.
 [[nodiscard]] double curvature(const Segment& segment) noexcept;
 
-/// Second derivative of the position by the distance: towards the centre of an arc, zero on a line.
+/// Second derivative of the position with respect to distance: towards the centre of an arc, zero on a line.
 [[nodiscard]] Vector3 bend_at(const Segment& segment, double s_mm) noexcept;
 
 /// Nearest point of a segment to `p`.
@@ -72,13 +72,13 @@ struct Nearest {
 };
 [[nodiscard]] Nearest nearest_on(const Segment& segment, const Vector3& p) noexcept;
 
-/// Segments in a row, of a path or of an array, by value. An array that it is given by reference must outlive it; one
-/// that is handed over, or written in braces, it keeps.
+/// A sequence of segments of a path or an array, by value. An array passed by reference must outlive it; an array
+/// passed as an rvalue or in braces is stored.
 class Segments;
 
-/// A connected run of segments with the distance of each from the start. Constant after construction; a copy is the
-/// same path, not another one. A line takes its start, its distance and, where they change, feed and line: its length
-/// is worked out when it is asked for. Arcs, and what else is no plain line, are kept in whole beside it.
+/// A connected sequence of segments with the distance of each from the start. Constant after construction; copies share
+/// their data. A line is stored as its start, its distance and, where they change, feed and line number; its length is
+/// computed on request. Arcs and other segments are stored in full.
 class Path {
  public:
   Path() = default;
@@ -91,7 +91,7 @@ class Path {
   /// Distance of segment i's start from the path's start; `distance(size())` is the whole length.
   [[nodiscard]] double distance_mm(std::size_t i) const noexcept { return data_->nodes[i].distance_mm; }
   [[nodiscard]] double length_mm() const noexcept { return size() == 0 ? 0.0 : distance_mm(size()); }
-  // One number of segment i, without the others.
+  // Single values of segment i.
   [[nodiscard]] const Vector3& start_mm(std::size_t i) const noexcept { return data_->nodes[i].start_mm; }
   [[nodiscard]] const Vector3& end_mm(std::size_t i) const noexcept;
   [[nodiscard]] double feed_mm_per_s(std::size_t i) const noexcept { return data_->feeds[i]; }
@@ -100,13 +100,13 @@ class Path {
   /// Whether it is a line that ends where the next one starts.
   [[nodiscard]] bool is_plain(std::size_t i) const noexcept { return data_->sources[i].kept == 0; }
 
-  /// Whether the motion is the same: geometry, feeds and stops, whatever lines they come from.
+  /// Whether the motion is the same: geometry, feeds and stops, regardless of line numbers.
   [[nodiscard]] bool moves_as(const Path& other) const noexcept;
 
-  /// Position at `s_mm` from the start. `cursor` is the segment index of the previous call: amortised O(1) on a
-  /// monotonous walk, and real-time safe.
+  /// Position at `s_mm` from the start. `cursor` is the segment index of the previous call: amortised O(1) for
+  /// monotonic `s_mm`, and real-time safe.
   [[nodiscard]] Vector3 point(double s_mm, std::size_t& cursor) const noexcept;
-  /// Segment at `s_mm` from the start, wherever that is.
+  /// Segment at `s_mm` from the start, without a cursor.
   [[nodiscard]] std::size_t segment_at(double s_mm) const noexcept;
   /// Moves `cursor` to the segment at `s_mm` from the start, one by one.
   void seek(double s_mm, std::size_t& cursor) const noexcept;
@@ -134,20 +134,20 @@ class Path {
   std::shared_ptr<const Data> data_;
 };
 
-/// Makes a path segment by segment, without an array of them.
+/// Builds a path segment by segment, without an array of segments.
 class PathBuilder {
  public:
   /// Throws Error(argument) as `Path` does.
   void add(const Segment& segment);
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  /// The path of what was added; the builder is then as new.
+  /// The path of the added segments; the builder is then empty.
   [[nodiscard]] Path path();
 
  private:
   void put(const Vector3& next_mm);
 
   std::shared_ptr<Path::Data> data_ = std::make_shared<Path::Data>();
-  Segment last_;  // not yet put: where the next one starts is not known
+  Segment last_;  // not yet stored: the start of the next one is not known
   std::size_t size_ = 0;
   double distance_mm_ = 0.0;  // of the start of `last_`
 };
@@ -178,7 +178,7 @@ class Segments {
     std::size_t at_;
   };
 
-  // What takes segments takes both.  NOLINTBEGIN(google-explicit-constructor)
+  // Functions of segments accept both. NOLINTBEGIN(google-explicit-constructor)
   Segments(Path path) noexcept : path_(std::move(path)), count_(path_.size()) {}
   Segments(std::span<const Segment> array) noexcept : array_(array.data()), count_(array.size()) {}
   Segments(const std::vector<Segment>& array) noexcept : Segments(std::span<const Segment>(array)) {}
@@ -198,7 +198,7 @@ class Segments {
   [[nodiscard]] Segment back() const noexcept { return (*this)[count_ - 1]; }
   [[nodiscard]] Iterator begin() const noexcept { return {this, 0}; }
   [[nodiscard]] Iterator end() const noexcept { return {this, count_}; }
-  /// From `first` on, so many.
+  /// `count` segments from `first` on.
   [[nodiscard]] Segments part(std::size_t first, std::size_t count) const noexcept {
     Segments part = *this;
     part.first_ += first;

@@ -8,19 +8,20 @@
 
 namespace shapegcode {
 
-/// What a time-optimal trajectory keeps.
+/// Limits of a time-optimal trajectory.
 struct TrajectoryLimits {
   Vector3 max_feed_mm_per_s = Vector3::Constant(250.0);
   Vector3 max_acceleration_mm_per_s2 = Vector3::Constant(1000.0);
   Vector3 max_jerk_mm_per_s3 = Vector3::Constant(50'000.0);
-  /// By which the path may be left where its direction or its curvature jumps: there it is rounded. 0: the motion comes
-  /// to rest there instead.
+  /// Permitted deviation from the path where it is rounded: where its direction or its curvature jumps. 0: the motion
+  /// stops there instead.
   double contour_tolerance_mm = 0.05;
 };
 
 /// Set-points of a whole path from rest to rest, one per period: nearly as fast as speed, acceleration and jerk of
-/// every axis and the programmed feeds allow. Limits hold for the differences of the set-points (1.001), the end is
-/// reached to the last bit, and the motion rests at segments with `stop_at_end`. How: docs/concepts/time_optimal.md.
+/// every axis and the programmed feeds allow. The differences of the set-points keep the limits to a factor of 1.001,
+/// the end is reached to the last bit, and the motion stops at segments with `stop_at_end`. Method:
+/// docs/concepts/time_optimal.md.
 ///
 /// Throws Error(argument) on limits that are not above zero and finite, a tolerance below zero, a segment without a
 /// feed, or more set-points than can be numbered; Error(numeric) if the limits cannot be kept.

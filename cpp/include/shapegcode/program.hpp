@@ -15,7 +15,7 @@
 
 namespace shapegcode {
 
-/// The modal state of the controller that a program carries from block to block, as G numbers.
+/// The modal state of the control between blocks, as G numbers.
 struct ModalState {
   int motion = 0;                    ///< group 01: 0, 1, 2, 3
   int plane = 17;                    ///< group 02: 17, 18, 19
@@ -38,13 +38,13 @@ struct ModalState {
   std::uint32_t uncertain_groups = 0;
 };
 
-/// A program file that a call refers to, found by whoever knows about files.
+/// A program file that a call refers to, loaded by the caller.
 struct SourceText {
   std::string name;  ///< for messages
   std::string text;
 };
 
-/// Offsets of one tool, mm; what is not given is not known.
+/// Offsets of one tool, mm; no value: not known.
 struct ToolOffset {
   std::optional<double> length_mm;
   std::optional<double> length_wear_mm;
@@ -60,26 +60,26 @@ struct CodeBindings {
   std::int64_t tool_program = -1;             ///< T calls it with T in #149; -1: none
 };
 
-/// What a program may ask of whoever reads and simulates it. Each is counted while the text is read, and reading ends
-/// at the line where it is passed: what is too much is never expanded first. A plain text of any length that `bytes`
-/// and `moves` allow is read; what a few lines expand to has limits of its own.
+/// Limits of the work that a program may cause when read and simulated. They are checked while the text is read, and
+/// reading ends at the line that exceeds one, before it is expanded further. A program without calls and loops may have
+/// any length within `bytes` and `moves`; expansion has separate limits.
 struct WorkLimits {
-  std::uint64_t steps = 4'000'000;             ///< lines executed, each beyond its first time
+  std::uint64_t steps = 4'000'000;             ///< lines executed, not counting the first time of each
   std::uint64_t moves = 100'000'000;           ///< moves, dwells, and blocks with machine functions
-  std::uint64_t bytes = 1'000'000'000;         ///< of texts that are read
+  std::uint64_t bytes = 1'000'000'000;         ///< of program texts read
   std::uint64_t expansion_moves = 800'000;     ///< moves beyond one for each line of the texts
-  std::uint64_t expansion_bytes = 33'554'432;  ///< of the plain text beyond those of the texts
-  double seconds = 100'000.0;  ///< least time: moves at their feed, but no faster than the axes are; dwells
+  std::uint64_t expansion_bytes = 33'554'432;  ///< of the expanded program beyond those of the texts
+  double seconds = 100'000.0;                  ///< minimum time: moves at their feed within the axis limits; dwells
   Vector3 feed_mm_per_s = Vector3::Constant(std::numeric_limits<double>::infinity());   ///< of each axis while cutting
   Vector3 rapid_mm_per_s = Vector3::Constant(std::numeric_limits<double>::infinity());  ///< of each axis in a rapid
   double tool_change_s = 0.0;                                                           ///< of an M06
   double m_function_s = 0.0;                                                            ///< of any other M code
 };
 
-/// How a program text is to be read: the controller's settings that change its meaning.
+/// Settings of the control that change the meaning of a program.
 struct ReaderOptions {
   bool calculator_decimal_point = true;     ///< parameter 3401#0: X10 is 10 mm (true) or 10 least increments (false)
-  bool absolute_arc_centres = false;        ///< I J K are positions, not distances from the start (not FANUC)
+  bool absolute_arc_centres = false;        ///< I J K are positions, not distances from the start (not on FANUC)
   double least_increment_mm = 0.001;        ///< of metric input
   double least_increment_inch = 0.0001;     ///< of inch input
   double arc_tolerance_mm = 0.01;           ///< largest difference of start and end radius
@@ -92,24 +92,24 @@ struct ReaderOptions {
   char offset_memory = 'C';                                             ///< A, B or C: see SystemVariables
   std::map<int, double> retained_variables;                             ///< #500 ... #999
   CodeBindings bindings;
-  std::int64_t program = -1;        ///< O number of the program to use, of a file that holds several; -1: the first
-  std::int64_t program_index = -1;  ///< the same by its index in `list_programs`, whatever its name; -1: by number
-  std::function<std::optional<SourceText>(std::int64_t)> load_program;  ///< programs that the file does not hold
-  std::array<std::int64_t, 2> opaque_programs = {9000, 9999};           ///< if not found: called, but not looked into
+  std::int64_t program = -1;        ///< O number of the program to use in a multi-program file; -1: the first
+  std::int64_t program_index = -1;  ///< the same by its index in `list_programs`; -1: by number
+  std::function<std::optional<SourceText>(std::int64_t)> load_program;  ///< loads programs that are not in the file
+  std::array<std::int64_t, 2> opaque_programs = {9000, 9999};           ///< if not found: called, but not expanded
   int subprogram_nesting = 10;
   WorkLimits limits;
   std::array<std::optional<bool>, 9> block_skip;  ///< switch on, off, or not known, of / ... /9
-  bool expand_compensation = true;                ///< G41/G42 become plain moves; false: kept as they stand
+  bool expand_compensation = true;                ///< G41/G42 become simple moves; false: left unchanged
   char compensation_start_up = 'A';               ///< type A or B (parameter 5003)
   double scale_unit = 0.001;                      ///< of P, I, J, K of G51 without a point (parameter 5400#7)
   double peck_clearance_mm = 0.5;                 ///< of G73 and G83 (parameters 5114, 5115)
-  bool collect_alarms = false;                    ///< go on behind an alarm, and keep all in Program::alarms
+  bool collect_alarms = false;                    ///< continue after an alarm, and store all in Program::alarms
   ModalState power_on;                            ///< state at the first block
-  /// Ascending lines of the source behind which the modal state is kept (Program::probed); calls count as one line.
+  /// Ascending lines of the source after which the modal state is stored (Program::probed); calls count as one line.
   std::vector<std::uint32_t> probe_lines;
 };
 
-/// Something to tell the user about one line of the text.
+/// A message to the user about one line of the program.
 struct Finding {
   std::uint32_t line = 0;
   std::string message;
@@ -118,7 +118,7 @@ struct Finding {
   std::string file;  ///< name of the text, empty: the program's own
 };
 
-/// Where a line of an expanded program comes from.
+/// Source line of a line of an expanded program.
 struct LineOrigin {
   std::uint32_t line = 0;  ///< from 1
   std::uint32_t file = 0;  ///< into Program::files
@@ -126,7 +126,7 @@ struct LineOrigin {
   friend bool operator==(const LineOrigin&, const LineOrigin&) = default;
 };
 
-/// A block's N word or comment inside a region, and the segment before which it stood.
+/// A block's N word or comment inside a region, and the segment that follows it.
 struct RegionNote {
   std::uint32_t segment = 0;
   std::int32_t n_number = -1;        ///< -1: none
@@ -135,21 +135,21 @@ struct RegionNote {
   std::uint32_t comment_length = 0;
 };
 
-/// A run of cutting moves between two stops: what the converter may rewrite.
+/// Cutting moves between two stops, which the converter may rewrite.
 struct Region {
   std::uint32_t first_line = 0;  ///< from 1, first line with a cutting move
   std::uint32_t last_line = 0;   ///< last line with a cutting move
   std::size_t text_begin = 0;    ///< byte range of these lines, line ends included
   std::size_t text_end = 0;
-  std::shared_ptr<const Path> path;  ///< zero-length moves left out
+  std::shared_ptr<const Path> path;  ///< without zero-length moves
   std::vector<RegionNote> notes;
   ModalState entry;                ///< before the first line
   ModalState exit;                 ///< after the last line
-  bool incremental = false;        ///< moves an axis whose position is not known: origin arbitrary, G91
-  bool exact_stop_at_end = false;  ///< the last block carried G09 or stood in G61
-  bool look_ahead_mode = false;    ///< the program switched a look-ahead mode on before it (G05.1 Q1, G08 P1)
-  bool shaped = false;             ///< the program says that these are shaped blocks: (SHAPED) behind its header
-  bool was_rapid = false;          ///< likewise, in place of a rapid: (SHAPED RAPID)
+  bool incremental = false;        ///< moves an axis of unknown position: arbitrary origin, G91
+  bool exact_stop_at_end = false;  ///< the last block has G09 or is in G61
+  bool look_ahead_mode = false;    ///< the program has switched a look-ahead mode on before (G05.1 Q1, G08 P1)
+  bool shaped = false;             ///< marked as shaped blocks in the program: (SHAPED) after its header
+  bool was_rapid = false;          ///< likewise, instead of a rapid: (SHAPED RAPID)
   std::uint32_t blocks = 0;        ///< source blocks with a cutting move
 };
 
@@ -159,94 +159,93 @@ struct OtherMove {
   double dwell_s = 0.0;  ///< a wait instead of a move when > 0
 };
 
-/// M, S and T words of one block: what may take cycle time, and which tool is in use.
+/// M, S and T words of one block, which may take cycle time or change the tool.
 struct MachineFunction {
   std::array<int, 6> m_codes = {};
   int m_count = 0;
   std::int64_t tool = -1;             ///< T, -1 if the block has none
   double spindle_rev_per_min = -1.0;  ///< S, -1 if the block has none
-  /// Axes that the block moves in rapid from or to a position that is not known (behind M06, G28, G30, G53).
+  /// Axes that the block moves in rapid from or to an unknown position (after M06, G28, G30, G53).
   std::array<bool, axis_count> unknown_move = {false, false, false};
 };
 
-/// Where a rapid ends, or a cutting move whose path is not known.
+/// End of a rapid, or of a cutting move whose path is not known.
 struct MoveEnd {
   std::uint32_t line = 0;
   Vector3 position_mm = Vector3::Zero();
   std::array<bool, axis_count> known = {false, false, false};
 };
 
-/// A call that was executed: the plain program has the called blocks in its place.
+/// An executed call; the expanded program has the called blocks instead.
 struct ProgramCall {
-  std::uint32_t line = 0;  ///< of the plain program before which the called blocks stand
+  std::uint32_t line = 0;  ///< of the expanded program, before the called blocks
   LineOrigin origin;
   std::int64_t number = -1;  ///< O number that was called
 };
 
 enum class StepKind : std::uint8_t { region, move, function };
 
-/// What the machine does, in order: a region, another move or dwell, or machine functions.
+/// One step of the program in order: a region, another move or dwell, or machine functions.
 struct ProgramStep {
   StepKind kind = StepKind::move;
   std::uint32_t index = 0;  ///< into Program::regions, other_moves or functions
   std::uint32_t line = 0;
 };
 
-/// A program read: the text to the letter, its regions, and everything between them.
+/// A program after reading: its exact text, its regions, and everything between them.
 struct Program {
-  std::string text;  ///< as handed over, or expanded
-  /// The text holds calls, macro statements or coordinate modes: `text` is the plain program that they come to, and
-  /// line numbers of regions and steps count its lines; `origins` leads back.
+  std::string text;  ///< the original, or expanded
+  /// The original contains calls, macro statements or coordinate modes: `text` is the expanded program, and line
+  /// numbers of regions and steps count its lines; `origins` gives the original lines.
   bool expanded = false;
-  std::string unexpanded;                     ///< the text as handed over, if expanded
+  std::string unexpanded;                     ///< the original text, if expanded
   std::vector<LineOrigin> origins;            ///< one per line of `text`; empty if not expanded
-  std::vector<std::string> files;             ///< names; the first is empty and stands for the program's own file
+  std::vector<std::string> files;             ///< names; the first is empty: the program's own file
   std::vector<std::int64_t> program_numbers;  ///< all O numbers in the file
-  std::vector<std::size_t> called;            ///< programs of the file that others called, as `list_programs` counts
+  std::vector<std::size_t> called;            ///< programs of the file called by others, as `list_programs` counts
   std::vector<Finding> alarms;                ///< with ReaderOptions::collect_alarms
-  std::map<int, double> expanded_radii_mm;    ///< D number -> radius, where cutter compensation was expanded
+  std::map<int, double> expanded_radii_mm;    ///< D number -> radius, if cutter compensation was expanded
   std::uint32_t compensated_moves = 0;        ///< cutting moves under G41/G42 that were expanded
-  std::uint32_t kept_compensated_moves = 0;   ///< and those that are kept as they stand
+  std::uint32_t kept_compensated_moves = 0;   ///< and those left unchanged
   std::string line_end = "\n";
   std::uint32_t line_count = 0;
   std::uint32_t block_count = 0;     ///< lines with at least one word
   std::uint64_t move_count = 0;      ///< as WorkLimits::moves counts
   double least_time_s = 0.0;         ///< as WorkLimits::seconds counts
-  std::size_t header_offset = 0;     ///< where a header comment may be inserted: behind the O line
+  std::size_t header_offset = 0;     ///< where a header comment may be inserted: after the O line
   std::int64_t program_number = -1;  ///< O number, -1 if none
   std::vector<std::shared_ptr<Region>> regions;
   std::vector<OtherMove> other_moves;
   std::vector<MachineFunction> functions;
-  std::vector<ProgramStep> steps;  ///< all of the three in the order in which they happen
+  std::vector<ProgramStep> steps;  ///< all of the three in order of execution
   std::vector<MoveEnd> move_ends;  ///< in order
-  std::vector<ProgramCall> calls;  ///< in order, each as often as it was executed in a row of different ones
+  std::vector<ProgramCall> calls;  ///< in order; repetitions of one call in succession once
   std::vector<Finding> warnings;
   ModalState final_state;
-  std::vector<ModalState> probed;  ///< state behind each of ReaderOptions::probe_lines
+  std::vector<ModalState> probed;  ///< state after each of ReaderOptions::probe_lines
 };
 
-/// A program of a file that may hold several.
+/// A program of a file, which may contain several.
 struct ProgramEntry {
   std::int64_t number = -1;  ///< O number; -1: it has none
   std::string name;          ///< of a line "<NAME>" or "O<NAME>", with its brackets; empty: none
   std::string folder;        ///< of the "&F=" line before it, as written; empty: none
   std::uint32_t first_line = 1;
-  std::size_t text_begin = 0;  ///< bytes: its lines, with those of its folder and of what stands before its O line
+  std::size_t text_begin = 0;  ///< bytes: its lines, including those of its folder and before its O line
   std::size_t text_end = 0;
 };
 
-/// The programs of a text in the order in which they stand. Throws Error(program) where its frame of '%' lines or its O
-/// numbers are none that can be read.
+/// The programs of a text in order. Throws Error(program) if its '%' lines or its O numbers cannot be read.
 [[nodiscard]] std::vector<ProgramEntry> list_programs(const std::string& text);
 
-/// Reads a program text into regions of canonical moves (FANUC milling dialect: docs/reference/dialect.md, what is
-/// read, passed through and refused). Pure function of its arguments. Throws Error(program) with line and column.
+/// Reads a program text into regions of canonical moves (FANUC milling dialect; docs/reference/dialect.md lists the
+/// words read, passed through and refused). Pure function of its arguments. Throws Error(program) with line and column.
 [[nodiscard]] Program read_program(std::string text, const ReaderOptions& options = {});
 
-/// Says of a program that was read where its lines come from: it is the plain program of `source`, a text in another
-/// control's words. `lines` has for each line of the program's text (as it was handed over) the line of the source, and
-/// its file: 0 the source itself, n the n-th of `files`. Findings and origins name lines of the source from then on;
-/// `notes` about lines of the source join the warnings. Throws Error(argument) if lines or files are missing.
+/// Relates a program to `source`, a text in another control's dialect from which it was translated. `lines` has for
+/// each line of the program's original text the line of the source, and its file: 0 the source itself, n the n-th of
+/// `files`. Findings and origins then name lines of the source; `notes` about lines of the source are added to the
+/// warnings. Throws Error(argument) if lines or files are missing.
 void lead_back(Program& program, std::string source, const std::vector<LineOrigin>& lines,
                const std::vector<std::string>& files, std::vector<Finding> notes);
 

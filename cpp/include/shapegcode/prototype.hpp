@@ -15,7 +15,7 @@
 #include "shapegcode/samples.hpp"
 #include "shapegcode/shaper.hpp"
 
-// What the author of a controller prototype begins with: plan, step, filter, plant.
+// A start for controller prototypes: plan, step, filter, plant.
 //
 //     using namespace shapegcode;
 //     const std::vector modes = {Mode{46.0, 0.02, 1.0}, Mode{131.0, 0.02, 1.0}};
@@ -30,23 +30,23 @@
 
 namespace shapegcode {
 
-/// A path from rest to rest as a control runs it: look-ahead over the whole of it at the start, then one set-point per
-/// period, through a shaper whose zeros lie on the modes exactly. `step` is real-time safe: no allocation, no
+/// A path from rest to rest as a control runs it: look-ahead over the whole path at the start, then one set-point per
+/// period, through a shaper whose zeros lie exactly on the modes. `step` is real-time safe: no allocation, no
 /// exception, no lock, bounded work.
 class ShapedMotion {
  public:
-  /// Behind a shaper of your own: any filter on the grid of the period. Throws Error(argument) as plan_speed and
+  /// With a shaper of your own: any filter on the grid of the period. Throws Error(argument) as plan_speed and
   /// Interpolator do, and on a path without segments.
   ShapedMotion(Path path, const MotionLimits& limits, Fir shaper, double period_s)
       : ShapedMotion(std::make_shared<const Path>(std::move(path)), limits, std::move(shaper), period_s) {}
 
-  /// Behind the shortest filter on this grid whose zeros lie on every mode (grid_polynomial). Where the period is much
-  /// shorter than theirs its taps are large and of both signs: hand over a filter of your own there. Throws
-  /// Error(design) where there is none.
+  /// With the shortest filter on this grid that has a zero on every mode (grid_polynomial). If the period is much
+  /// shorter than those of the modes, its taps are large and of both signs: pass a filter of your own then. Throws
+  /// Error(design) if there is none.
   ShapedMotion(Path path, const MotionLimits& limits, std::span<const Mode> modes, double period_s)
       : ShapedMotion(std::move(path), limits, to_fir(grid_polynomial(modes, period_s), period_s), period_s) {}
 
-  /// Next set-point in mm, `out` of axis_count values. False once the last one was given; `out` is then the end.
+  /// Next set-point in mm, `out` of axis_count values. False after the last one; `out` is then the end.
   bool step(std::span<double> out) noexcept {
     const bool moving = interpolator_.step(out);
     stream_.step(out, out);
@@ -54,7 +54,7 @@ class ShapedMotion {
     if (!moving) --tail_;
     return true;
   }
-  /// Set-points from start to end: those of the path and as many more as the shaper lasts.
+  /// Number of set-points from start to end: those of the path plus the shaper duration.
   [[nodiscard]] std::size_t sample_count() const noexcept {
     return interpolator_.sample_count() + static_cast<std::size_t>(stream_.fir().duration_samples());
   }

@@ -8,9 +8,9 @@
 
 namespace shapegcode {
 
-/// An input shaper: amplitudes A_k at times t_k, ascending from t_1 = 0, that add up to one. The times are
-/// continuous; `to_fir` puts a shaper whose times lie on a sample grid into the filter cascade. Build one with
-/// `make_shaper`, which checks it.
+/// An input shaper: impulses of amplitude A_k at times t_k, ascending from t_1 = 0, with a sum of one. The times are
+/// continuous; `to_fir` converts a shaper whose times lie on a sample grid to a filter. Use `make_shaper`, which checks
+/// its arguments.
 struct Shaper {
   std::vector<double> times_s;     ///< t_k in s, strictly ascending from exactly 0
   std::vector<double> amplitudes;  ///< A_k, one per time, sum 1 within 1e-9; may be negative
@@ -23,7 +23,7 @@ struct Shaper {
 /// sum of the amplitudes that differs from 1 by more than 1e-9. Source: paper 002, eq. 4 and 9.
 [[nodiscard]] Shaper make_shaper(std::vector<double> times_s, std::vector<double> amplitudes);
 
-/// Time of the last tap in s: how much longer the shaped command moves than the unshaped one.
+/// Time of the last impulse in s, by which the shaped command is longer than the unshaped one.
 [[nodiscard]] double duration_s(const Shaper& shaper);
 
 /// First moment sum A_k t_k in s: the mean delay of the shaped command.
@@ -36,63 +36,63 @@ struct Shaper {
 /// True if any amplitude is below zero.
 [[nodiscard]] bool has_negative(const Shaper& shaper);
 
-/// sum |A_k|: 1 for a non-negative shaper; the factor by which the shaper may magnify speed and acceleration.
+/// sum |A_k|: 1 for a non-negative shaper; the largest factor by which the shaper increases speed and acceleration.
 [[nodiscard]] double abs_sum(const Shaper& shaper);
 
-/// Residual vibration of `mode` after the last tap, relative to the unshaped one:
-/// V = e^{-zeta*omega*t_N} |sum A_k e^{zeta*omega*t_k} e^{j*omega_d*t_k}| (paper 002, eq. 8 sets it to zero).
-/// The rounding floor is about 1e-16*(1 + omega*t_N)*sum|A_k|. Throws Error(argument) as `pole` does.
+/// Residual vibration of `mode` after the last impulse, relative to the unshaped one: V = e^{-zeta*omega*t_N} |sum A_k
+/// e^{zeta*omega*t_k} e^{j*omega_d*t_k}| (paper 002, eq. 8 sets it to zero). The rounding floor is about 1e-16*(1 +
+/// omega*t_N)*sum|A_k|. Throws Error(argument) as `pole` does.
 [[nodiscard]] double residual_ratio(const Shaper& shaper, const Mode& mode);
 
-/// The shaper as a filter on samples `period_s` (s) apart. Exact or not at all: throws Error(design), naming the time,
-/// if a time differs from a multiple of the period by more than 1e-9 of the larger of time and period (rounding the
-/// times would undo the zeros), and Error(argument) if the period is not finite and positive.
+/// The shaper as a filter on samples `period_s` (s) apart. Times are never rounded: throws Error(design), naming the
+/// time, if a time differs from a multiple of the period by more than 1e-9 of the larger of time and period (rounding
+/// would lose the zeros), and Error(argument) if the period is not finite and positive.
 [[nodiscard]] Fir to_fir(const Shaper& shaper, double period_s);
 
 /// Smallest distance |z - 1| of a mode's z = e^{s*period} from +1 at which `grid_polynomial` accepts it: below it a
 /// single mode already has sum |A_k| of some 4e4.
 inline constexpr double grid_least_distance_from_one = 0.01;
 
-/// Largest residual ratio that `grid_polynomial` returns; a design whose rounding leaves more is refused.
+/// Largest residual ratio that `grid_polynomial` returns; a design with more, due to round-off, is refused.
 inline constexpr double grid_largest_residual = 1e-10;
 
-/// Shortest shaper with taps at whole multiples of `period_s` (s) that cancels every mode exactly there: the polynomial
+/// Shortest shaper with impulses at whole multiples of `period_s` (s) that cancels every mode exactly: the polynomial
 /// with the roots z_i = e^{s_i*period} and their conjugates, scaled to sum 1. Two periods per mode; one for a mode
 /// whose z is real (half a period of it is a multiple of the grid); none for one that aliases onto an earlier one. A
-/// mode above the grid's Nyquist frequency is fine. Amplitudes may be negative and large (46/131 Hz, zeta .02: sum
-/// |A_k| is 1 at 5 ms, 248 at 1 ms): look at `abs_sum` before use.
+/// mode above the grid's Nyquist frequency is allowed. Amplitudes may be negative and large (46/131 Hz, zeta .02: sum
+/// |A_k| is 1 at 5 ms, 248 at 1 ms): check `abs_sum` before use.
 ///
 /// Throws Error(argument) if `modes` is empty, as `pole` does, or if the period is not finite and positive;
-/// Error(design) if a z_i is closer to +1 than `grid_least_distance_from_one`, or if rounding leaves more than
+/// Error(design) if a z_i is closer to +1 than `grid_least_distance_from_one`, or if round-off leaves a residual above
 /// `grid_largest_residual`. Source: this project.
 [[nodiscard]] Shaper grid_polynomial(std::span<const Mode> modes, double period_s);
 
 // One declaration here and one definition in families.cpp per family; those with a tolerated residual are in
 // extra_insensitive.hpp.
 
-/// Zero-vibration shaper of one mode: taps at 0 and half the damped period, amplitudes 1/(1+K) and K/(1+K) with
-/// K = exp(-zeta*pi/sqrt(1-zeta^2)). Throws Error(argument) as `pole` does. Source: paper 002, eq. 1-2 (Smith 1958).
+/// Zero-vibration shaper of one mode: impulses at 0 and half the damped period, amplitudes 1/(1+K) and K/(1+K) with K =
+/// exp(-zeta*pi/sqrt(1-zeta^2)). Throws Error(argument) as `pole` does. Source: paper 002, eq. 1-2 (Smith 1958).
 [[nodiscard]] Shaper zv(const Mode& mode);
 
-/// ZV where impulses lie at multiples of a period only: the second one split between the two multiples around half the
-/// damped period, so that the residual at the mode is exactly zero; three non-negative impulses, two where half the
-/// period is a multiple. Throws Error(argument) as `pole` does or for a period that is not above 0, Error(design) if
-/// the period is longer than a quarter of the damped period. Source: this project.
+/// ZV with impulses at multiples of a period: the second impulse is divided between the two multiples around half the
+/// damped period, so that the residual at the mode is exactly zero. Three non-negative impulses, or two if half the
+/// damped period is a multiple. Throws Error(argument) as `pole` does or for a period that is not above 0,
+/// Error(design) if the period is longer than a quarter of the damped period. Source: this project.
 [[nodiscard]] Shaper zv_on_grid(const Mode& mode, double period_s);
 
-/// Most zeros that `repeated_zv` places at a mode.
+/// Maximum number of zeros of `repeated_zv`.
 inline constexpr int max_repeated_zeros = 20;
 
 /// The ZV shaper in series with itself: `zeros` zeros at the mode, so that V and its first `zeros`-1 derivatives with
-/// respect to the frequency vanish there; 1 is ZV, 2 ZVD, 3 ZVDD. `zeros`+1 non-negative taps, half a damped period
+/// respect to the frequency vanish there; 1 is ZV, 2 ZVD, 3 ZVDD. `zeros`+1 non-negative impulses, half a damped period
 /// apart. Throws Error(argument) as `pole` does, or if `zeros` is not from 1 to `max_repeated_zeros`. Source: Singer
 /// and Seering 1990.
 [[nodiscard]] Shaper repeated_zv(const Mode& mode, int zeros);
 
-/// Modified ZV: three non-negative taps 3/8 of the damped period apart, amplitudes (1 - 1/sqrt 2, (sqrt 2 - 1) K,
+/// Modified ZV: three non-negative impulses 3/8 of the damped period apart, amplitudes (1 - 1/sqrt 2, (sqrt 2 - 1) K,
 /// (1 - 1/sqrt 2) K^2) over their sum, K = exp(-zeta*3/4*pi/sqrt(1-zeta^2)). It cancels the mode and also the pole of
-/// the same decay at 5/3 of its damped frequency: half as long again as ZV, and (undamped) .62 of ZV's slope of V at
-/// the mode. Throws Error(argument) as `pole` does. Source: the open printer firmware Klipper, "mzv".
+/// the same decay at 5/3 of its damped frequency: 1.5 times as long as ZV, and (undamped) .62 of ZV's slope of V at the
+/// mode. Throws Error(argument) as `pole` does. Source: the open printer firmware Klipper, "mzv".
 [[nodiscard]] Shaper mzv(const Mode& mode);
 
 /// The second pole that `mzv` cancels, as a mode: the same decay rate, 5/3 of the damped frequency. Throws
@@ -100,24 +100,23 @@ inline constexpr int max_repeated_zeros = 20;
 [[nodiscard]] Mode mzv_second_zero(const Mode& mode);
 
 /// Negative zero-vibration shaper of unity magnitude: amplitudes exactly 1, -1, 1; without damping at 0, 1/6 and 1/3 of
-/// the period. The two times solve 1 - e^{-s t2} + e^{-s t3} = 0 to rounding, damped or not, not by a fitted formula.
-/// Throws Error(argument) as `pole` does, Error(design) where the solution ends at high damping. Source of the family:
+/// the period. The two times solve 1 - e^{-s t2} + e^{-s t3} = 0 to round-off, damped or not, not by a fitted formula.
+/// Throws Error(argument) as `pole` does, Error(design) if there is no solution at high damping. Source of the family:
 /// Singhose, Singer and Seering 1994; of the solution: this project.
 [[nodiscard]] Shaper negative_zv(const Mode& mode);
 
-/// The two shapers in series: cancels what either cancels and lasts as long as both together. Taps whose times agree
-/// within 1e-12 of the duration are merged. Throws Error(argument) if either is not a valid shaper. Source: paper 002,
-/// eq. 3.
+/// The two shapers in series: cancels the modes of both; the durations add. Impulses whose times agree within 1e-12 of
+/// the duration are merged. Throws Error(argument) if either is not a valid shaper. Source: paper 002, eq. 3.
 [[nodiscard]] Shaper convolve(const Shaper& first, const Shaper& second);
 
-/// Convolved ZV of one or more modes, the conventional multi-mode shaper: 2^n taps. Throws Error(argument) if `modes`
-/// is empty, and as `pole` does. Source: paper 002, section 2.
+/// Convolved ZV of one or more modes, the conventional multi-mode shaper: 2^n impulses. Throws Error(argument) if
+/// `modes` is empty, and as `pole` does. Source: paper 002, section 2.
 [[nodiscard]] Shaper convolved_zv(std::span<const Mode> modes);
 
-/// Most humps of `extra_insensitive`.
+/// Maximum number of humps of `extra_insensitive`.
 inline constexpr int max_humps = 3;
 
-/// An extra-insensitive shaper and where its residual vanishes and peaks. The frequencies are natural frequencies of
+/// An extra-insensitive shaper, with the zeros and maxima of its residual. The frequencies are natural frequencies of
 /// modes with the damping ratio of the design.
 struct ExtraInsensitive {
   Shaper shaper;
@@ -125,15 +124,15 @@ struct ExtraInsensitive {
   std::vector<double> humps_hz;  ///< ascending, between the zeros: V = vibration_limit, its largest there
 };
 
-/// Extra-insensitive shaper of one mode: non-negative taps, `humps`+2 of them, whose residual between its outermost
-/// zeros rises to exactly `vibration_limit` (above 0, below 1) at each of `humps` (1 to `max_humps`) maxima. With an
-/// odd number of humps the middle one lies at the mode, with two the middle zero does.
+/// Extra-insensitive shaper of one mode: `humps`+2 non-negative impulses whose residual between its outermost zeros
+/// rises to exactly `vibration_limit` (above 0, below 1) at each of `humps` (1 to `max_humps`) maxima. With an odd
+/// number of humps the middle one lies at the mode, with two the middle zero does.
 ///
 /// Without damping it is the Dolph-Chebyshev window over half periods, in closed form; with damping the conditions
 /// themselves (sum, zeros, height and slope at every hump) are solved for amplitudes, times and frequencies by Newton's
-/// method, followed from zero damping: exact to rounding, not a fit. Throws Error(argument) as `pole` does or on a
-/// value outside its range, Error(design) where no such shaper with non-negative taps is reached: with a limit of .05
-/// the solution ends at a damping ratio of some .69, .45 and .32 for one, two and three humps.
+/// method, by continuation from zero damping: exact to round-off, not a fit. Throws Error(argument) as `pole` does or
+/// on a value outside its range, Error(design) if there is no such shaper with non-negative impulses: with a limit of
+/// .05 the solution exists up to damping ratios of some .69, .45 and .32 for one, two and three humps.
 ///
 /// Sources: Singhose, Seering and Singer 1994 (EI), Singhose, Porter, Tuttle and Singer 1997 (several humps); the
 /// closed form and the damped solution: this project.
@@ -147,15 +146,15 @@ struct ExtraInsensitive {
 /// The largest residual over a band of frequencies.
 struct WorstResidual {
   double residual_ratio;  ///< V at `frequency_hz`
-  double frequency_hz;    ///< where in the band it was found
+  double frequency_hz;    ///< its frequency in the band
   double upper_bound;     ///< no frequency of the band has a larger V (up to rounding)
 };
 
 /// Largest residual ratio of a mode with the damping of `mode` and a natural frequency from `lowest_hz` to
 /// `highest_hz`, found and proven: the band is halved until a bound on the derivatives shows that no part of it exceeds
-/// what was found by more than 1e-6 of it, or by 1e-12. Throws Error(argument) as `pole` does or if the band is not
-/// ascending (equal ends are fine), Error(design) if the proof needs more than a million parts, as a band of many
-/// thousand periods of the shaper would. Source: this project.
+/// the largest value found by more than 1e-6 of it, or by 1e-12. Throws Error(argument) as `pole` does or if the band
+/// is not ascending (equal ends are allowed), Error(design) if the proof needs more than a million parts, as for a band
+/// of many thousand periods of the shaper. Source: this project.
 [[nodiscard]] WorstResidual worst_residual(const Shaper& shaper, const Mode& mode, double lowest_hz, double highest_hz);
 
 /// A band of frequencies.
@@ -164,14 +163,14 @@ struct FrequencyBand {
   double highest_hz;
 };
 
-/// How far upwards `insensitive_band` looks, in frequencies of the mode.
+/// Upper end of the search of `insensitive_band`, in multiples of the mode's frequency.
 inline constexpr double insensitivity_reach = 10.0;
 
 /// The band around `mode` in which the residual stays at or below `vibration_limit` (above 0, below 1): its ends are
-/// where V leaves the limit for the first time, found by steps that a bound on the derivatives proves safe. Both ends
-/// are the mode's frequency if V exceeds the limit there; the upper end is at most `insensitivity_reach` times it. The
-/// limit is forgiven 1e-9 of itself, so that a hump that touches it does not end the band. Throws Error(argument) as
-/// `pole` does or on a limit outside its range. Source: this project.
+/// the nearest frequencies at which V exceeds the limit, found by steps that a bound on the derivatives proves safe.
+/// Both ends are the mode's frequency if V exceeds the limit there; the upper end is at most `insensitivity_reach`
+/// times it. A relative excess of 1e-9 is permitted, so that a hump that touches the limit does not end the band.
+/// Throws Error(argument) as `pole` does or on a limit outside its range. Source: this project.
 [[nodiscard]] FrequencyBand insensitive_band(const Shaper& shaper, const Mode& mode, double vibration_limit);
 
 /// Insensitivity: width of `insensitive_band` over the mode's frequency (no unit); ZV has .064 and EI .399 at 5 %

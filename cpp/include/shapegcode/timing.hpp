@@ -8,14 +8,14 @@
 
 namespace shapegcode {
 
-/// Where the time goes. The parts add up to the whole.
+/// Parts of the cycle time; their sum is the whole.
 struct TimeParts {
   double cutting_s = 0.0;       ///< cutting blocks at their feed (override and axis limits included)
   double rapid_s = 0.0;         ///< rapids at their rate
-  double in_position_s = 0.0;   ///< waits behind rapids and exact stops
+  double in_position_s = 0.0;   ///< waits after rapids and exact stops
   double dwell_s = 0.0;         ///< G04, dwells of cycles
-  double acceleration_s = 0.0;  ///< what acceleration adds to cutting blocks and rapids; in look-ahead also what the
-                                ///< limits at corners and on arcs add
+  double acceleration_s = 0.0;  ///< added to cutting blocks and rapids by acceleration; in look-ahead also by the
+                                ///< limits at corners and on arcs
   double tool_change_s = 0.0;   ///< M06
   double function_s = 0.0;      ///< other M codes
 
@@ -38,8 +38,8 @@ struct RegionTime {
   double length_mm = 0.0;
 };
 
-/// Everything between two tool changes, all uses of a tool together. A T word selects, M06 changes; a program without
-/// any M06 changes tools by T.
+/// Time of a tool, all its uses together. A T word selects the tool, M06 changes it; a program without any M06 changes
+/// tools by T.
 struct ToolTime {
   std::int64_t tool = -1;        ///< -1: before the first tool is known
   std::uint32_t first_line = 0;  ///< of its first use
@@ -53,39 +53,40 @@ struct BlockTime {
   std::uint32_t line = 0;
   BlockKind kind = BlockKind::cutting;
   double start_s = 0.0;     ///< since the start of the program
-  double duration_s = 0.0;  ///< until its successor starts; the last block of a run has the run's acceleration and wait
-  double feed_mm_per_s = 0.0;  ///< highest speed along the path that it reaches; 0 for what does not move
+  double duration_s = 0.0;  ///< until its successor starts; the last block before a rest includes the acceleration and
+                            ///< wait of the whole motion
+  double feed_mm_per_s = 0.0;  ///< highest speed reached along the path; 0 without motion
 };
 
-/// How long a program takes, and where.
+/// Cycle time of a program and its parts.
 struct CycleTime {
   TimeParts parts;
-  double outside_regions_s = 0.0;  ///< whole time without cutting_s and acceleration_s of the regions
+  double outside_regions_s = 0.0;  ///< whole time less cutting_s and acceleration_s of the regions
   double cutting_length_mm = 0.0;
   double rapid_length_mm = 0.0;
   std::vector<RegionTime> regions;
-  std::vector<ToolTime> tools;    ///< in the order of first use
-  std::vector<BlockTime> blocks;  ///< only if asked for
+  std::vector<ToolTime> tools;    ///< in order of first use
+  std::vector<BlockTime> blocks;  ///< only if requested
 };
 
 /// Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004, section 2.2), by the
-/// planner in look-ahead. Regions and cutting moves outside of them are runs from rest to rest; cutting moves outside
-/// that follow each other without anything between are one run. Waits for in-position come behind rapids and behind
-/// runs that end with an exact stop (G09, G61). Moves of an axis whose position is not known count what is known of
-/// them. Throws Error(argument) on a model that `check` refuses.
+/// planner in look-ahead. Each region is a motion from rest to rest, and so is each uninterrupted sequence of cutting
+/// moves outside of regions. Waits for in-position follow rapids and motions that end with an exact stop (G09, G61).
+/// Moves of an axis of unknown position count as far as they are known. Throws Error(argument) on a model that `check`
+/// refuses.
 [[nodiscard]] CycleTime time_program(const Program& program, const FanucModel& model, bool per_block = false);
 
-/// The same question answered by giving every set-point.
+/// Cycle time by full interpolation.
 struct InterpolatedTime {
   double total_s = 0.0;
-  double cutting_s = 0.0;  ///< runs from rest to rest, acceleration included
-  double rapid_s = 0.0;    ///< acceleration included
+  double cutting_s = 0.0;  ///< motions from rest to rest, including acceleration
+  double rapid_s = 0.0;    ///< including acceleration
   double in_position_s = 0.0;
   double dwell_s = 0.0;
   double tool_change_s = 0.0;
   double function_s = 0.0;
   std::uint64_t set_points = 0;
-  std::vector<double> region_s;  ///< per region, wait included
+  std::vector<double> region_s;  ///< per region, including the wait
 };
 
 /// Full interpolation of a program, sample by sample: blocks through the acceleration filters, or look-ahead profiles,
@@ -93,10 +94,10 @@ struct InterpolatedTime {
 /// `time_program`. Throws Error(argument) on a model that `check` refuses.
 [[nodiscard]] InterpolatedTime interpolate_program(const Program& program, const FanucModel& model);
 
-/// What acceleration after interpolation and servo lag make of a circle.
+/// Effect of acceleration after interpolation and servo lag on a circle.
 struct CircleFigures {
-  double command_error_mm = 0.0;  ///< programmed radius minus radius of the set-points behind the acceleration filters
-  double radial_error_mm = 0.0;   ///< programmed radius minus radius of the axes behind the servo loop
+  double command_error_mm = 0.0;  ///< programmed radius minus radius of the set-points after the acceleration filters
+  double radial_error_mm = 0.0;   ///< programmed radius minus radius of the axes after the servo loop
 };
 
 /// Runs circles in XY at a constant feed until the transient has decayed and measures the mean radius over whole turns.

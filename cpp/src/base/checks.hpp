@@ -1,4 +1,4 @@
-// What arguments are asked for, with one wording. Every function throws Error(argument) with the value and its limit.
+// Checks of arguments with uniform messages. Every function throws Error(argument) with the value and its limit.
 #pragma once
 
 #include <cstdint>

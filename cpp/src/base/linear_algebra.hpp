@@ -2,8 +2,8 @@
 
 #include <Eigen/Dense>
 
-// Decompositions of plain matrices, each compiled once: where several sources instantiate one, most of the time of
-// compiling them goes into it. The results are those of the Eigen class of the same name.
+// Decompositions of dynamic matrices, each compiled once, because instantiating them in several sources dominates the
+// compile time. The results are those of the Eigen class of the same name.
 
 namespace shapegcode::linear_algebra {
 

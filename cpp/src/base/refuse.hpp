@@ -1,4 +1,4 @@
-// How a value that cannot be is refused, and what the message says.
+// Errors for invalid values, and their messages.
 #pragma once
 
 #include <array>

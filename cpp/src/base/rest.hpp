@@ -5,9 +5,9 @@
 
 namespace shapegcode {
 
-// What decays geometrically ends among the smallest numbers, where an operation takes a hundred times as long and
-// rounding can hold it for ever. A state below this size, in whatever unit, is none: no figure shows it, and nothing
-// that starts above it is changed.
+// Geometrically decaying values end as denormals, which take a hundred times as long to compute with and may never
+// reach zero because of rounding. A state below this size, in any unit, is set to zero: this is invisible in all
+// figures and changes no larger value.
 inline constexpr double min_state = 1e-100;
 
 /// Batch and streaming forms look after the same samples, so that they agree to the last bit.

@@ -1,4 +1,4 @@
-// The C interface: nothing but translation. No exception crosses it, and what a call hands over is checked here.
+// The C interface: translation only. No exception crosses it, and the arguments of a call are checked here.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-// Settings as C sets them, number by number.
+// Settings of the C interface, set one number at a time.
 #include "c/settings.hpp"
 
 #include <algorithm>

@@ -13,7 +13,7 @@ namespace shapegcode::c {
 
 [[nodiscard]] inline Vector3 vector_of(const double* values) noexcept { return {values[0], values[1], values[2]}; }
 
-/// What is set for an axis, whether the control has it or not.
+/// Numbers set for an axis, whether the control has the axis or not.
 struct AxisNumbers {
   FollowingLimits following;
   AxisTravel travel;

@@ -1,4 +1,4 @@
-// What the codes of the C interface say.
+// Texts for the codes of the C interface.
 #include "shapegcode/shapegcode.h"
 
 int shapegcode_c_version(void) { return SHAPEGCODE_C_VERSION; }

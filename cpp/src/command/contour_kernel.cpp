@@ -42,8 +42,8 @@ std::vector<double> contour_kernel(const Fir& shaper, std::span<const Mode> mode
     rest += std::abs(kernel[--size]);
   }
   kernel.resize(size);
-  // A base-excited mode follows a steady motion without delay, whatever was cut off: sum and mean are the shaper's, or
-  // none where another axis moves.
+  // A base-excited mode follows a constant velocity without delay, whatever was cut off: sum and mean are the shaper's,
+  // or zero if another axis moves.
   double sum = 0.0;
   double moment = 0.0;
   for (std::size_t k = 0; k < kernel.size(); ++k) {

@@ -14,7 +14,7 @@
 namespace shapegcode {
 namespace {
 
-// Relative change of a factor's row below which it stands for all that follow.
+// Relative change of a factor's row below which the row is used for all later ones.
 constexpr double settling_change = 1e-13;
 constexpr std::array<double, 3> second_difference{1.0, -2.0, 1.0};
 

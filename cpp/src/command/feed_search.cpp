@@ -17,7 +17,7 @@ constexpr int raising_rounds = 6;  // behind them speeds are only lowered
 constexpr double aim = 0.97;       // of the tolerance, for the next round
 constexpr double enough = 0.88;    // of the tolerance: what is used so far is not raised
 constexpr double largest_raise = 1.25;
-// A corner that would have to be passed more slowly than this, or than this share of its first speed, is a stop.
+// A corner becomes a stop if its speed would be below this, or below this ratio of its first speed.
 constexpr double creep_mm_per_s = 0.5;
 constexpr double creep_share = 0.02;
 // Curves and lines are never slowed below this share of their speed: what then still deviates is not the feed's doing.

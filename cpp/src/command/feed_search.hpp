@@ -16,7 +16,7 @@
 
 namespace shapegcode {
 
-/// What the axes may do while the contour is corrected.
+/// Limits of the axes during contour correction.
 [[nodiscard]] RunLimits run_limits(const MotionLimits& limits);
 
 /// A shaped run as `RunShaper` gives it out.

@@ -9,7 +9,7 @@
 
 namespace shapegcode {
 
-/// What the axes may do while the contour is corrected. A section whose plain shaping asks for more keeps what it asks.
+/// Limits of the axes during contour correction. A section that exceeds them by shaping alone is left unchanged.
 struct RunLimits {
   Vector3 max_speed_mm_per_s = Vector3::Constant(1e300);
   Vector3 max_acceleration_mm_per_s2 = Vector3::Constant(1e300);

@@ -20,7 +20,7 @@ DeviationMeter::DeviationMeter(RunReader& rows, RunDeviation& measured)
   if (rows.motion().rounding_mm() > 0.0) tracker_.emplace(rows.path());
 }
 
-// A row as the emitted blocks pass it: a block is straight, or an arc where the path is one.
+// A row as the emitted blocks pass through it: a block is straight, or an arc where the path is an arc.
 Vector3 DeviationMeter::as_block(std::size_t row) const noexcept {
   const auto at = static_cast<std::ptrdiff_t>(row);
   const auto half = static_cast<std::ptrdiff_t>(half_);

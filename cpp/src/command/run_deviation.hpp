@@ -12,7 +12,7 @@
 
 namespace shapegcode {
 
-/// Largest deviation of what follows the path, near each junction and segment of a run, in mm.
+/// Largest deviation of the contour target near each junction and segment of a motion from rest to rest, in mm.
 struct RunDeviation {
   std::vector<float> at_junction;  ///< [i]: while segment i is entered, within half the shaper
   std::vector<float> on_segment;   ///< further than that from every corner; negative: nowhere

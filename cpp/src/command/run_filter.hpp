@@ -12,7 +12,7 @@
 
 namespace shapegcode {
 
-/// What follows the look-ahead of a run, on half the block grid, and how the contour is kept.
+/// Filters after the look-ahead of a motion from rest to rest, on half the block grid, and the contour target.
 struct RunFilter {
   /// A set of shapers along an axis, used instead of constant ones; the contour is then kept with the modes at each of
   /// its positions, by the tables.

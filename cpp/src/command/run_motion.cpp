@@ -15,8 +15,8 @@
 namespace shapegcode {
 namespace {
 
-// Of the contour tolerance: what rounding corners takes, the rest is for what the shaper does. That is little where the
-// contour is brought back behind it, and most of it where it is not.
+// Fraction of the contour tolerance for corner rounding; the rest is for the shaper's distortion. With contour
+// compensation that distortion is small, without it large.
 constexpr double rounding_share = 0.75;
 constexpr double rounding_share_uncompensated = 0.25;
 // Without a tolerance corners are rounded as for this one.

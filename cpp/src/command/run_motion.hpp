@@ -1,4 +1,4 @@
-// The command of a run before shaping: as a speed profile along its path, or as set-points that were planned.
+// The command of a motion from rest to rest before shaping: a speed profile along its path, or planned set-points.
 #pragma once
 
 #include <cstddef>

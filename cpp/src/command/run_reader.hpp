@@ -14,12 +14,11 @@
 
 namespace shapegcode {
 
-/// The samples of a run on half the block grid: the command before shaping and, where something shall follow the path,
-/// by how much it would leave it, and where the path is meanwhile. Rows are read as they are asked for and forgotten
-/// behind what is given out, so that memory does not grow with the run. The corrections lie beside the rows that they
-/// belong to; others decide them.
+/// The samples of a motion from rest to rest on half the block grid: the command before shaping and, with a contour
+/// target, its uncorrected deviation and the position on the path. Rows are read on request and freed after output, so
+/// that memory does not grow with the motion. Corrections are stored with their rows; they are computed elsewhere.
 ///
-/// The deviation is the one across the path; along it only near corners, where time cannot be given away.
+/// The deviation is perpendicular to the path; its component along the path counts only near corners.
 class RunReader {
  public:
   /// `motion`: along the path. `keeps_places`: tangents, target positions and segments are kept, too.

@@ -32,7 +32,7 @@ void RunShaper::next(Vector3& position) {
   rows_.forget(out_);
 }
 
-// A correction bends the command a little before the arc begins and behind its end.
+// A correction changes the command slightly before the start and after the end of an arc.
 std::int8_t RunShaper::arc_normal() { return rows_.arc_normal(out_ - 1, corrector_ ? corrector_->lead() : 0); }
 
 }  // namespace shapegcode

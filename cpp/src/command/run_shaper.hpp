@@ -12,9 +12,9 @@
 
 namespace shapegcode {
 
-/// One run from rest to rest as a shaped command on half the block grid: row 2k is the border k of block periods, row
-/// 2k+1 the middle of period k. With a target, the command before shaping is corrected so that the shaped command or
-/// the response keeps to the path.
+/// One motion from rest to rest as a shaped command on half the block grid: row 2k is boundary k of the block periods,
+/// row 2k+1 the middle of period k. With a target, the command before shaping is corrected so that the shaped command
+/// or the response stays on the path.
 class RunShaper {
  public:
   /// `filter` stays the caller's. `measured`: filled while the run is given out if not null; asks for a target.

@@ -33,7 +33,7 @@ void put_part(const SpeedCaps& part, std::size_t first, SpeedCaps& caps) {
   std::ranges::copy(part.at_junction, caps.at_junction.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
-// The rows of a part; a part without periods has the one row on which it rests.
+// Number of rows of a part; a part without periods has one row, its position at rest.
 void put(const std::vector<Vector3>& grid, const std::vector<Vector3>& middle, const Vector3& at, ShapedCommand& part) {
   part.grid_mm.resize(static_cast<Eigen::Index>(std::max<std::size_t>(grid.size(), 1)), axis_count);
   part.middle_mm.resize(static_cast<Eigen::Index>(middle.size()), axis_count);

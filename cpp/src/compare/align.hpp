@@ -1,4 +1,4 @@
-// Private: which entries of two lists are the same, in the order in which they stand.
+// Private: equal entries of two lists, in order.
 #pragma once
 
 #include <algorithm>

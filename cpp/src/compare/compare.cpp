@@ -35,7 +35,7 @@ std::string position_text(const Vector3& position) {
   return fmt::format("X{:.3f} Y{:.3f} Z{:.3f}", position[0] + 0.0, position[1] + 0.0, position[2] + 0.0);
 }
 
-// What two functions give, each on a core of its own where that is worth it.
+// Results of two functions, run in parallel if that is faster.
 template <typename One, typename Other>
 auto both(const One& one, const Other& other, std::size_t moves) {
   auto other_value = std::async(moves < worth_a_thread ? std::launch::deferred : std::launch::async, other);

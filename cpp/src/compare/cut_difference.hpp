@@ -1,4 +1,4 @@
-// Private: two cuts side by side.
+// Private: comparison of two cuts.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Private: what a program does, as a list that another program's can be held against.
+// Private: the effects of a program as a list, for comparison with another program.
 #pragma once
 
 #include <array>

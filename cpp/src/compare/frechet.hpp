@@ -1,4 +1,4 @@
-// Private: whether two polylines can be run through side by side, both forwards, never further apart than a distance.
+// Private: whether two polylines can be traversed in parallel, both forwards, within a given distance of each other.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// The words of a program, line by line, beside its canonical moves.
+// The words of a program, line by line, with its canonical moves.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -6,7 +6,7 @@
 namespace shapegcode {
 namespace {
 
-// Halvings of the jerk that ends at a speed.
+// Bisections of the jerk that reaches a speed.
 constexpr int jerk_halvings = 44;
 // As near as that, relative to what a period changes, is there.
 constexpr double reached = 1e-9;

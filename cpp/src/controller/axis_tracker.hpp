@@ -1,4 +1,4 @@
-// One axis that goes to a goal which may change in any period, nearly as fast as its limits allow.
+// Motion of one axis to a target that may change in any period, nearly as fast as its limits allow.
 #pragma once
 
 #include "planner/landing.hpp"

@@ -9,7 +9,7 @@
 namespace shapegcode {
 namespace {
 
-// What a position may be beyond a limit by rounding, mm.
+// Round-off by which a position may exceed a limit, mm.
 constexpr double at_limit_mm = 1e-6;
 // An axis that comes back by less than that has not turned, in its unit.
 constexpr double turned_back = 1e-6;

@@ -1,5 +1,5 @@
-// Motion beside the path: axes that are jogged while the path rests, an offset that is added while it is run, backlash,
-// and where an axis may be at all.
+// Motion in addition to the path: jogging while the path rests, offsets during motion, backlash compensation, and
+// travel limits.
 #pragma once
 
 #include <array>

@@ -13,7 +13,7 @@ ChangeCost cost_of_change(std::span<const Fir> chains, std::span<const double> p
   const double reach_mm = fastest_mm_per_s * static_cast<double>(longest) * period_s;
   ChangeCost cost;
   for (std::size_t first = 0; first + 1 < chains.size(); ++first) {
-    // The filters of all positions that the axis can pass during one increment, if it starts behind the first.
+    // The filters of all positions that the axis can pass during one increment, if it starts after the first.
     std::size_t last = first + 1;
     while (last + 1 < chains.size() && position_mm[last] < position_mm[first + 1] + reach_mm) ++last;
     ChangeCost here{0.0, 0.0, 0.0};

@@ -1,4 +1,4 @@
-// What a shaper that follows a position adds to acceleration and jerk where it changes.
+// Acceleration and jerk added by the changes of a shaper that depends on a position.
 #pragma once
 
 #include <span>

@@ -9,7 +9,7 @@
 namespace shapegcode {
 namespace {
 
-// Three set-points are on a straight line if the middle one is as near to it as that.
+// Three set-points are on a straight line if the middle one is within this distance of it.
 constexpr double straight_mm = 1e-9;
 
 double distance_to(const Vector3& point, const Vector3& begin, const Vector3& end) noexcept {

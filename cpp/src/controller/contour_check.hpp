@@ -1,4 +1,4 @@
-// How far filters behind planned set-points take them from their path.
+// Deviation from the path caused by the filters after the planned set-points.
 #pragma once
 
 #include <cstddef>

@@ -8,7 +8,7 @@
 namespace shapegcode {
 namespace {
 
-// A corner that may be passed no faster is a stop.
+// A corner with a speed limit below this is a stop.
 constexpr double crawl_mm_per_s = 1e-2;
 // A share of what another axis travels that hardly is travel of X, Y and Z.
 constexpr double hardly_moves = 0.1;

@@ -1,4 +1,4 @@
-// The pushing thread's side of a control: what is taken, and what a segment and its junction allow.
+// The part of a control for the pushing thread: acceptance of segments, and the limits of a segment and its junction.
 #pragma once
 
 #include <span>

@@ -9,7 +9,8 @@
 namespace shapegcode {
 namespace {
 
-// Periods of a section, by the stop behind it: what it costs to plan that is spread over them.
+// Number of periods of a section by the length of the stop after it, over which the cost of planning that stop is
+// distributed.
 constexpr double periods_share = 0.125;
 constexpr std::size_t shortest_section = 8;
 constexpr std::size_t longest_section = 32;

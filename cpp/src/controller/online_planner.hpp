@@ -1,4 +1,4 @@
-// The look-ahead of a control: sections of motion, each with a stop behind it, one after another.
+// The look-ahead of a control: successive sections of motion, each followed by a planned stop.
 #pragma once
 
 #include <array>

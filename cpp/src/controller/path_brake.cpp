@@ -8,7 +8,7 @@
 namespace shapegcode {
 namespace {
 
-// Of the acceleration: the rest is for a curve that begins within the period.
+// Fraction of the acceleration used; the rest is for a curve that begins within the period.
 constexpr double braking_share = 0.995;
 // Points of the section that the next period may lead to.
 constexpr std::size_t periods_ahead = 2;

@@ -1,4 +1,4 @@
-// Braking along what is planned, harder than it is planned.
+// Deceleration along the planned path, harder than planned.
 #pragma once
 
 #include "controller/sections.hpp"

@@ -1,4 +1,4 @@
-// What belongs to places of the path, on its way from the thread that pushes to the one that steps.
+// Queue of items at positions of the path, from the pushing thread to the stepping one.
 #pragma once
 
 #include <atomic>

@@ -8,7 +8,7 @@
 namespace shapegcode {
 namespace {
 
-// Of the pace at which it was run. The set-points then take a quarter of the acceleration and an eighth of the jerk.
+// Ratio to the original speed. The set-points then need a quarter of the acceleration and an eighth of the jerk.
 constexpr double highest_pace = 0.5;
 // What the change of the pace may take of acceleration and, twice, of the jerk: 3 pace' pace a and pace'' v.
 constexpr double acceleration_share = 0.5;

@@ -1,4 +1,4 @@
-// Back along the path that was run, and forward again.
+// Motion back along the completed path, and forward again.
 #pragma once
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// Finished set-points on their way from the thread that plans to the one that steps.
+// Queue of finished set-points from the planning thread to the stepping one.
 #pragma once
 
 #include <array>

@@ -11,7 +11,7 @@
 namespace shapegcode {
 namespace {
 
-// By which a sum of taps may miss 1.
+// Permitted difference of a sum of taps from 1.
 constexpr double tap_rounding = 1e-12;
 
 // Sums of taps that are 1 to the last bits only would move the machine when it is at rest.

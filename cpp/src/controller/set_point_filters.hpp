@@ -1,5 +1,5 @@
-// What follows the path in a control: contour correction, smoothing and shaper of every axis, and of its velocity and
-// acceleration. A shaper that follows a position is the first of them.
+// Filters after the path in a control: contour correction, smoothing and shaper of every axis, and of its velocity and
+// acceleration. A shaper that depends on a position comes first.
 #pragma once
 
 #include <optional>

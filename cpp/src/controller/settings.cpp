@@ -16,7 +16,7 @@ constexpr std::size_t min_window = 8;
 constexpr int max_lead = 10'000;
 constexpr std::size_t max_segments = std::size_t{1} << 24;
 
-// Share of acceleration and jerk that the changes of a shaper may take which follows a position.
+// Fraction of acceleration and jerk for the changes of a shaper that depends on a position.
 constexpr double change_share = 0.25;
 
 // Of acceleration and jerk that a fade has to leave.

@@ -1,4 +1,4 @@
-// What the settings of a control come to.
+// Values derived from the settings of a control.
 #pragma once
 
 #include "controller/online_planner.hpp"

@@ -8,7 +8,7 @@
 namespace shapegcode {
 namespace {
 
-// Share of acceleration and jerk with which it is caught up: what is left is for the ripple.
+// Fraction of acceleration and jerk for catching up with the spindle; the rest is for its ripple.
 constexpr double catching_share = 0.8;
 // Where the motion begins it is followed as near as that, revolutions.
 constexpr double followed_within = 0.005;

@@ -1,4 +1,4 @@
-// A spindle that is measured, and motion that is bound to it.
+// A measured spindle, and motion synchronous with it.
 #pragma once
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// Filters as plain rows of taps, for what is computed of several in a row.
+// Filters as dense rows of taps, for computations on cascades.
 #pragma once
 
 #include <cstddef>

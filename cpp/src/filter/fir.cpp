@@ -25,7 +25,7 @@ constexpr int taps_per_pass = 8;
 constexpr int max_delay = 100'000'000;  // a day of milliseconds; sums of a few filters stay countable
 constexpr Index block_rows = 1024;      // 8 kB of output: stays in the first-level cache between passes
 
-/// Sum of the last `length` samples, free of drift: every rounding of `sum` is caught exactly (two-sum) in `error`.
+/// Sum of the last `length` samples, free of drift: the round-off of `sum` is stored exactly (two-sum) in `error`.
 struct RunningSum {
   double sum = 0.0;
   double error = 0.0;

@@ -19,7 +19,7 @@ using Eigen::Index;
 
 namespace {
 
-/// A place as the filter below it and the share of the one above.
+/// A place as the index of the filter below it and the weight of the one above.
 struct Shares {
   std::size_t lower;
   double upper_share;

@@ -22,8 +22,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int most_least_squares = 40;
-// Relative changes of phi and of the residual's squares at which a round has changed nothing. The coefficients of poles
-// close to each other are hardly determined, so the residual settles before phi does.
+// Relative changes of phi and of the residual sum of squares below which the iteration has converged. The coefficients
+// of close poles are poorly determined, so the residual converges before phi.
 constexpr double settled_phi = 1e-11;
 constexpr double settled_squares = 1e-9;
 constexpr double exact_arma_share = 1e-20;  // of the responses' squares

@@ -8,8 +8,8 @@
 
 namespace shapegcode::identification {
 
-/// A sampled force as it runs between its samples: linear over each of `steps` parts of a period. Only the periods in
-/// which it is not zero throughout are kept.
+/// A sampled force between its samples: linear over each of `steps` parts of a period. Only the periods in which it is
+/// not zero are stored.
 class HeldForce {
  public:
   /// `force_n` must stay as long as this.

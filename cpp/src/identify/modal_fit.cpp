@@ -28,8 +28,8 @@ using identification::ModeTerms;
 using identification::one_pole;
 using identification::OnePole;
 
-/// What the force within a period adds to a mode's state z (mode_terms) by its end, and to dz/ds: weights of the force
-/// at the ends of the parts of the period.
+/// Contribution of the force within a period to a mode's state z (mode_terms) at its end, and to dz/ds: weights of the
+/// force at the ends of the parts of the period.
 class PeriodInput {
  public:
   PeriodInput(Complex pole, double period_s, std::size_t steps) : weight_(steps + 1), derivative_(steps + 1) {

@@ -21,7 +21,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Share of a candidate's response that the chosen ones cannot follow, below which it is taken for one of them.
+// If less than this fraction of a candidate's response cannot be explained by the chosen ones, it is one of them.
 constexpr double least_own_share = 1e-6;
 
 /// Products of the candidates' columns (unit length, offset taken out) and of these with the response, from which the

@@ -17,7 +17,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using linear_algebra::triangulate;
 
-// A column whose part of its own is smaller than this share of it is a combination of the others.
+// A column is a combination of the others if its independent part is smaller than this fraction of it.
 constexpr double dependent = 1e-11;
 // Steps of theta (all logarithms) and predicted gains below which the minimum is reached.
 constexpr double step_floor = 1e-11;

@@ -1,4 +1,4 @@
-// What every part of identification asks of its records.
+// Checks of records common to all parts of identification.
 #pragma once
 
 #include <cstddef>

@@ -40,8 +40,8 @@ std::vector<Complex> spectrum(std::span<const double> values, double mean, std::
   return result;
 }
 
-/// The sensor's offset: the mean of the last eighth if the response has decayed by then. Otherwise that mean says
-/// nothing, and an offset is left to the model, which needs a real pole for it.
+/// The sensor's offset: the mean of the last eighth if the response has decayed by then. Otherwise that mean is
+/// meaningless, and the model represents the offset by a real pole.
 double offset_of(std::span<const double> values) {
   const Eigen::Map<const VectorXd> all(values.data(), static_cast<Index>(values.size()));
   const auto tail = all.tail(std::max<Index>(all.size() / 8, 1));

@@ -9,7 +9,7 @@
 namespace shapegcode {
 namespace {
 
-// The planner wants a speed at every junction; this one is a stop to every purpose.
+// The planner needs a speed at every junction; this one is practically a stop.
 constexpr double standstill_mm_per_s = 1e-3;
 
 // A tangent junction to within what the least increment lets a program say (1 um over 1 mm).

@@ -1,4 +1,4 @@
-// What a segment allows: its acceleration, and how long jerk has to be spread.
+// Acceleration limit of a segment, and the time over which jerk is spread.
 #pragma once
 
 #include "shapegcode/limits.hpp"

@@ -20,7 +20,7 @@ using Eigen::Vector2d;
 
 constexpr int max_newton_steps = 100;
 constexpr int max_fit_steps = 200;
-// Points whose spread across a line is below this share of that along it give no circle.
+// Points give no circle if their spread across a line is below this fraction of that along it.
 constexpr double straight_share = 1e-12;
 
 // Centre and radius, about the points' own mean.

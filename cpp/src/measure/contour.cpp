@@ -17,7 +17,7 @@ constexpr double two_pi = 2.0 * std::numbers::pi;
 constexpr double window_margin_mm = 1e-3;
 constexpr double longest_retreat_mm = 10.0;
 constexpr double longest_turn_mm = 2.0;
-// Two feet are equally near if their squared distances differ by no more than rounding leaves.
+// Two feet are equally near if their squared distances differ by no more than round-off.
 constexpr double tie_relative = 1e-9;
 constexpr double tie_absolute_mm2 = 1e-18;
 constexpr double retreat_tie_relative = 1e-6;

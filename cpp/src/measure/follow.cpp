@@ -12,8 +12,8 @@ namespace {
 
 using detail::refuse;
 
-// A curve full of peaks is divided near its ends again and again, at a cost that grows with the square of the rows: it
-// is divided in windows, whose ends remain.
+// A curve full of peaks would be divided near its ends repeatedly, in quadratic time: so it is divided in windows,
+// whose ends remain.
 constexpr Eigen::Index window_rows = 512;
 
 struct Furthest {

@@ -1,4 +1,4 @@
-// What a wall's profile goes through before its roughness is measured.
+// Processing of a wall's profile before its roughness is measured.
 #pragma once
 
 #include <optional>

@@ -26,7 +26,7 @@ std::vector<double> less_fit(std::span<const double> profile, const Eigen::Matri
   return {rest.begin(), rest.end()};
 }
 
-/// How many spacings fit into a length; no more than `most` are counted.
+/// Number of spacings that fit into a length; at most `most`.
 std::size_t whole_spacings(double length_mm, double spacing_mm, std::size_t most) {
   const double count = std::floor(length_mm / spacing_mm * (1.0 + rounding_share));
   return count < static_cast<double>(most) ? static_cast<std::size_t>(count) : most;

@@ -43,7 +43,7 @@ PathSection section_of(const Path& path, std::size_t first, std::size_t last, Se
   return section;
 }
 
-// The next run that can be measured as one line or one circle, from `first` on; moves without length belong to it.
+// The next segments from `first` on that can be measured as one line or one circle, including moves without length.
 PathSection run_from(const Path& path, std::size_t first) {
   std::optional<std::size_t> shape;
   std::size_t last = first;

@@ -15,7 +15,7 @@ using Eigen::Vector2d;
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double no_wall = std::numeric_limits<double>::quiet_NaN();
-// The programmed path is swept in chords that leave an arc by no more than this.
+// The programmed path is swept in chords within this distance of an arc.
 constexpr double chord_error_mm = 1e-5;
 constexpr double min_chord_mm = 1e-6;  // also where a spiral ends in its centre
 constexpr double max_discs = 1e8;      // tool radii along the path

@@ -1,4 +1,4 @@
-// What the parts of milling refuse alike.
+// Checks common to the parts of milling.
 #pragma once
 
 #include <algorithm>

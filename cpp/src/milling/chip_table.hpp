@@ -1,5 +1,5 @@
-// What a tooth's element contributes at its azimuth, cumulated over azimuth: a flute's force is a difference of two
-// entries, however its helix runs.
+// Contribution of a tooth element at its azimuth, integrated over azimuth: a flute's force is a difference of two
+// entries, for any helix.
 #pragma once
 
 #include <array>

@@ -31,7 +31,7 @@ bool same(const ToolBeam& a, const ToolBeam& b) {
          a.spindle_n_per_um == b.spindle_n_per_um;
 }
 
-// For loads that are weighed by their height.
+// For loads weighted by their height.
 void prepare(FluteSet& set) {
   for (ChipTable& table : set.tables) table.prepare_twice();
 }

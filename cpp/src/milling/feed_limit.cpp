@@ -11,7 +11,7 @@ namespace {
 
 using detail::refuse;
 
-// Accepted share of the binding limit, and the one that is aimed at, so that a step lands on the safe side.
+// Accepted fraction of the limit reached, and the target fraction, chosen so that a step ends on the safe side.
 constexpr double accepted = 1.0 - 2e-4;
 constexpr double aimed = 1.0 - 8e-5;
 constexpr double first_exponent = 0.85;  // of a force against the feed, before anything is known

@@ -49,7 +49,7 @@ void check(std::span<const FeedBlock> blocks, const FeedStations& stations, cons
   detail::check_pieces(blocks.back().end_mm, options.least_length_mm / candidates, "a quarter of the least length");
 }
 
-// Lowest feed over a section; sections are asked for in ascending order.
+// Lowest feed over a section; sections must be requested in ascending order.
 class LowestFeed {
  public:
   explicit LowestFeed(const FeedStations& stations) : stations_(stations) {}

@@ -20,7 +20,7 @@ double distance_to_edge(const Vector2d& point, const Vector2d& a, const Vector2d
   return (point - a - share * along).norm();
 }
 
-/// The first index at or beyond a position on the grid, within 0 ... count.
+/// The first index at or after a position on the grid, within 0 ... count.
 std::int64_t first_at(double position, double count) noexcept {
   if (!(position > 0.0)) return 0;
   if (position >= count) return static_cast<std::int64_t>(count);

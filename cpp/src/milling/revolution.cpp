@@ -13,7 +13,7 @@ namespace {
 constexpr double panel_rad = 8.0 / 180.0 * std::numbers::pi;  // of Simpson's rule, two steps each
 constexpr double brief_rad = 1.0 / 180.0 * std::numbers::pi;  // between kinks: a straight line will do
 constexpr double same_kink_rad = 1e-6;
-// A weighted load along less azimuth than this stands at its middle.
+// A weighted load over less azimuth than this acts at its middle.
 constexpr double short_rad = 1e-2;
 
 }  // namespace

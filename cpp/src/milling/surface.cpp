@@ -31,7 +31,7 @@ Eigen::VectorXd wall_error_um(MillingForce& force, const ToolBeam& beam, std::sp
   const EndMill& tool = force.tool();
   const double lag_rad_per_mm = std::tan(tool.helix_rad) / tool.radius_mm();
   const double pitch = 2.0 * std::numbers::pi / tool.flutes;
-  // In the spindle's own sense teeth pass from +pi/2 to -pi/2.
+  // In the direction of spindle rotation teeth pass from +pi/2 to -pi/2.
   const bool tooth_leaves = (wall.side == WallSide::right) == (force.sense() == SpindleSense::clockwise);
   const double finish = tooth_leaves ? -half_pi + inside_rad : half_pi - inside_rad;
   const double away = wall.side == WallSide::right ? 1.0 : -1.0;

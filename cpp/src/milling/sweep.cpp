@@ -27,7 +27,7 @@ using Eigen::Vector2d;
 
 constexpr double steps_per_diameter = 40.0;
 constexpr double largest_turn_rad = 0.35;  // of one step on an arc
-// Behind a vertex the load changes at once: the first step there is cut up at these shares.
+// After a vertex the load changes abruptly: the first step there is divided at these fractions.
 constexpr std::array<double, 4> shares_behind_vertex = {0.0625, 0.125, 0.25, 0.5};
 constexpr double vertex_rad = 0.05;
 // The newest step of the tool is kept apart from the grid, exactly, for this share of the radius: beside the tool it

@@ -1,4 +1,4 @@
-// Private to milling: the step of a tool that the grid and the closed form measure distances from.
+// Private to milling: a step of the tool, from which grid and closed form measure distances.
 #pragma once
 
 #include <Eigen/Core>

@@ -12,7 +12,7 @@
 namespace shapegcode {
 namespace {
 
-// A block that ends on a tick to within rounding ends there.
+// A block that ends at a period to within round-off ends exactly there.
 constexpr double tick_tolerance = 1e-6;
 // Blocks that one step takes one by one; where more of them end within a period, whole groups are passed at once.
 constexpr std::size_t group_size = 16;

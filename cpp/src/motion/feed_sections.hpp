@@ -1,4 +1,4 @@
-// A path cut where the speed that it may have changes, for a planner that looks at nothing but feeds and axes.
+// A path divided where its speed limit changes, for planners that consider only feeds and axes.
 #pragma once
 
 #include <cstdint>

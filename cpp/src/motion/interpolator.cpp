@@ -27,7 +27,7 @@ Interpolator::Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<con
       delay_s_(delay_s) {
   const double rest = 0.0;
   smoothing_.reset({&rest, 1});
-  // A ramp that ends on a tick to within rounding ends there.
+  // A ramp that ends at a period to within round-off ends exactly there.
   const double ramps = std::ceil((profile_->ramp_duration_s() + delay_s) / period_s - 1e-9);
   sample_count_ = static_cast<std::size_t>(require_count(ramps, max_set_points, "a path", "set-points")) + 1 +
                   static_cast<std::size_t>(smoothing_.fir().duration_samples());

@@ -1,4 +1,4 @@
-// Private: segments as LinuxCNC's planner queues them, with the arcs that it puts between them.
+// Private: segments as LinuxCNC's planner queues them, with its blend arcs between them.
 #pragma once
 
 #include <algorithm>

@@ -9,7 +9,7 @@
 namespace shapegcode::detail {
 namespace {
 
-// As small as the planner looks at distances, speeds and times.
+// Smallest distances, speeds and times that the planner considers.
 constexpr double least_distance_mm = 1e-12;
 constexpr double least_speed_mm_per_s = 1e-8;
 constexpr double least_time_s = 1e-12;

@@ -15,7 +15,7 @@
 namespace shapegcode {
 namespace {
 
-// What the junctions and segments of a path allow.
+// Speed limits of the junctions and segments of a path.
 struct PathSpeeds {
   std::vector<double> on_segment;
   std::vector<double> corner;  // [i]: where segment i is entered

@@ -1,4 +1,4 @@
-// The phases of a profile out of the ramps of its pieces, one after another: what is passed is forgotten.
+// Generates the phases of a profile from the ramps of its pieces, one after another, and frees the completed ones.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// Sections of path with one limit each, the speeds where they meet, and the phases of constant acceleration within
-// them.
+// Sections of a path with one limit each, the speeds at their boundaries, and the phases of constant acceleration
+// within them.
 #pragma once
 
 #include <algorithm>

@@ -15,7 +15,7 @@ bool PlainPlan::serves(const MotionLimits& limits) noexcept {
          !limits.max_jerk_mm_per_s3.array().isFinite().any();
 }
 
-// Boundary speeds by a forward and a backward pass in v^2, as pass_speeds does it.
+// Boundary speeds by a forward and a backward pass in v^2, as in pass_speeds.
 PlainPlan::PlainPlan(Path path, const MotionLimits& limits, const FilterTolerance& filter)
     : path_(std::move(path)), limits_(limits), filter_(filter) {
   const std::size_t n = path_.size();

@@ -16,7 +16,7 @@
 namespace shapegcode {
 namespace {
 
-// grbl takes two moves for a straight line, or for a reversal, where the cosine of their angle is as near to 1 as this.
+// grbl treats two moves as a straight line or a reversal if the cosine of their angle is within this of 1.
 constexpr double straight_cosine = 0.999999;
 
 // Equal parts of a segment as lines between points on it.

@@ -1,4 +1,4 @@
-// Private: what the models of open planners share.
+// Private: common parts of the models of open planners.
 #pragma once
 
 #include <cstddef>

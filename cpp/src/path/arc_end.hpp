@@ -1,4 +1,4 @@
-// Private: whether segments connect, and the sweep of an arc leads to its end.
+// Private: checks that segments connect, and that the sweep of an arc leads to its end.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Private: the axes of an arc's plane, and what is computed with them.
+// Private: the axes of an arc's plane, and computations with them.
 #pragma once
 
 #include <cmath>

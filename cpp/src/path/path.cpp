@@ -19,7 +19,7 @@ bool same(const Vector3& a, const Vector3& b) noexcept {
   return same(a[0], b[0]) && same(a[1], b[1]) && same(a[2], b[2]);
 }
 
-// Whether a segment is what `make_line` makes of its ends, to the bit, and ends where the next one starts.
+// Whether a segment equals `make_line` of its ends, to the bit, and ends where the next one starts.
 bool is_plain(const Segment& segment, const Vector3& next_mm) noexcept {
   const Segment line = make_line(segment.start_mm, next_mm, segment.feed_mm_per_s, segment.line);
   return segment.kind == line.kind && same(segment.end_mm, next_mm) && same(segment.length_mm, line.length_mm) &&

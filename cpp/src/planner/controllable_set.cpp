@@ -6,7 +6,7 @@
 namespace shapegcode {
 namespace {
 
-// Smaller coefficients of c than this (of the tangent: per mm) are none.
+// Smaller coefficients of c than this (of the tangent: per mm) count as zero.
 constexpr double no_coefficient = 1e-9;
 // Squares of speeds below this are rest, mm^2/s^2.
 constexpr double at_rest = 1e-12;

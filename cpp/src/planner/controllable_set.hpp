@@ -1,4 +1,4 @@
-// From which states of the motion a stop is certain, with every limit kept.
+// States of the motion from which it can stop within every limit.
 #pragma once
 
 #include <algorithm>

@@ -6,8 +6,8 @@
 namespace shapegcode {
 namespace {
 
-// What rounding a jump of a derivative over the half-width d to both sides takes off the path: of the direction, times
-// d, and of the second derivative, times d^2.
+// Deviation from the path when a jump is rounded over the half-width d on both sides: of the direction, times d, and of
+// the second derivative, times d^2.
 constexpr double turn_deviation = 1.0 / 6.0;
 constexpr double bend_deviation = 1.0 / 120.0;
 // Jumps of a derivative that are rounding of coordinates.

@@ -1,4 +1,4 @@
-// What jumps where two segments meet, and how much of the tolerance its rounding takes.
+// Jumps of the derivatives where two segments meet, and the tolerance that their rounding needs.
 #pragma once
 
 #include <array>

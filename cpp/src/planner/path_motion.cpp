@@ -6,7 +6,7 @@
 namespace shapegcode {
 namespace {
 
-// Relative, of a limit that a state may be beyond by rounding.
+// Relative round-off by which a state may exceed a limit.
 constexpr double rounding = 1e-9;
 // Candidates of the jerk that are tried, and halvings between the best of them and the next.
 constexpr int candidates = 12;

@@ -1,4 +1,4 @@
-// The motion along the planned path: one state a period, always such that a stop is certain.
+// The motion along the planned path: one state per period, from which it can always stop within the limits.
 #pragma once
 
 #include <cstddef>

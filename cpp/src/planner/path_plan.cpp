@@ -7,7 +7,7 @@
 namespace shapegcode {
 namespace {
 
-// Rounds of the plan after the first; more change nothing that counts.
+// Rounds of the plan after the first; more have no significant effect.
 constexpr int rounds = 4;
 // Stations that are made room for at first, where they may become more.
 constexpr std::size_t first_capacity = 1024;

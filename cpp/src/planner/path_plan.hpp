@@ -1,4 +1,4 @@
-// The look-ahead over a whole path: intervals, and for every station the states from which a stop is certain.
+// The look-ahead over a whole path: intervals, and for every station the states from which it can stop.
 #pragma once
 
 #include <algorithm>

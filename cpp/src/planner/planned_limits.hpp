@@ -1,5 +1,5 @@
-// How much of the limits is planned, and what is done where set-points pass them nevertheless: limits are looked at in
-// some places of an interval only.
+// Fraction of the limits used in planning, and the reaction if set-points exceed them anyway, because limits are
+// checked only at some points of an interval.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// The path that can be run through: junctions rounded within the tolerance, cut into intervals between stations.
+// The path with junctions rounded within the tolerance, divided into intervals between stations.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Segments as the planner has them: what each of them and its junction with the one before allow.
+// Segments in the planner, with the limits of each and of its junction with the previous one.
 #pragma once
 
 #include <algorithm>

@@ -8,7 +8,7 @@
 namespace shapegcode {
 namespace {
 
-// Of an axis that does not move.
+// For an axis that does not move.
 constexpr double no_share = 1e-9;
 
 // What an arc adds to the cubic: in its plane the tangent turns by the same angle for every mm.

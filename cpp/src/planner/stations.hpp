@@ -1,4 +1,4 @@
-// The path as the planner has it: intervals between stations, with all derivatives by the path parameter.
+// The path in the planner: intervals between stations, with all derivatives with respect to the path parameter.
 #pragma once
 
 #include <algorithm>

@@ -21,7 +21,7 @@ namespace shapegcode {
 namespace {
 
 constexpr int most_plans = 24;
-// A motion that gets on by less in so many periods does not end.
+// A motion with less progress than this in so many periods does not end.
 constexpr std::size_t progress_periods = 4096;
 constexpr double progress_mm = 1e-6;
 

@@ -22,7 +22,7 @@ constexpr double damping_step = 0.02;      // of the range from no damping to th
 constexpr int zero_newton_steps = 30;
 constexpr double newton_converged = 1e-15;
 
-/// Two phases omega*t2 < omega*t3 at which the taps 1, -1, 1 leave nothing of the mode.
+/// Two phases omega*t2 < omega*t3 at which the impulses 1, -1, 1 have zero residual at the mode.
 struct NegativePhases {
   double second;
   double third;

@@ -16,8 +16,8 @@ namespace shapegcode {
 
 namespace {
 
-// Two z closer than this are one root, and an imaginary part below it is none: what the other root would have
-// cancelled stays below the rounding of the amplitudes.
+// Two z closer than this count as one root, and a smaller imaginary part as zero: the error is below the round-off of
+// the amplitudes.
 constexpr double same_root = 1e-14;
 
 /// z = e^{s*period}, and 1 - z without the cancellation of the plain difference.

@@ -26,7 +26,7 @@ AxisPlant::AxisPlant(const SimulationOptions& options)
     throw Error(ErrorKind::argument,
                 fmt::format("{} feed drives: must be none or one each for X, Y and Z", options.drives.size()));
   }
-  // It is looked for at every set-point.
+  // Searched at every set-point.
   static_cast<void>(require_count(options.settling_limit_s / period_s_, max_set_points, "settling limit", "periods"));
   drives_.reserve(options.drives.size());
   for (const FeedDriveParameters& drive : options.drives) {

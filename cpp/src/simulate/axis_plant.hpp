@@ -1,4 +1,4 @@
-// The plant behind three axes: modes, or feed drives with modes on them. Only here a simulation chooses.
+// The plant of three axes: modes, or feed drives with modes. The choice is made only here.
 #pragma once
 
 #include <vector>

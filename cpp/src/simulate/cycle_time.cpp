@@ -14,7 +14,7 @@
 namespace shapegcode {
 namespace {
 
-// Closed forms for the runs of one program.
+// Closed forms for the motions of one program.
 class Clock {
  public:
   Clock(const Program& program, const FanucModel& model, bool per_block)

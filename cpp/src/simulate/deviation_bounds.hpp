@@ -1,5 +1,5 @@
-// How far set-points of blocks can be from the path at most, whatever the feed override: they run through the same
-// lines, at other instants.
+// Upper bound of the distance of block set-points from the path at any feed override: they follow the same lines, at
+// other instants.
 #pragma once
 
 #include <cstddef>

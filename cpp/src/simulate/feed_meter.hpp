@@ -11,9 +11,9 @@
 
 namespace shapegcode::detail {
 
-/// Finds where a motion is fastest against the programmed feed at its position, over one, four and sixteen
-/// of `SimulationOptions::feed_window_s`. Positions are those that a tracker of the path finds; near several short
-/// segments the highest feed of those within the deviation counts. Without a window it measures nothing.
+/// Finds the largest ratio of the speed to the programmed feed at the same position, over one, four and sixteen times
+/// `SimulationOptions::feed_window_s`. A tracker of the path gives the positions; near several short segments the
+/// highest feed of those within the deviation counts. Without a window it measures nothing.
 class FeedMeter {
  public:
   /// `path` stays the caller's.

@@ -1,4 +1,4 @@
-// Filters behind the set-points, in order.
+// Filters after the set-points, in order.
 #pragma once
 
 #include <vector>

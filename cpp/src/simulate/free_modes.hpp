@@ -1,4 +1,4 @@
-// Modes of three axes over many periods at once, while their command runs at steady speed.
+// Modes of three axes over many periods at once, while their command has constant velocity.
 #pragma once
 
 #include <array>

@@ -5,7 +5,7 @@
 
 namespace shapegcode::detail {
 
-/// What the machine functions of one block take.
+/// Time of the machine functions of one block.
 struct FunctionWait {
   double tool_change_s = 0.0;
   double function_s = 0.0;

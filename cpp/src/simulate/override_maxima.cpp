@@ -7,7 +7,7 @@
 namespace shapegcode::detail {
 namespace {
 
-// What a maximum may be short of, and no more: rounding of the bounds.
+// Largest error of a maximum: round-off of the bounds.
 constexpr double slack_relative = 1e-10;
 constexpr double slack_mm = 1e-10;
 // So far before a section that counts a run begins: the trackers and the corners near its beginning are then those of a

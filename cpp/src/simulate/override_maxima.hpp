@@ -1,4 +1,4 @@
-// The largest deviations of a run at another feed override, without a look at most of it.
+// The largest deviations of a motion at another feed override, without simulating most of it.
 #pragma once
 
 #include <cstddef>

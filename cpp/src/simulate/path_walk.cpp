@@ -41,7 +41,7 @@ double PathWalk::move(Found found, const Vector3& p) noexcept {
     }
     const std::size_t neighbour = on ? here_ + 1 : here_ - 1;
     const Found next = look(at(neighbour), p);
-    // Outside of a corner both segments say the corner, as does a segment without length.
+    // Outside of a corner both segments give the corner as nearest point, as does a segment without length.
     if (next.distance2 > found.distance2) {
       break;
     }

@@ -1,4 +1,4 @@
-// Distance of a point from the segment of path beside it, without a search.
+// Distance of a point from the adjacent segment of the path, without a search.
 #pragma once
 
 #include <algorithm>

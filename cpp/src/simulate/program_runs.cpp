@@ -15,7 +15,7 @@ constexpr double memory = 20.0;        // time constants of the servo loop beyon
 constexpr double steps_per_lag = 8.0;  // pieces per time constant where the speed changes
 constexpr double junction_gap_mm = 1e-6;
 
-// Position error of the servo loop at the end of a command, per axis, put together from pieces of even motion, the last
+// Position error of the servo loop at the end of a command, per axis, summed over pieces of constant velocity, the last
 // one first: e = (1 - a) / K * sum of v (exp(-K t) - exp(-K (t + d))), t from a piece's end to the end of the command.
 class LagAtEnd {
  public:

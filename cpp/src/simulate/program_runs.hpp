@@ -1,5 +1,5 @@
-// Runs of a program. Closed form and full interpolation share which moves make one run and which feed holds; waits and
-// reached feeds are the closed form's alone.
+// Motions of a program from rest to rest. Closed form and full interpolation use the same division into motions and the
+// same feeds; only the closed form has waits and reached feeds.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
 // The set-points of a whole program, one per period: cutting runs, rapids, waits. Full interpolation of the cycle time
-// and the simulation of a program are made of the same ones.
+// and the simulation of a program use the same ones.
 #pragma once
 
 #include <array>

@@ -24,7 +24,7 @@ namespace {
 
 constexpr double recorded_decay_s = 0.25;
 
-// A drive rests when no axis has moved by more than this in so long; one that never does is left after the limit.
+// A drive is at rest when no axis has moved by more than this in this time; waiting ends at the limit.
 constexpr double resting_mm = 1e-6;
 constexpr double resting_s = 0.05;
 constexpr double longest_lag_s = 10.0;

@@ -19,7 +19,7 @@ namespace {
 
 using detail::SetPoint;
 
-// Set-points behind the filters, one per call; false behind the last.
+// Set-points after the filters, one per call; false after the last.
 using Source = std::function<bool(SetPoint&)>;
 
 // Set-points of one run from rest to rest, then so many at rest as its filters need.

@@ -18,7 +18,7 @@ namespace {
 constexpr double same_position_mm = 1e-6;
 constexpr double steepest = 0.05;  // share of the path in XY below which it counts as a plunge
 
-// Follows set-points along a path and keeps what happened between two stations.
+// Follows set-points along a path and records speed and time between two stations.
 class Follower {
  public:
   Follower(const Path& path, std::span<const double> stations, const TravelOptions& options)

@@ -17,7 +17,7 @@ namespace shapegcode {
 namespace {
 
 constexpr double largest_position_mm = 99999.999;
-// How far a line is tried beyond its last good end before it is settled: keeps the fit linear in the program's length.
+// Length to which a line is tried beyond its last valid end; keeps the time of the fit linear in the program's length.
 constexpr std::uint32_t line_patience = 2048;
 constexpr std::uint32_t longest_arc_periods = 65536;
 constexpr double straight_increments = 0.05;  // from its chord: the command is a steady line

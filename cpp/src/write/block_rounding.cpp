@@ -11,7 +11,7 @@
 namespace shapegcode {
 namespace {
 
-// A position so near to an increment, in increments, is on it.
+// A position within this distance of an increment, in increments, is on it.
 constexpr double on_increment = 1e-6;
 // Memory stays bounded: a longer run is rounded in pieces of so many blocks.
 constexpr std::size_t longest_section = 4096;

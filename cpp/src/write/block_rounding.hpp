@@ -8,10 +8,10 @@
 
 namespace shapegcode {
 
-// Moves the ends of fitted blocks to the other neighbouring increment where that leaves less in the modes of the axes
-// (options.modes), and gives the blocks their F and R for it. Every end stays within an increment of the exact command,
-// and so does what is between; number, kinds and periods of the blocks stay. `covered`: command periods up to the end
-// of the last block; `rests`: ascending periods at which the command is at rest.
+// Moves the ends of fitted blocks to the other neighbouring increment if that reduces the residual of the axes' modes
+// (options.modes), and adapts F and R. All points stay within an increment of the exact command; number, kinds and
+// periods of the blocks do not change. `covered`: command periods up to the end of the last block; `rests`: ascending
+// periods at which the command is at rest.
 void round_for_vibration(std::vector<FittedBlock>& blocks, const Eigen::Ref<const Eigen::MatrixXd>& grid_mm,
                          const BlockShape& shape, std::uint32_t covered, std::span<const std::uint32_t> rests,
                          const FitOptions& options);

@@ -8,7 +8,8 @@ namespace shapegcode {
 namespace {
 
 constexpr double largest_radius_increments = 99999999.0;  // a word has eight digits
-// Ticks by which a block ends before its last tick: far over the rounding of any controller, far under what matters.
+// Periods by which a block ends before its last interpolation period: far above the round-off of any controller, far
+// below any significant time.
 constexpr double tick_margin = 1e-4;
 // Distance, and share of its time, that a block may stand still at its end for the sake of a shorter F, and by which an
 // arc's middle may be off for the sake of a shorter R, in increments: a tenth of what an end is off by its rounding.

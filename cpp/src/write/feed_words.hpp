@@ -6,8 +6,8 @@
 
 namespace shapegcode {
 
-// Gives blocks that may share an F the same one, so that it is written once, and each group the F with the fewest
-// digits: F words are a quarter of a shaped text.
+// Gives blocks that may share an F the same one, so that it is written once, with the fewest digits: F words are a
+// quarter of a shaped program.
 void shorten_feeds(std::vector<FittedBlock>& blocks, BlockPosition start, const BlockShape& shape);
 
 }  // namespace shapegcode

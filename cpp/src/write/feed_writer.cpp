@@ -25,7 +25,7 @@ constexpr std::size_t longest_line = 100000;  // the reader has held the program
 
 using Increments = std::array<std::int64_t, axis_count>;
 
-// One line of a region, and the segments that it makes.
+// One line of a region, and its segments.
 struct SourceLine {
   std::string_view text;      // without its line end
   std::string_view line_end;  // as it stands

@@ -14,7 +14,7 @@
 namespace shapegcode {
 namespace {
 
-// Choices followed at a time; more of them on the last free blocks before a rest, where it shows most.
+// Number of candidates followed at a time; more on the last free blocks before a rest, where the effect is largest.
 constexpr std::size_t width_underway = 4;
 constexpr std::size_t width_before_rest = 128;
 constexpr std::size_t free_nodes_before_rest = 8;

@@ -9,8 +9,8 @@
 namespace shapegcode {
 namespace {
 
-// What a change of an arc costs beside an angle at which two meet, both in rad^2: arcs that turn now more and now less
-// cancel each other's angles, and are held by it.
+// Weight of a change of an arc relative to the angle at a junction, both in rad^2: it prevents arcs from turning
+// alternately more and less to cancel each other's angles.
 constexpr double change_weight = 0.02;
 constexpr double largest_angle_rad = 0.2;  // a corner is meant
 constexpr double radius_slack_rad = 2e-5;  // by which a shorter R may turn an arc

@@ -7,8 +7,8 @@
 namespace shapegcode {
 
 // Gives arcs another R, and the F for it, so that they meet their neighbours at smaller angles: an arc through the ends
-// and the middle of a block in which the curvature changes is a little off its tangents at both ends. Ends and kinds
-// stay; the middle of an arc moves by `most_mm` at most. For planners that slow where the direction jumps.
+// and the middle of a block in which the curvature changes is a little off its tangents at both ends. Ends and kinds do
+// not change; the middle of an arc moves by at most `most_mm`. For planners that slow where the direction jumps.
 void smooth_arcs(std::vector<FittedBlock>& blocks, const BlockPosition& start, const BlockShape& shape, double most_mm,
                  double increment_mm);
 

@@ -33,18 +33,19 @@ struct OscillatorMotion {
                                             double period_s, double theta = 1.4, double displacement_m = 0.0,
                                             double velocity_m_per_s = 0.0);
 
-/// What is compared: the response (m, m/s or m/s²) of an oscillator of given natural frequency and damping ratio.
+/// The measured response (m, m/s or m/s²), and the natural frequency and damping ratio of the oscillator.
 struct MassProblem {
   TapSignals tap;
   double period_s;
   double omega_rad_s;
   double damping_ratio;
   Quantity quantity = Quantity::acceleration;
-  double theta = 1.4;        ///< of the Wilson theta method
-  double impulse_n_s = 0.0;  ///< besides the force: an impulse just before the first sample, too short for samples
+  double theta = 1.4;  ///< of the Wilson theta method
+  double impulse_n_s =
+      0.0;  ///< in addition to the force: an impulse just before the first sample, too short to be sampled
 };
 
-/// Where bisection looks for the mass and when it stops.
+/// Range of the bisection for the mass, and when it stops.
 struct MassSearch {
   double low_kg = 1e-3;
   double high_kg = 1e3;
@@ -56,20 +57,20 @@ struct EquivalentMass {
   double mass_kg = 0.0;
   double measured_rms = 0.0;   ///< of the response, in its unit
   double simulated_rms = 0.0;  ///< of the Wilson theta response with this mass
-  int halvings = 0;            ///< of the range of masses before its middle was right; 0 in closed form
+  int halvings = 0;            ///< halvings of the range of masses; 0 in closed form
   bool converged = false;      ///< the RMS agree within the tolerance
 };
 
-/// Mass with which the oscillator answers the force with the measured RMS. The response is proportional to 1/m, so one
-/// simulation with 1 kg tells: m = its RMS / measured RMS.
+/// Mass with which the oscillator responds to the force with the measured RMS. The response is proportional to 1/m, so
+/// one simulation with 1 kg is sufficient: m = its RMS / measured RMS.
 ///
 /// Throws Error(argument) on signals that arma_driven refuses (with an impulse, the force may be zero), a response that
 /// is zero throughout, a frequency that is not above 0, a damping ratio outside 0 ... 1, and as wilson_theta. Source:
-/// paper 003, section 2.2; that one simulation is enough, because the RMS goes as 1/m: this project.
+/// paper 003, section 2.2; the closed form: this project.
 [[nodiscard]] EquivalentMass equivalent_mass_closed_form(const MassProblem& problem);
 
-/// The same by halving the range of masses until the RMS agree: paper 003's steps 1 to 7, kept as the check. Errors
-/// also on a range or tolerance that is not positive. A range without solution ends at one of its ends, not converged.
+/// The same by halving the range of masses until the RMS agree: paper 003's steps 1 to 7, kept as a check. Also throws
+/// on a range or tolerance that is not positive. A range without solution ends at one of its ends, not converged.
 [[nodiscard]] EquivalentMass equivalent_mass_bisection(const MassProblem& problem, const MassSearch& search);
 
 }  // namespace shapegcode

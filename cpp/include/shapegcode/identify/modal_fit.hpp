@@ -12,19 +12,19 @@
 
 namespace shapegcode {
 
-/// How the force runs between its samples.
+/// Course of the force between its samples.
 enum class ForceHold : std::uint8_t {
   linear,        ///< straight from sample to sample
-  band_limited,  ///< as behind an anti-aliasing filter: sinc interpolation, right up to .45 of the sampling rate
-  impulse,       ///< blows at the samples, each just before the response is read: force times period is its momentum
+  band_limited,  ///< as after an anti-aliasing filter: sinc interpolation, accurate up to .45 of the sampling rate
+  impulse,  ///< impulses at the samples, each just before the response is sampled: force times period is the momentum
 };
 
-/// What belongs to the model of a tap besides its modes.
+/// Parts of the model of an impact besides its modes.
 struct ModalFitOptions {
   Quantity quantity = Quantity::acceleration;
   /// A constant offset of the response per record.
   bool with_offset = true;
-  /// Modes far below: the structure moves like a free mass, displacement = integral of the integral of force, over it.
+  /// Modes far below: the structure moves like a free mass, displacement = double integral of the force / mass.
   bool with_mass_line = false;
   /// Modes far above: a spring without mass, displacement = compliance * force (acceleration: the force's second
   /// difference).
@@ -33,7 +33,7 @@ struct ModalFitOptions {
   bool coloured_residuals = false;
   ForceHold hold = ForceHold::linear;
   /// Standard deviation in N of white noise on the measured force. In a pulse of up to 128 samples the true force is
-  /// estimated along with the modes; the effect on a longer one is added to the covariance, to first order.
+  /// estimated together with the modes; the effect on a longer pulse is added to the covariance, to first order.
   double force_noise_n = 0.0;
   int most_iterations = 60;
 };
@@ -43,16 +43,16 @@ struct FitQuality {
   double sum_of_squares = 0.0;            ///< of the residuals, in the response's unit squared
   double log_likelihood = 0.0;            ///< for white normal residuals of the same variance in all records
   std::size_t samples = 0;                ///< of all records together
-  std::size_t parameters = 0;             ///< fitted ones, offsets and amplitudes included
+  std::size_t parameters = 0;             ///< fitted ones, including offsets and amplitudes
   double residual_autocorrelation = 0.0;  ///< at a lag of one sample, no unit; white noise: about 0
   std::vector<double> residual_rms;       ///< per record, in the response's unit
-  std::vector<Eigen::VectorXd> fitted;    ///< per record: the model's response, offset included
+  std::vector<Eigen::VectorXd> fitted;    ///< per record: the model's response, including the offset
   int iterations = 0;
   bool converged = false;
   std::string reason;  ///< why it has not converged; empty if it has
 };
 
-/// Result of fit_modes. Entry r belongs to the r-th start; a mode may have passed another one.
+/// Result of fit_modes. Entry r belongs to the r-th start; modes may have changed their order.
 struct ModalFit {
   std::vector<double> omega_rad_s;    ///< undamped natural frequencies
   std::vector<double> damping_ratio;  ///< no unit
@@ -64,15 +64,15 @@ struct ModalFit {
   FitQuality quality;
 };
 
-/// Fits modes to taps by output error: the least squares, for white noise on the response the maximum likelihood, of
-/// measured minus modelled response. The model is the sum over modes of (1/m) s^q/(s^2 + 2 zeta omega s + omega^2)
-/// applied to the measured force (q = 0 displacement, 1 velocity, 2 acceleration), from rest at the first sample; the
-/// force runs between its samples as `hold` says and the modes are propagated exactly.
+/// Fits modes to impacts by output error: least squares of measured minus modelled response (maximum likelihood for
+/// white noise on the response). The model is the sum over modes of (1/m) s^q/(s^2 + 2 zeta omega s + omega^2) applied
+/// to the measured force (q = 0 displacement, 1 velocity, 2 acceleration), from rest at the first sample; between its
+/// samples the force follows `hold`, and the modes are propagated exactly.
 ///
 /// `start`: n >= 1 modes (rad/s, below Nyquist; 0 < zeta < 1), e.g. from arma_driven. The fit is Levenberg-Marquardt in
-/// ln omega and ln zeta with exact derivatives; 1/m and what the options add are linear and eliminated (variable
-/// projection). The covariance is the residual variance over (J'J), with degrees of freedom = samples - parameters;
-/// noise on the force adds, to first order, what it does to the modelled response.
+/// ln omega and ln zeta with exact derivatives; 1/m and the parameters of the options are linear and eliminated
+/// (variable projection). The covariance is the residual variance over (J'J), with degrees of freedom = samples -
+/// parameters; noise on the force adds its effect on the modelled response, to first order.
 ///
 /// Throws Error(argument) on signals that arma_driven refuses, a period or start outside its range, or too few samples
 /// for the parameters. The result reports whether it converged. Source: L. Ljung, System Identification, ch. 7.
@@ -106,33 +106,33 @@ struct DecayFit {
 
 /// Fits free decays: response = sum over modes of A exp(-zeta omega t) cos(omega_d t + phase), plus an offset, t from
 /// the first sample, by least squares (for white noise the maximum likelihood). omega and zeta are common to the
-/// records, amplitude and phase are each record's own. Whether displacement, velocity or acceleration was measured
-/// makes no difference.
+/// records, amplitude and phase are separate for each record. The measured quantity (displacement, velocity or
+/// acceleration) makes no difference.
 ///
 /// `start`: n >= 1 modes (rad/s, below Nyquist; 0 < zeta < 1), e.g. from arma_decay. Method and errors as in fit_modes.
 [[nodiscard]] DecayFit fit_decay(Responses responses, double period_s, const NaturalModes& start,
                                  const DecayFitOptions& options);
 
-/// Candidates in the order in which they explain most of what those before them leave.
+/// Candidates in the order in which each explains most of the remaining residual.
 struct ModeRanking {
   std::vector<std::size_t> chosen;     ///< indices into the candidates
-  std::vector<double> sum_of_squares;  ///< of what is left after each choice, in the response's unit squared
-  double total = 0.0;                  ///< of the responses, offsets taken out
+  std::vector<double> sum_of_squares;  ///< of the residual after each choice, in the response's unit squared
+  double total = 0.0;                  ///< of the responses, without offsets
 };
 
-/// Ranks candidates for the modes of taps by forward selection: at each step the candidate whose response to the force,
-/// together with those already chosen, leaves the least squares; residues are fitted, frequencies and damping ratios
-/// are not. Gives starts for fit_modes out of the poles of a stabilisation chart, also where the model with just as
-/// many modes misses a weak one. Stops early where no candidate explains anything more.
+/// Ranks candidates for the modes of impacts by forward selection: each step chooses the candidate that, together with
+/// those already chosen, gives the smallest sum of squares; residues are fitted, frequencies and damping ratios are
+/// not. Provides starts for fit_modes from the poles of a stabilisation chart, even if the model with the same number
+/// of modes misses a weak one. Stops early if no candidate explains more.
 ///
-/// `candidates` as the starts of fit_modes; `most` >= 1: how many to choose. The first `kept` of them are chosen before
-/// all others, in their order: handed over as fitted, they leave only what is new to the rest of the candidates. Throws
+/// `candidates` as the starts of fit_modes; `most` >= 1: number to choose. The first `kept` of them (modes already
+/// fitted) are chosen before all others, in their order, so that the others explain only the remaining residual. Throws
 /// Error(argument) as fit_modes.
 [[nodiscard]] ModeRanking rank_modes(std::span<const TapSignals> taps, double period_s, const NaturalModes& candidates,
                                      std::size_t most, std::size_t kept = 0,
                                      Quantity quantity = Quantity::acceleration);
 
-/// The same for free decays: amplitude and phase are each record's own.
+/// The same for free decays: amplitude and phase are separate for each record.
 [[nodiscard]] ModeRanking rank_modes(Responses responses, double period_s, const NaturalModes& candidates,
                                      std::size_t most, std::size_t kept = 0);
 

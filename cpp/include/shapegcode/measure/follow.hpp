@@ -10,14 +10,14 @@
 
 namespace shapegcode {
 
-/// By how much, and in which direction, a table leaves the path that its command follows: what a picture magnifies.
-/// `ContourTracker` says the same with a sign.
+/// Deviation vectors of the response from the path that its command follows, for magnified pictures. `ContourTracker`
+/// gives signed distances.
 class PathFollower {
  public:
   /// Both are expected at the path's start. Throws Error(argument) on a path without segments.
   explicit PathFollower(const Path& path);
-  /// The next samples of both, (k, 3), mm. Returns from foot to response, (k, 3), mm; rows that are not finite stay
-  /// so. Throws Error(argument) where the two differ in length.
+  /// The next samples of both, (k, 3), mm. Returns the vectors from foot to response, (k, 3), mm; rows that are not
+  /// finite stay so. Throws Error(argument) if the two differ in length.
   [[nodiscard]] Eigen::MatrixXd step(const Eigen::Ref<const Eigen::MatrixXd>& command_mm,
                                      const Eigen::Ref<const Eigen::MatrixXd>& response_mm);
 
@@ -28,11 +28,11 @@ class PathFollower {
   std::size_t cursor_ = 0;
 };
 
-/// Fewer samples of curves over time: which rows remain so that every curve, drawn straight between them, stays within
-/// its tolerance at every row that is left out (Douglas and Peucker 1973, with distance taken along the value). First
-/// and last row remain, and one of 512 at the least. `times`: (n), rising; `values`: (n, curves); `tolerances`: one for
-/// each curve, above 0. O(n). Throws Error(argument) on other shapes, times that do not rise, a tolerance that is not
-/// above 0, or a value that is not finite.
+/// Decimates curves over time: selects rows such that every curve, drawn straight between them, stays within its
+/// tolerance at every omitted row (Douglas and Peucker 1973, with distance along the value). First and last row are
+/// kept, and at least one of 512. `times`: (n), rising; `values`: (n, curves); `tolerances`: one for each curve, above
+/// 0. O(n). Throws Error(argument) on other shapes, times that do not rise, a tolerance that is not above 0, or a value
+/// that is not finite.
 [[nodiscard]] std::vector<std::size_t> thin_curves(const Eigen::Ref<const Eigen::VectorXd>& times,
                                                    const Eigen::Ref<const Eigen::MatrixXd>& values,
                                                    const Eigen::Ref<const Eigen::VectorXd>& tolerances);

@@ -14,7 +14,7 @@
 
 namespace shapegcode {
 
-/// The circle of least squares of radial distance through points.
+/// Least-squares circle through points (radial distances).
 struct CircleFit {
   Eigen::Vector2d centre_mm = Eigen::Vector2d::Zero();
   double radius_mm = 0.0;
@@ -30,32 +30,32 @@ struct CircleFit {
 /// Figures of a profile after ISO 4287 (ISO 21920-2), in mm.
 struct Roughness {
   double cutoff_mm = 0.0;     ///< lambda_c: separates roughness from waviness
-  double evaluated_mm = 0.0;  ///< length that the figures speak of: the profile less one cut-off at each end
+  double evaluated_mm = 0.0;  ///< evaluation length: the profile less one cut-off at each end
   double ra_mm = 0.0;         ///< arithmetic mean height of the roughness profile
   double rz_mm = 0.0;         ///< mean over sampling lengths (one cut-off each) of highest peak less deepest valley
   double wa_mm = 0.0;         ///< arithmetic mean height of the waviness profile
 };
 
 /// Gaussian low-pass of ISO 16610-21: weight exp(-pi (x / (alpha L))^2) / (alpha L), alpha = sqrt(ln 2 / pi), so that a
-/// wave of length L comes through with one half. The weights end at one L to either side (where they are 1e-6 of the
-/// middle) and are made to sum to one, also where the profile ends within them. Throws Error(argument) unless spacing
-/// and cut-off are > 0 and the profile is finite.
+/// wave of length L is transmitted with a factor of one half. The weights end at one L on either side (where they are
+/// 1e-6 of the middle) and are normalised to a sum of one, also where the profile ends within them. Throws
+/// Error(argument) unless spacing and cut-off are > 0 and the profile is finite.
 [[nodiscard]] std::vector<double> gaussian_low_pass(std::span<const double> profile_mm, double spacing_mm,
                                                     double cutoff_mm);
 
-/// Roughness and waviness of an evenly spaced profile. `lambda_s_mm` > 0 smooths it first (0: no such filter). What is
-/// waviness is measured from its own mean: form has to be removed before. Throws Error(argument) if less than one
-/// sampling length remains, or as gaussian_low_pass() does.
+/// Roughness and waviness of an evenly spaced profile. `lambda_s_mm` > 0 smooths it first (0: no such filter). Waviness
+/// is measured from its own mean: remove form before. Throws Error(argument) if less than one sampling length remains,
+/// or as gaussian_low_pass() does.
 [[nodiscard]] Roughness measure_roughness(std::span<const double> profile_mm, double spacing_mm, double cutoff_mm,
                                           double lambda_s_mm = 0.0);
 
-/// What a plant does while its command stands still.
+/// Vibration of a plant while its command is at rest.
 struct RestVibration {
-  double begin_s = 0.0;                   ///< the command stands still from here on
-  double observed_s = 0.0;                ///< for so long
+  double begin_s = 0.0;                   ///< start of the rest of the command
+  double observed_s = 0.0;                ///< duration of the rest
   Vector3 residual_mm = Vector3::Zero();  ///< largest |response - command|
-  /// From the beginning of the rest until |response - command| stays within the band; NaN where it still left the band
-  /// in the last eighth of what was observed, so that nothing shows that it stays.
+  /// From the beginning of the rest until |response - command| stays within the band; NaN if it left the band in the
+  /// last eighth of the observed time, so that it may leave it again.
   Vector3 settling_s = Vector3::Zero();
 };
 
@@ -63,15 +63,15 @@ struct RestVibration {
 /// the parabola through three samples gives the height (for a wave of 8 samples per period exact to 0.5 %).
 class VibrationWatch {
  public:
-  /// A rest is where the command moves no axis by more than 1e-9 mm per period. Throws Error(argument) unless period
+  /// The command is at rest while no axis moves by more than 1e-9 mm per period. Throws Error(argument) unless period
   /// and band are > 0.
   VibrationWatch(double period_s, double band_mm);
 
-  /// Whether a next sample of the command would end its rest.
+  /// Whether this next sample of the command would end its rest.
   [[nodiscard]] bool moves(const Vector3& command) const noexcept;
   /// Takes the next sample. Returns |response - command| at it, or just before it if that is larger, mm.
   Vector3 step(const Vector3& command, const Vector3& response) noexcept;
-  /// The rest in which the command stands now; `observed_s` 0 while it moves.
+  /// The present rest of the command; `observed_s` 0 while it moves.
   [[nodiscard]] RestVibration rest() const noexcept;
 
  private:
@@ -92,7 +92,7 @@ enum class SectionKind : std::uint8_t {
   curve,  ///< anything else
 };
 
-/// A section of a path that is measured by itself.
+/// A section of a path that is measured separately.
 struct PathSection {
   std::size_t first = 0;  ///< index of its first segment
   std::size_t last = 0;   ///< inclusive
@@ -112,9 +112,9 @@ struct LineRange {
   std::uint32_t last = 0;
 };
 
-/// The whole path as sections: maximal runs of lines of one direction (1e-4 rad) and of arcs about one centre (1 µm)
-/// with one radius (1 µm) and sense. Runs shorter than `short_mm` that follow each other (a curve that a CAM system
-/// cut into pieces) are one section of the kind `curve`. Throws Error(argument) if `short_mm` is not finite or < 0.
+/// The whole path as sections: maximal sequences of lines of one direction (1e-4 rad) and of arcs about one centre (1
+/// µm) with one radius (1 µm) and sense. Successive sequences shorter than `short_mm` (a curve that a CAM system
+/// divided) are one section of the kind `curve`. Throws Error(argument) if `short_mm` is not finite or < 0.
 [[nodiscard]] std::vector<PathSection> path_sections(const Path& path, double short_mm = 0.5);
 
 /// The parts of a path that come from given source lines, in the order of the path; a range that the path enters
@@ -124,18 +124,18 @@ struct LineRange {
 /// The walls that a round tool leaves on the left and right of a path: the envelope of a disc (tool axis Z, seen from
 /// above) that is swept in straight lines from one sample to the next.
 ///
-/// Stations stand evenly along each section, in the middle of their cells. At each one the wall is where the swept area
-/// ends on the horizontal normal of the path; exactly, not on a raster. Only what is swept while the foot of the tool's
-/// centre lies within one tool radius along the path counts: another pass of the path nearby cuts a wall of its own.
-/// What the programmed path itself would cut so is the reference: a wall's deviation is positive to the left of it, on
-/// either side of the path (at a left wall: material too much removed; at a right wall: material left standing).
-/// Where the programmed walls of two legs run into each other (inside of corners and of arcs narrower than the tool)
-/// there is no wall to measure.
+/// Stations lie evenly along each section, in the middle of their cells. At each one the wall is the end of the swept
+/// area on the horizontal normal of the path, computed exactly, not on a grid. Only the area swept while the foot of
+/// the tool's centre lies within one tool radius along the path counts: another pass of the path nearby cuts a separate
+/// wall. The reference is the wall cut by the programmed path itself. A wall's deviation is positive to the left of it,
+/// on either side of the path (at a left wall: too much material removed; at a right wall: material left). Where the
+/// programmed walls of two legs intersect (inside of corners and of arcs narrower than the tool) there is no wall to
+/// measure.
 ///
 /// Memory is proportional to the number of stations. `sweep` does not allocate.
 class SweptWalls {
  public:
-  /// What remains at the stations of a section, in order; NaN where there is no wall. mm.
+  /// Wall deviations at the stations of a section, in order; NaN where there is no wall. mm.
   struct Profile {
     double spacing_mm = 0.0;
     double first_mm = 0.0;  ///< distance of the first station from the path's start
@@ -145,14 +145,14 @@ class SweptWalls {
     std::vector<Eigen::Vector2d> normal;  // unit, to the left; zero where the path has no horizontal direction
   };
 
-  /// `spacing_mm` is the largest distance of two stations; it becomes wider where the path would need more than
+  /// `spacing_mm` is the largest distance between two stations; it is increased if the path would need more than
   /// `max_stations`. Throws Error(argument) on a tool radius or spacing that is not > 0, or a path of more than 1e8
   /// tool radii.
   SweptWalls(const Path& path, const std::vector<PathSection>& sections, double tool_radius_mm, double spacing_mm,
              std::size_t max_stations = 500'000);
 
-  /// The tool's centre goes from one point to another; the arc lengths are those of their feet on the path, the
-  /// deviation that of the further one from the path.
+  /// Sweeps a move of the tool's centre; the arc lengths are those of the feet of its ends on the path, the deviation
+  /// the larger one of both ends from the path.
   void sweep(const Vector3& from, const Vector3& to, double from_foot_mm, double to_foot_mm,
              double deviation_mm) noexcept;
   [[nodiscard]] Profile profile(std::size_t section) const;
@@ -192,8 +192,8 @@ struct MetrologyOptions {
   double period_s = 0.001;           ///< between two samples
   double tool_radius_mm = 1.5;       ///< of the disc that is swept along the response
   double station_spacing_mm = 0.05;  ///< largest distance of two stations; see SweptWalls
-  double band_mm = 0.001;            ///< settled is what stays within this of the command
-  double least_rest_s = 0.02;        ///< a shorter standstill inside of the path is no stop
+  double band_mm = 0.001;            ///< settled: the response stays within this of the command
+  double least_rest_s = 0.02;        ///< a shorter rest within the path is no stop
   double cutoff_mm = 0.0;            ///< lambda_c; 0: that of ISO 4288 for each section's length
   double lambda_s_mm = 0.0;          ///< 0: none
 };
@@ -207,14 +207,14 @@ struct WallFigures {
   [[nodiscard]] double band_mm() const noexcept { return largest_mm - least_mm; }
 };
 
-/// A circle through what was moved or cut on an arc, beside the programmed one.
+/// A circle fitted to the motion or cut on an arc, for comparison with the programmed one.
 struct ArcFigures {
   CircleFit fit;
   double mean_radius_mm = 0.0;  ///< mean distance from the programmed centre
 };
 
-/// Largest distance from the path on each side of it, mm. A deviation counts on one side alone: above or below where it
-/// is more along Z than across it, else left or right; beside a travel along Z only on none.
+/// Largest distance from the path on each side of it, mm. A deviation counts on one side only: above or below if it is
+/// more along Z than across it, else left or right; on none for travel along Z only.
 struct SideFigures {
   double left_mm = 0.0;
   double right_mm = 0.0;
@@ -226,7 +226,7 @@ struct SideFigures {
 /// What was measured in one section.
 struct SectionFigures {
   PathSection section;
-  double time_s = 0.0;                ///< while the foot of the command is in it
+  double time_s = 0.0;                ///< while the foot of the command is in the section
   Vector3 peak_mm = Vector3::Zero();  ///< largest |response - command| while the command moves
   std::optional<RestVibration> rest;  ///< the worst stop of the command in it (largest residual)
   DeviationStats command;             ///< signed, from the path; RMS while the command moves
@@ -242,7 +242,7 @@ struct SectionFigures {
   std::optional<ArcFigures> response_arc;
   std::optional<ArcFigures> left_wall_arc;  ///< of arcs in the XY plane that leave a wall on this side
   std::optional<ArcFigures> right_wall_arc;
-  WallFigures left;  ///< deviation from what the programmed path cuts, positive to the left
+  WallFigures left;  ///< deviation from the wall cut by the programmed path, positive to the left
   WallFigures right;
   WallFigures width;                        ///< left less right wall, with the tool's diameter
   std::optional<Roughness> left_roughness;  ///< of the longest section of wall without a gap
@@ -254,26 +254,26 @@ struct TrackFigures {
   std::vector<SectionFigures> sections;
   double duration_s = 0.0;  ///< until the command rests for the last time
   RestVibration rest;       ///< the stop at the end
-  DeviationStats command;   ///< as SimulationFigures has them: corners that were missed count
+  DeviationStats command;   ///< as in SimulationFigures: missed corners count
   DeviationStats response;
   SideFigures command_sides;
   SideFigures response_sides;
 };
 
-/// Measures what a run of samples does to the sections of a path, sample by sample. Memory is bounded by the path and
-/// the number of stations on it, not by the samples. A section's stations stand in the middle of cells of equal length
-/// that fill it; circles are fitted to the points at which the track passes them, so that every part of an arc weighs
-/// the same however slowly it is passed.
+/// Measures a motion per section of a path, sample by sample. Memory is bounded by the path and the number of stations
+/// on it, not by the samples. A section's stations lie in the middle of cells of equal length that fill it. Circles are
+/// fitted to the points at which the track passes the stations, so that every part of an arc has the same weight at any
+/// speed.
 class SectionMetrology {
  public:
   /// Copies what it needs of the path. Throws Error(argument) on a path without length, sections that are not of this
   /// path, or an option outside its range.
   SectionMetrology(const Path& path, std::vector<PathSection> sections, const MetrologyOptions& options);
 
-  /// Next sample of both, mm; the first is the start. Does not allocate. Samples that are not finite are an error that
-  /// the caller excludes.
+  /// Next sample of both, mm; the first is the start. Does not allocate. The caller must exclude samples that are not
+  /// finite.
   void step(const Vector3& command, const Vector3& response) noexcept;
-  /// Everything measured so far. May be called once more after further samples.
+  /// Everything measured so far. May be called again after further samples.
   [[nodiscard]] TrackFigures finish() const;
   /// Deviations of the walls at the stations of a section.
   [[nodiscard]] SweptWalls::Profile wall_profile(std::size_t section) const { return walls_.profile(section); }

@@ -11,7 +11,7 @@
 
 namespace shapegcode {
 
-/// What bounds a feed over one revolution of the spindle; infinite: no limit.
+/// Limits of a feed over one revolution of the spindle; infinite: no limit.
 struct FeedLimits {
   static constexpr double none = std::numeric_limits<double>::infinity();
 
@@ -30,7 +30,7 @@ struct FeedLimits {
 void check(const FeedLimits& limits);
 
 enum class FeedLimit : std::uint8_t {
-  none,  ///< the highest feed asked for is within all limits
+  none,  ///< the highest requested feed is within all limits
   resultant,
   deflection,
   torque,
@@ -40,38 +40,38 @@ enum class FeedLimit : std::uint8_t {
 
 struct LimitedFeed {
   double feed_mm_per_min = 0.0;
-  FeedLimit limit = FeedLimit::none;  ///< the one that is reached first
-  bool within = true;                 ///< false: even the lowest feed is beyond the limit, and it is returned
+  FeedLimit limit = FeedLimit::none;  ///< the limit reached first
+  bool within = true;                 ///< false: even the lowest feed exceeds the limit, and it is returned
 };
 
 /// The highest feed between `lowest` and `highest` (mm/min) that stays within all limits. Never above a limit, and
-/// where a limit binds within 0.02 % of it. Throws Error(argument) on limits or an engagement that `check` or `figures`
+/// within 0.02 % of the limit reached. Throws Error(argument) on limits or an engagement that `check` or `figures`
 /// refuse, or unless 0 < lowest <= highest.
 [[nodiscard]] LimitedFeed largest_feed(MillingForce& force, std::span<const EngagedArc> arcs, const FeedLimits& limits,
                                        double lowest, double highest);
 
-/// The same for every sample of a track, feeds along the path (its horizontal part makes the chip); where nothing is
-/// met or the tool only plunges: the highest. Throws as largest_feed.
+/// The same for every sample of a track, feeds along the path (the horizontal component makes the chip); without
+/// engagement, or if the tool only plunges, the highest feed. Throws as largest_feed.
 [[nodiscard]] std::vector<LimitedFeed> largest_feeds(MillingForce& force, const EngagementTrack& track,
                                                      const FeedLimits& limits, double lowest, double highest);
 
-/// How fast a path may be run: `feed_mm_per_min[i]` holds on the section that ends at `s_mm[i]` and begins at the
-/// station before it (0 before the first). Ascending; the last one is the path's end.
+/// Highest feeds along a path: `feed_mm_per_min[i]` is valid on the section that ends at `s_mm[i]` and begins at the
+/// previous station (at 0 for the first). Ascending; the last station is the path's end.
 struct FeedStations {
   std::vector<double> s_mm;
   std::vector<double> feed_mm_per_min;
 };
 
-/// What a block is to the scheduler.
+/// A block in the scheduler.
 struct FeedBlock {
   double end_mm = 0.0;           ///< of the block, along the path
-  double kept_mm_per_min = 0.0;  ///< it keeps this feed; 0: it may get another one
+  double kept_mm_per_min = 0.0;  ///< fixed feed; 0: it may get another one
   bool divisible = false;        ///< may be divided into several blocks
 };
 
 struct FeedScheduleOptions {
-  double least_length_mm = 0.6;  ///< over which a feed stays, and of a piece of a divided block
-  /// From one feed to the next, as far as feeds that are kept allow.
+  double least_length_mm = 0.6;  ///< minimum length of a section of one feed, and of a piece of a divided block
+  /// Largest change from one feed to the next, as far as fixed feeds allow.
   double most_change_mm_per_min = std::numeric_limits<double>::infinity();
   double resolution_mm_per_min = 0.1;  ///< feeds are whole multiples, rounded down
 };
@@ -83,10 +83,10 @@ struct FeedStretch {
   double feed_mm_per_min = 0.0;
 };
 
-/// Feeds of a path in the shortest time that the stations allow: sections that begin and end where a block does or
-/// within a divisible one, none shorter than the least length (but where kept blocks leave no more room), each at the
-/// lowest feed of its stations. The borders are chosen together (dynamic programming), with a charge for each of one
-/// percent of the shortest section's time, so that none is made for nothing. O(stations + length).
+/// Feeds of a path for the shortest time within the stations' feeds: sections that begin and end at block ends or
+/// within divisible blocks, none shorter than the minimum length (unless between blocks of fixed feed), each at the
+/// lowest feed of its stations. All boundaries are chosen together (dynamic programming), with a cost for each of one
+/// percent of the shortest section's time, which prevents useless boundaries. O(stations + length).
 ///
 /// Throws Error(argument) on stations or blocks that do not ascend to one end above 0, a feed that is not above 0, or
 /// options outside their range.
@@ -97,13 +97,13 @@ struct FeedStretch {
 /// sections do not cover the path.
 [[nodiscard]] Path with_feeds(const Path& path, std::span<const FeedStretch> sections);
 
-/// Lowers the feeds around each station that the load holds, because the travel lags behind a change of feed: a change
-/// down must be commanded so early that the travel has followed, `before_s` times the feed that the load allows, and a
-/// change up not before the travel has left, `behind_s` times it. `load_mm_per_min`: the largest feed that the load at
-/// a station allows, which may be above what is wanted there. One entry of each per station.
+/// Lowers the feeds around each station that is limited by its load, because the motion lags behind a change of feed. A
+/// lower feed must be commanded earlier, by `before_s` times the feed that the load allows; a higher one later, by
+/// `behind_s` times it. `load_mm_per_min`: the largest feed that the load at a station allows, which may be above the
+/// desired one. One entry of each per station.
 ///
-/// Behind a filter of mean delay m and length d a change commanded at a position begins m times the slower feed before
-/// it and has ended d - m times the slower feed behind it.
+/// After a filter of mean delay m and length d, a change commanded at a position begins m times the slower feed before
+/// it and ends d - m times the slower feed after it.
 void look_ahead_on_load(FeedStations& stations, std::span<const double> load_mm_per_min,
                         std::span<const double> before_s, std::span<const double> behind_s);
 

@@ -11,7 +11,7 @@
 
 namespace shapegcode {
 
-/// Sense in which the spindle turns, seen from the spindle towards the work piece.
+/// Direction of spindle rotation, seen from the spindle towards the workpiece.
 enum class SpindleSense : std::uint8_t {
   clockwise,          ///< M03
   counter_clockwise,  ///< M04
@@ -22,7 +22,7 @@ struct EndMill {
   double diameter_mm = 0.0;
   int flutes = 0;
   double helix_rad = 0.0;  ///< of a right-hand helix on a right-hand cutter: the tip enters first
-  /// How far each flute stands out beyond the mean radius, in the order in which they cut; empty: no runout.
+  /// Radius of each flute less the mean radius, in the order in which they cut; empty: no runout.
   std::vector<double> runout_mm = {};
 
   [[nodiscard]] double radius_mm() const noexcept { return 0.5 * diameter_mm; }
@@ -43,17 +43,17 @@ struct EngagedArc {
   double top_mm = 0.0;
 };
 
-/// What the tool meets along a path, in the order of travel; columns of one length but for `arcs`.
+/// Engagement of the tool along a path, in the order of travel; all columns except `arcs` have the same length.
 struct EngagementTrack {
-  std::vector<double> s_mm;  ///< distance along the path at which the sample stands
+  std::vector<double> s_mm;  ///< distance of the sample along the path
   std::vector<double> x_mm;  ///< of the tool's axis
   std::vector<double> y_mm;
-  std::vector<double> direction_rad;     ///< of feed in the XY plane, from +X; 0 where the tool only plunges
-  std::vector<double> horizontal;        ///< share of the travel that lies in the XY plane: 1 level, 0 a plunge
-  std::vector<std::uint32_t> segment;    ///< of the path
-  std::vector<double> radial_depth_mm;   ///< width of what is met, across the direction of feed: R (sin to - sin from)
-  std::vector<double> section_mm2;       ///< area across the direction of feed; times the feed: material removal rate
-  std::vector<double> plunged_mm2;       ///< area of material below the end of a tool that goes down (0: goes level)
+  std::vector<double> direction_rad;    ///< of feed in the XY plane, from +X; 0 where the tool only plunges
+  std::vector<double> horizontal;       ///< component of the travel in the XY plane: 1 level, 0 a plunge
+  std::vector<std::uint32_t> segment;   ///< of the path
+  std::vector<double> radial_depth_mm;  ///< width of cut, perpendicular to the feed: R (sin to - sin from)
+  std::vector<double> section_mm2;  ///< area of cut, perpendicular to the feed; times the feed: material removal rate
+  std::vector<double> plunged_mm2;  ///< area of material below the end of a descending tool (0: level)
   std::vector<std::uint32_t> first_arc;  ///< size() + 1 entries, into `arcs`
   std::vector<EngagedArc> arcs;
 
@@ -63,15 +63,15 @@ struct EngagementTrack {
   }
 };
 
-/// An end mill as a beam that is clamped at its overhang: a shank, and below it the fluted part, which is as stiff as a
-/// round bar of an effective diameter. Heights count from the tip.
+/// An end mill as a beam clamped at its overhang: a shank, and below it the fluted part, modelled as a round bar of an
+/// effective diameter. Heights count from the tip.
 struct ToolBeam {
-  double overhang_mm = 0.0;            ///< from the tip to where it is clamped (effective length of paper 001)
+  double overhang_mm = 0.0;            ///< from the tip to the clamping (effective length of paper 001)
   double fluted_length_mm = 0.0;       ///< from the tip; at or above the overhang: no shank is free
   double effective_diameter_mm = 0.0;  ///< of the fluted part: about 0.8 of the cutter's diameter
   double shank_diameter_mm = 0.0;
   double young_modulus_gpa = 0.0;
-  /// Springs across the axis between the clamped end and the frame, one behind the other.
+  /// Springs across the axis between the clamped end and the frame, in series.
   double holder_n_per_um = std::numeric_limits<double>::infinity();
   double spindle_n_per_um = std::numeric_limits<double>::infinity();
 };
@@ -81,11 +81,11 @@ struct ToolBeam {
 void check(const ToolBeam& beam);
 
 /// Deflection at one height under a load of 1 N across the axis at another, um/N: Euler-Bernoulli beam of two sections
-/// in closed form, springs added. The same when both heights change places. Heights beyond the overhang count as
-/// clamped. The beam is taken as checked.
+/// in closed form, plus springs. Symmetric in both heights. Heights beyond the overhang count as clamped. The beam must
+/// be checked before.
 [[nodiscard]] double compliance_um_per_n(const ToolBeam& beam, double at_mm, double load_mm) noexcept;
 
-/// Which chip thickness the specific cutting force belongs to.
+/// Chip thickness used in the specific cutting force.
 enum class ChipThickness : std::uint8_t {
   mean,   ///< of the whole engagement: how paper 001 fits its coefficients
   local,  ///< of each element of a flute
@@ -122,9 +122,10 @@ struct ForceFigures {
 
 /// Forces on the tool over one revolution, sample by sample; frame of the tool.
 struct ForceCurve {
-  Eigen::VectorXd turned_rad;  ///< by the spindle, in its own sense; at 0 the first flute's tip looks along the feed
-  Eigen::MatrixX2d force_n;    ///< (n_angles, 2)
-  Eigen::VectorXd torque_nm;   ///< (n_angles,); positive: against the spindle
+  Eigen::VectorXd
+      turned_rad;  ///< spindle angle in its direction of rotation; at 0 the first flute's tip points along the feed
+  Eigen::MatrixX2d force_n;               ///< (n_angles, 2)
+  Eigen::VectorXd torque_nm;              ///< (n_angles,); positive: against the spindle
   std::vector<Eigen::MatrixX2d> flute_n;  ///< of each flute, (n_angles, 2)
 };
 
@@ -133,15 +134,15 @@ struct ForceCurve {
 [[nodiscard]] Eigen::Vector2d machine_frame(const Eigen::Vector2d& tool_frame, double direction_rad) noexcept;
 
 /// Forces of an end mill at one engagement. The chip of a tooth at azimuth p is feed per tooth * cos p thick (paper 001
-/// eq. 1); with runout that of flute i is the least of m * feed per tooth * cos p + r_i - r_(i-m), m >= 1, and not
-/// below 0. A flute with a helix takes its force from the integral of the chip's powers over azimuth, so nothing is cut
-/// into discs. With a counter-clockwise spindle all is mirrored, helix and order of the flutes included. The mean chip
-/// thickness, where the coefficients ask for it, is that of the whole engagement without runout.
+/// eq. 1); with runout that of flute i is the minimum of m * feed per tooth * cos p + r_i - r_(i-m), m >= 1, and not
+/// below 0. The force of a helical flute is an integral of the chip's powers over azimuth, without dividing the tool
+/// into discs. With a counter-clockwise spindle everything is mirrored, including helix and order of the flutes. The
+/// mean chip thickness, if the coefficients require it, is that of the whole engagement without runout.
 ///
-/// Holds the tables that many engagements share, and the last engagement, so make one and keep it. Not for several
-/// threads at a time. All members throw Error(argument) on an arc that does not lie within -pi/2 ... pi/2 and above the
-/// tip, or up to which a flute winds more than 1000 times around the tool, on a feed that is negative or not finite, or
-/// an angle of the spindle beyond 1e9 rad; a feed of 0 and an empty engagement give zeros.
+/// Stores tables shared by many engagements, and the last engagement, so reuse one object. Not thread-safe. All members
+/// throw Error(argument) on an arc that does not lie within -pi/2 ... pi/2 and above the tip, or up to which a flute
+/// winds more than 1000 times around the tool, on a feed that is negative or not finite, or an angle of the spindle
+/// beyond 1e9 rad; a feed of 0 and an empty engagement give zeros.
 class MillingForce {
  public:
   /// Throws Error(argument) on a tool or coefficients that `check` refuses, or a speed that is not positive.
@@ -160,18 +161,18 @@ class MillingForce {
   [[nodiscard]] double feed_per_tooth_mm(double feed_mm_per_min) const noexcept;
 
   /// Figures over one revolution at a feed along the path. Means of force and torque are exact; the mean of the
-  /// magnitude and the peaks are good to 0.1 % (angles at most 4 degrees apart, ends of arcs included, parabolas
+  /// magnitude and the peaks are accurate to 0.1 % (angles at most 4 degrees apart, ends of arcs included, parabolas
   /// between).
   [[nodiscard]] ForceFigures figures(std::span<const EngagedArc> arcs, double feed_mm_per_min);
 
-  /// The same without the largest force on a single flute, which stays 0: what a search for a feed needs.
+  /// The same without the largest force on a single flute, which stays 0; for the search of a feed.
   [[nodiscard]] ForceFigures quick_figures(std::span<const EngagedArc> arcs, double feed_mm_per_min);
 
   /// Forces at `angles` equal steps of the spindle. Throws Error(argument) on angles < 1.
   [[nodiscard]] ForceCurve curve(std::span<const EngagedArc> arcs, double feed_mm_per_min, int angles);
 
   /// Largest deflection of the tip over one revolution, um: quasi-static, the beam under the load along its flutes.
-  /// Throws Error(argument) also on an engagement above the overhang.
+  /// Also throws Error(argument) on an engagement above the overhang.
   [[nodiscard]] double peak_deflection_um(std::span<const EngagedArc> arcs, double feed_mm_per_min,
                                           const ToolBeam& beam);
 
@@ -205,7 +206,7 @@ enum class ForceColumn : std::uint8_t {
 };
 inline constexpr int force_columns = 9;
 
-/// `feed_mm_per_min`: along the path, one per sample; the chip comes from its horizontal part. Throws as
+/// `feed_mm_per_min`: along the path, one per sample; its horizontal component makes the chip. Throws as
 /// MillingForce::figures, and on another number of feeds. The deflection of the tip is 0 without a beam.
 [[nodiscard]] Eigen::MatrixXd figures_of(MillingForce& force, const EngagementTrack& track,
                                          std::span<const double> feed_mm_per_min, const ToolBeam* beam = nullptr);
@@ -217,23 +218,23 @@ enum class WallSide : std::uint8_t {
   left,
 };
 
-/// An arc that ends this close to +-pi/2 counts as reaching the wall; a bit more than what a material model of 20 um
-/// leaves open.
+/// An arc that ends this close to +-pi/2 counts as reaching the wall; slightly more than the uncertainty of a material
+/// model of 20 um.
 inline constexpr double wall_tolerance_rad = 0.02;
 
-/// Where a wall is looked at.
+/// Side and heights at which a wall is evaluated.
 struct WallHeights {
   WallSide side = WallSide::right;
-  std::span<const double> height_mm = {};     ///< above the tip, as long as the caller keeps them
+  std::span<const double> height_mm = {};     ///< above the tip; a view: the caller's data must outlive it
   double tolerance_rad = wall_tolerance_rad;  ///< an arc that ends this close to +-pi/2 reaches the wall
 };
 
-/// Form error of the wall across itself, um, at heights above the tip: + material is left standing, - the wall is cut
-/// too deep. Each height is finished as a flute passes +-pi/2 there; the error is what the beam is deflected at that
-/// height under all forces of that moment, and of several flutes with runout the one that reaches deepest counts (from
-/// the mean radius). Paper 001, section 2.3; the load is taken as spread along the flutes instead of at its centre. NaN
-/// where the engagement does not reach the wall. Throws Error(argument) as MillingForce::deflection_um, or on a height
-/// below the tip or not finite.
+/// Form error perpendicular to the wall, um, at heights above the tip: + material is left, - the wall is cut too deep.
+/// Each height is finished when a flute passes +-pi/2 there; the error is the deflection of the beam at that height
+/// under all forces at that moment. With runout the flute that cuts deepest counts (relative to the mean radius). Paper
+/// 001, section 2.3; the load is distributed along the flutes instead of acting at its centre. NaN where the engagement
+/// does not reach the wall. Throws Error(argument) as MillingForce::deflection_um, or on a height below the tip or not
+/// finite.
 [[nodiscard]] Eigen::VectorXd wall_error_um(MillingForce& force, const ToolBeam& beam, std::span<const EngagedArc> arcs,
                                             double feed_mm_per_min, const WallHeights& wall);
 

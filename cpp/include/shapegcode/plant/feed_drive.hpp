@@ -12,10 +12,10 @@
 
 namespace shapegcode {
 
-/// How a sliding pair resists.
+/// Friction of a sliding pair.
 enum class FrictionModel : std::uint8_t {
-  viscous,   ///< in proportion to the speed alone
-  stribeck,  ///< Coulomb, static and Stribeck as a function of the speed, made smooth through zero
+  viscous,   ///< proportional to the speed only
+  stribeck,  ///< Coulomb, static and Stribeck friction as a function of the speed, smoothed through zero
   lugre,     ///< the same with bristles between the surfaces: presliding, stick, frictional lag; one state
 };
 
@@ -26,7 +26,7 @@ struct FrictionParameters {
   double viscous_n_s_per_m = 0.0;           ///< >= 0
   double coulomb_n = 0.0;                   ///< sliding friction; > 0 unless viscous
   double static_n = 0.0;                    ///< friction to be overcome from rest; >= coulomb_n
-  double stribeck_velocity_m_per_s = 0.0;   ///< speed at which static has given way to sliding friction; > 0
+  double stribeck_velocity_m_per_s = 0.0;   ///< speed of the transition from static to sliding friction; > 0
   double smoothing_velocity_m_per_s = 0.0;  ///< Stribeck: sign(v) is tanh(v / this); > 0
   double bristle_stiffness_n_per_m = 0.0;   ///< LuGre, sigma0: force over displacement before sliding; > 0
   double bristle_damping_n_s_per_m = 0.0;   ///< LuGre, sigma1; >= 0
@@ -51,18 +51,18 @@ struct FrictionForce {
 [[nodiscard]] FrictionForce friction_force(const FrictionParameters& friction, double velocity_m_per_s,
                                            double bristle_m) noexcept;
 
-/// What the position loop compares with the set-point.
+/// Position that the position loop compares with the set-point.
 enum class PositionFeedback : std::uint8_t {
   motor,  ///< encoder on the motor (semi-closed loop)
   table,  ///< linear scale on the table (fully closed loop)
 };
 
-/// Feed drive of one axis, SI, everything referred to the travel of the table.
+/// Feed drive of one axis, SI units, referred to the travel of the worktable.
 struct FeedDriveParameters {
   double motor_mass_kg = 0.0;                                    ///< inertia of motor, coupling and screw; > 0
-  double table_mass_kg = 0.0;                                    ///< table with what it carries; > 0
+  double table_mass_kg = 0.0;                                    ///< worktable with its load; > 0
   double stiffness_n_per_m = 0.0;                                ///< motor to table, axial; > 0
-  double damping_n_s_per_m = 0.0;                                ///< beside the stiffness; >= 0
+  double damping_n_s_per_m = 0.0;                                ///< parallel to the stiffness; >= 0
   double backlash_m = 0.0;                                       ///< whole gap; >= 0
   FrictionParameters table_friction;                             ///< guideways
   FrictionParameters motor_friction;                             ///< bearings, seals, nut
@@ -70,8 +70,8 @@ struct FeedDriveParameters {
   double position_gain_per_s = 0.0;                              ///< > 0
   double velocity_gain_n_s_per_m = 0.0;                          ///< force over speed error; > 0
   double velocity_integral_time_s = 0.0;                         ///< of the speed controller; 0: none
-  double velocity_feed_forward_ratio = 0.0;                      ///< 0 ... 1: share of the set-points' speed
-  double acceleration_feed_forward_ratio = 0.0;                  ///< 0 ... 1: share of acceleration times both masses
+  double velocity_feed_forward_ratio = 0.0;                      ///< 0 ... 1: ratio of the set-points' speed
+  double acceleration_feed_forward_ratio = 0.0;                  ///< 0 ... 1: ratio of acceleration times both masses
   double force_limit_n = 0.0;                                    ///< of the motor; 0: none
   std::vector<Mode> modes;                                       ///< of the structure, excited by the table
 
@@ -82,22 +82,21 @@ struct FeedDriveParameters {
 /// x' = A x + B w, y = C x + D w with inputs that are linear between the set-points.
 struct FeedDriveLinearModel {
   Eigen::MatrixXd a;
-  /// Column 0: set-point. Column 1, only where there is acceleration feed-forward: speed of the set-points, whose
-  /// sample at a set-point is the difference to the one before over the period.
+  /// Column 0: set-point. Column 1, only with acceleration feed-forward: speed of the set-points, sampled as the
+  /// difference from the previous set-point divided by the period.
   Eigen::MatrixXd b;
   Eigen::MatrixXd c;  ///< one row: response (table and modes)
   Eigen::MatrixXd d;
 };
 
-/// The drive without what is not linear: friction other than viscous, backlash or a force limit make it throw
-/// Error(argument). Lengths in any one unit, s. At rest at a set-point r the state is r times `a^-1 b` reversed in
-/// sign.
+/// The linear model of a drive. Throws Error(argument) on friction other than viscous, backlash or a force limit.
+/// Lengths in any one unit, s. At rest at a set-point r the state is -r times `a^-1 b`.
 [[nodiscard]] FeedDriveLinearModel linear_model(const FeedDriveParameters& parameters);
 
 /// Motor, ball screw and table of one axis with its position and speed controller, integrated by CVODE (BDF with an
-/// analytic Jacobian). Set-points come once per period and are joined by straight lines; the speed that is fed forward
-/// steps at each of them. A copy takes over the state, not the integrator's history: its next step is as accurate, but
-/// not the same to the last digit. docs/concepts/feed_drive.md has the equations.
+/// analytic Jacobian). Set-points come once per period and are joined by straight lines; the feed-forward speed steps
+/// at each of them. A copy has the state but not the integrator's history: its next step is as accurate, but not the
+/// same to the last digit. docs/concepts/feed_drive.md has the equations.
 class FeedDrive {
  public:
   /// At rest at zero. `rtol` relative tolerance (of following error, deflections and speeds), `atol_mm` absolute
@@ -140,12 +139,12 @@ class FeedDrive {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The equations of FeedDrive with fixed steps, for a controller prototype that needs its plant in bounded time: a
-/// Rosenbrock method (L-stable, third order: Rodas3 of Sandu et al. 1997) whose linear systems are solved in place.
-/// After construction no allocation, no lock, no exception. Each step() costs the same, except where a set-point asks
-/// for what no machine follows (metres per second at once): steps that fail there are divided, at most to 21 times the
-/// work. docs/concepts/feed_drive.md states the error beside FeedDrive for usual drives; twice the substeps show it for
-/// another.
+/// The equations of FeedDrive with fixed steps, for controller prototypes that need bounded time: a Rosenbrock method
+/// (L-stable, third order: Rodas3 of Sandu et al. 1997) whose linear systems are solved in place. After construction no
+/// allocation, no lock, no exception. Each step() takes the same time, except for set-points that no machine can follow
+/// (jumps of metres per second): failing steps are divided there, at most to 21 times the work.
+/// docs/concepts/feed_drive.md gives the error relative to FeedDrive for typical drives; for others compare with twice
+/// the substeps.
 class FeedDriveRealTime {
  public:
   static constexpr int default_substeps = 4;

@@ -7,8 +7,7 @@
 
 namespace shapegcode {
 
-/// A linear plant x' = A*x + B*u, y = C*x + D*u: n states, m inputs, p outputs, in whatever units fit together (time
-/// in s).
+/// A linear plant x' = A*x + B*u, y = C*x + D*u: n states, m inputs, p outputs, in any consistent units (time in s).
 struct StateSpace {
   Eigen::MatrixXd a;  ///< (n, n)
   Eigen::MatrixXd b;  ///< (n, m)
@@ -16,8 +15,8 @@ struct StateSpace {
   Eigen::MatrixXd d;  ///< (p, m)
 };
 
-/// What a period does to the state when the input runs linearly from u0 to u1 (first-order hold):
-/// x1 = state*x0 + from_input*u0 + to_input*u1. No approximation.
+/// Change of the state over a period in which the input changes linearly from u0 to u1 (first-order hold): x1 =
+/// state*x0 + from_input*u0 + to_input*u1. No approximation.
 struct HeldPeriod {
   Eigen::MatrixXd state;       ///< (n, n)
   Eigen::MatrixXd from_input;  ///< (n, m)
@@ -26,8 +25,8 @@ struct HeldPeriod {
 
 /// Matrix exponential, also of stiff, singular and badly scaled matrices: balanced by powers of two (B. N. Parlett and
 /// C. Reinsch, Numer. Math. 13, 1969), then scaling and squaring (N. J. Higham, SIAM J. Matrix Anal. Appl. 26, 2005).
-/// Errors are about 1e-15 of the larger of 1 and the result, in the balanced scale, also beside rates of 1e6.
-/// Throws Error(argument) if it is not square or not finite, Error(numeric) if the exponential is not.
+/// Errors are about 1e-15 of the larger of 1 and the result, in the balanced scale, also with rates of 1e6. Throws
+/// Error(argument) if it is not square or not finite, Error(numeric) if the exponential is not.
 [[nodiscard]] Eigen::MatrixXd matrix_exponential(const Eigen::MatrixXd& matrix);
 
 /// The period's matrices as blocks of the exponential of [[A, B, 0], [0, 0, 1/period], [0, 0, 0]]*period (C. F. Van
@@ -36,27 +35,27 @@ struct HeldPeriod {
 [[nodiscard]] HeldPeriod first_order_hold(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double period_s);
 
 /// Propagates a linear plant exactly from sample to sample for an input that is linear between them, as a servo's
-/// set-points are. Real-time safe after construction: step() allocates nothing, throws nothing and takes always the
+/// set-points are. Real-time safe after construction: step() allocates nothing, throws nothing and always takes the
 /// same work.
 class LinearPlant {
  public:
-  /// At rest in x = 0 with input 0. Throws Error(argument) on sizes that do not fit, no state, no input or no output,
-  /// a value that is not finite, or period_s <= 0; Error(numeric) if the plant outgrows all numbers within a period.
+  /// At rest in x = 0 with input 0. Throws Error(argument) on sizes that do not fit, no state, no input or no output, a
+  /// value that is not finite, or period_s <= 0; Error(numeric) if the plant overflows within a period.
   LinearPlant(StateSpace plant, double period_s);
 
   /// State at the instant at which the input is `input`. Throws Error(argument) on a wrong size or a value that is not
   /// finite.
   void reset(const Eigen::VectorXd& state, const Eigen::VectorXd& input);
-  /// The steady state under a constant input: A*x + B*u = 0. Where integrators leave a choice, the one nearest to
-  /// `near` (an axis stays where it is), distances taken in the balanced scale of A. Throws Error(argument) where no
-  /// state stays (an integrator that this input fills), and as reset().
+  /// The steady state under a constant input: A*x + B*u = 0. If integrators leave it undetermined, it is the state
+  /// nearest to `near` (an axis keeps its position), with distances in the balanced scale of A. Throws Error(argument)
+  /// if there is none (the input makes an integrator grow), and as reset().
   void reset_at_rest(const Eigen::VectorXd& input);
   void reset_at_rest(const Eigen::VectorXd& input, const Eigen::VectorXd& near);
 
   /// One period later, at which the input is `in`: inputs() values in, outputs() out.
   void step(std::span<const double> in, std::span<double> out) noexcept;
   /// The same for a whole record, (n_samples, inputs()): the plant is put to rest for the first row, or to `state` with
-  /// that input, and row k of the result, (n_samples, outputs()), is the output at row k. What step() gives, to the
+  /// that input, and row k of the result, (n_samples, outputs()), is the output at row k. Identical to step(), to the
   /// last bit; the plant stays at the last row. Throws Error(argument) on a wrong shape or a value that is not finite.
   [[nodiscard]] Eigen::MatrixXd respond(const Eigen::MatrixXd& inputs);
   [[nodiscard]] Eigen::MatrixXd respond(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& state);

@@ -23,13 +23,13 @@ struct ModeTransition {
 /// The matrix exponential of d'' + 2*zeta*omega*d' + omega^2*d = 0 over `time_s`, in closed form. Throws as pole().
 [[nodiscard]] ModeTransition mode_transition(const Mode& mode, double time_s);
 
-/// How a mode depends on where an axis stands: linear in frequency and damping ratio between the rows, constant beyond
-/// the ends. An empty table leaves the mode as it is.
+/// Dependence of a mode on an axis position: frequency and damping ratio are linear between the rows, constant beyond
+/// the ends. An empty table leaves the mode constant.
 struct ModeTable {
-  int axis = 0;                       ///< whose position counts: 0, 1, 2 for X, Y, Z
+  int axis = 0;                       ///< axis of the position: 0, 1, 2 for X, Y, Z
   std::vector<double> position_mm;    ///< strictly ascending
   std::vector<double> frequency_hz;   ///< undamped natural frequency, one per position
-  std::vector<double> damping_ratio;  ///< one per position, or none: that of the mode
+  std::vector<double> damping_ratio;  ///< one per position, or empty: that of the mode
 
   [[nodiscard]] bool empty() const noexcept { return position_mm.empty(); }
 };
@@ -41,35 +41,35 @@ using AxisModeTables = std::array<std::vector<ModeTable>, axis_count>;
 /// many frequencies above 0, and none or as many damping ratios 0 <= zeta < 1.
 void check_table(const ModeTable& table);
 
-/// The mode at a position (mm) of the table's axis; the participation stays. The table must pass check_table.
+/// The mode at a position (mm) of the table's axis, with the same participation. The table must pass check_table.
 [[nodiscard]] Mode mode_at(const Mode& mode, const ModeTable& table, double position_mm) noexcept;
 
-/// Base-excited modes by the axis which they move: d'' + 2*zeta*omega*d' + omega^2*d = -x'' and response
-/// u = x + sum(participation*d), where x'' is the acceleration of that axis, or the sum of excited_by*x'' over X, Y, Z.
-/// A mode that moves several axes stands at each of them.
+/// Base-excited modes by the axis which they move: d'' + 2*zeta*omega*d' + omega^2*d = -x'' and response u = x +
+/// sum(participation*d), where x'' is the acceleration of that axis, or the sum of excited_by*x'' over X, Y, Z. A mode
+/// that moves several axes is listed at each of them.
 using AxisModes = std::array<std::vector<Mode>, axis_count>;
 
-/// Shares of the accelerations of X, Y and Z that excite a mode of `axis`.
+/// Factors of the accelerations of X, Y and Z that excite a mode of `axis`.
 [[nodiscard]] Vector3 excitation(const Mode& mode, std::size_t axis) noexcept;
-/// Throws Error(argument) on a participation or a share of an acceleration that is not finite.
+/// Throws Error(argument) on a participation or an excitation factor that is not finite.
 void check_shares(const Mode& mode, std::size_t axis);
 
 /// Propagates the modes exactly (matrix exponential) for a command that is linear between set-points, as a servo's
-/// set-points are (first-order hold). Real-time safe after construction: no allocation, no exception, bounded work.
-/// Of each mode that its own axis excites: u'' + 2*zeta*omega*u' + omega^2*u = 2*zeta*omega*x' + omega^2*x.
+/// set-points are (first-order hold). Real-time safe after construction: no allocation, no exception, bounded work. For
+/// each mode excited by its own axis: u'' + 2*zeta*omega*u' + omega^2*u = 2*zeta*omega*x' + omega^2*x.
 ///
 /// Modes may vary with the commanded position of an axis. Frequency and damping are then held over each period at their
 /// value in its middle (an error of second order in the period), and the matrices of the period are interpolated
-/// between neighbours so close that omega*period differs by at most 1e-3 rad: an error below 2e-7 of the motion per
-/// period. (Fewer matrices, and a larger error, only where more than 2^18 would be needed.)
+/// between neighbours whose omega*period differs by at most 1e-3 rad: an error below 2e-7 of the motion per period.
+/// (Fewer matrices, and a larger error, only where more than 2^18 would be needed.)
 class ModalPlant {
  public:
-  /// `tables`: how modes vary with position, by axis and number of the mode; none: constant modes.
-  /// Throws Error(argument) on period <= 0, an invalid mode or table, or more tables than modes of an axis.
+  /// `tables`: how modes vary with position, by axis and number of the mode; empty: constant modes. Throws
+  /// Error(argument) on period <= 0, an invalid mode or table, or more tables than modes of an axis.
   ModalPlant(AxisModes modes, double period_s, AxisModeTables tables = {});
   /// At rest at `position`; peak() restarts from zero.
   void reset(const Vector3& position) noexcept;
-  /// Moves set-point and table alike: a change of coordinates.
+  /// Shifts set-point and worktable together: a change of coordinates.
   void shift(const Vector3& by_mm) noexcept { command_ += by_mm; }
   /// Next set-point in, the response at that instant out: X, Y and Z.
   void step(std::span<const double> in, std::span<double> out) noexcept {
@@ -80,20 +80,20 @@ class ModalPlant {
   /// Deflection u - x at the last set-point.
   [[nodiscard]] Vector3 deflection() const noexcept { return deflection_; }
   /// Largest |deflection| per axis since the last reset() or reset_peak(), between set-points too: evaluated at most
-  /// 1/20 period of the axis' fastest mode apart (at most 1024 times per set-point) and refined where the deflection
-  /// turns, so that it is right to about 1e-4 of itself.
+  /// 1/20 period of the axis' fastest mode apart (at most 1024 times per set-point) and refined at turning points of
+  /// the deflection, so that it is accurate to about 1e-4 of itself.
   [[nodiscard]] Vector3 peak() const noexcept { return peak_; }
   /// peak() restarts from the present deflection.
   void reset_peak() noexcept { peak_ = deflection_.cwiseAbs(); }
-  /// Largest |deflection| per axis that follows, if the command rests from now on (continuous time, not only at
-  /// samples; searched over the time in which the slowest mode of the axis makes `n_periods` oscillations, in steps of
-  /// 1/64 period of the fastest; ends early when no larger one can follow, and after 1e6 steps). The stop itself
-  /// counts: the command's last velocity falls to zero at the last set-point. Throws Error(argument) on n_periods < 1.
+  /// Largest future |deflection| per axis if the command rests from now on (continuous time, not only at samples;
+  /// searched over the time in which the slowest mode of the axis makes `n_periods` oscillations, in steps of 1/64
+  /// period of the fastest; ends early when no larger one can follow, and after 1e6 steps). The stop itself counts: the
+  /// command's last velocity falls to zero at the last set-point. Throws Error(argument) on n_periods < 1.
   [[nodiscard]] Vector3 residual_peak(int n_periods = 5) const;
 
  private:
   using Transition = ModeTransition;
-  /// What the motion over a period needs to know of a mode.
+  /// Properties of a mode needed for the motion over a period.
   struct Node {
     Transition over_period;
     double decay_rate = 0.0;       // 1/s: zeta*omega
@@ -115,7 +115,7 @@ class ModalPlant {
       const double quadrature = (velocity + decay_rate * deflection) * damped_period_s;
       return deflection * deflection + quadrature * quadrature;
     }
-    /// No later deflection of the free mode exceeds this share of the response.
+    /// Upper bound of the free mode's later contribution to the response.
     [[nodiscard]] double reachable() const noexcept;
   };
   /// A mode that varies: nodes between the rows of its table, every interval divided evenly.
@@ -127,7 +127,7 @@ class ModalPlant {
     std::vector<Node> nodes;
     std::vector<Transition> sub;  // times participation; node, end of sub-step
   };
-  /// Where in its nodes a varying mode stands.
+  /// Position of a varying mode between its nodes.
   struct TablePosition {
     double position_mm = 0.0;
     std::size_t node = 0;
@@ -144,19 +144,19 @@ class ModalPlant {
   [[nodiscard]] static Transition between(const Transition& a, const Transition& b, double share) noexcept;
   [[nodiscard]] static Node node_of(const Mode& mode, double period_s);
   [[nodiscard]] Varying tabulate(std::size_t axis, std::size_t mode, const ModeTable& table) const;
-  /// The varying modes as they are at `position`.
+  /// Sets the varying modes to `position`.
   void move_to(const Vector3& position) noexcept;
   /// Sub-step matrices of the varying modes of an axis.
   void move_sub_steps(std::size_t axis) noexcept;
   /// A mode of an axis at the last set-point.
   [[nodiscard]] Mode mode_now(std::size_t axis, std::size_t mode) const noexcept;
-  /// States too small to be any become zero.
+  /// Sets negligible states to zero.
   void forget_nothing() noexcept;
-  /// No later deflection of an axis that is free from now on exceeds it.
+  /// Upper bound of later deflections of an axis that is free from now on.
   [[nodiscard]] double reachable(std::size_t axis) const noexcept;
   /// An axis with one mode, after the commands' velocities jumped.
   void step_only_mode(std::size_t axis, const Vector3& jumps) noexcept;
-  /// `peak_` over the period that now begins, looked at between its ends; called only where it may grow.
+  /// Updates `peak_` between the ends of the present period; called only if it may grow.
   void look_between(std::size_t axis) noexcept;
   /// Largest |deflection| between two instants `time_s` apart, with the turning point found by the secant of the rate.
   [[nodiscard]] static double largest_between(const Motion& from, const Motion& to, double time_s) noexcept;
@@ -179,7 +179,7 @@ class ModalPlant {
 };
 
 /// ModalPlant with constant modes for whole records: the same motion to the last bit, without peaks between samples,
-/// any number of axes, and about as fast as memory can be read. Records may be handed over in pieces.
+/// for any number of axes, and about as fast as memory access. Records may be passed in pieces.
 class ModalResponse {
  public:
   /// (n_samples, n_axes) in any memory order, mm.

@@ -17,7 +17,7 @@ class ServoLag {
   ServoLag(const Vector3& position_gain_per_s, const Vector3& feed_forward_ratio, double period_s);
   /// Rest at `position`.
   void reset(const Vector3& position) noexcept;
-  /// Moves set-point and position alike: a change of coordinates.
+  /// Shifts set-point and position together: a change of coordinates.
   void shift(const Vector3& by_mm) noexcept { setpoint_ += by_mm; }
   /// Next set-point in, position of the axes at that instant out: X, Y and Z.
   void step(std::span<const double> in, std::span<double> out) noexcept {
@@ -30,7 +30,7 @@ class ServoLag {
 
  private:
   Vector3 decay_;  // of the error in one period
-  Vector3 share_;  // of an increment that becomes error
+  Vector3 share_;  // part of an increment that becomes error
   Vector3 setpoint_ = Vector3::Zero();
   Vector3 error_mm_ = Vector3::Zero();
   std::int64_t row_ = 0;  // set-points since reset()

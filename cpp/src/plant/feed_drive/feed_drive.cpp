@@ -54,7 +54,7 @@ FeedDriveLinearModel linear_model(const FeedDriveParameters& parameters) {
                 fmt::format("a linear model needs a drive without backlash and force limit, here {} m and {} N",
                             parameters.backlash_m, parameters.force_limit_n));
   }
-  // Nothing depends on the period: it only turns set-points into the speed that is an input here.
+  // The model does not depend on the period, which only converts set-points to their speed, an input here.
   const FeedDriveEquations equations(parameters, 1.0);
   const FeedDriveEquations::Layout& at = equations.layout();
   const VectorXd rest = VectorXd::Zero(at.size);

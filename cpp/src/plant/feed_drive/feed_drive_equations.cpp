@@ -9,8 +9,8 @@
 namespace shapegcode {
 namespace {
 
-// Balls do not touch all at once: the stiffness builds up over this share of the gap, half of it inside. It also keeps
-// the damping, which acts in contact only, from jumping.
+// The balls do not touch all at once: the stiffness builds up over this fraction of the gap, half of it inside. This
+// also avoids a jump of the damping, which acts in contact only.
 constexpr double contact_share = 0.1;
 
 }  // namespace

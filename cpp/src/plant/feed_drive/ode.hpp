@@ -7,7 +7,7 @@
 
 namespace shapegcode {
 
-/// Right side and Jacobian of y' = f(t, y) as the inner loop calls them: no allocation, no copies.
+/// Right-hand side and Jacobian of y' = f(t, y) for the inner loop: no allocation, no copies.
 class OdeSystem {
  public:
   OdeSystem() = default;

@@ -13,7 +13,7 @@ namespace shapegcode {
 namespace {
 
 constexpr double two_pi = 2.0 * std::numbers::pi;
-// Below this two programmed points are one: far under any least increment, far over double rounding.
+// Programmed points closer than this are identical: far below any least increment, far above double round-off.
 constexpr double coincident_mm = 1e-7;
 
 }  // namespace

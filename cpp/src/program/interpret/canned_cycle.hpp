@@ -6,7 +6,7 @@
 
 namespace shapegcode {
 
-/// A drilling cycle G73 ... G89 at one hole, as its modal words stand.
+/// A drilling cycle G73 ... G89 at one hole, with its present modal words.
 struct CannedCycle {
   int code = 80;
   double r_mm = 0.0;          ///< R level, absolute

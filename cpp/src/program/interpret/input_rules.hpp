@@ -1,4 +1,4 @@
-// Private: what the settings of a control make of words and marks, asked for in several places.
+// Private: interpretation of words and marks by the settings of a control, used in several places.
 #pragma once
 
 #include <array>

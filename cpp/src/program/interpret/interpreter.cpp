@@ -11,7 +11,7 @@ namespace shapegcode::detail {
 namespace {
 
 constexpr std::size_t max_warnings_of_one_kind = 100;
-// Comments of a shaped program: its header begins so, and each shaped region has the mark before it.
+// Comments of a shaped program: the start of its header, and the mark before each shaped region.
 constexpr std::string_view shaped_header = "(SHAPEGCODE ";
 constexpr std::string_view shaped_mark = "(SHAPED)";
 constexpr std::string_view shaped_rapid_mark = "(SHAPED RAPID)";

@@ -1,4 +1,4 @@
-// Codes that change the modal state or what is known of the position.
+// Codes that change the modal state or the known position.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -9,7 +9,7 @@ namespace shapegcode::detail {
 double least_time_s(const Segment& segment, const WorkLimits& limits) noexcept {
   const bool rapid = segment.kind == SegmentKind::rapid;
   const Vector3& fastest = rapid ? limits.rapid_mm_per_s : limits.feed_mm_per_s;
-  // An arc may point along any direction of its plane: all axes together are its bound.
+  // An arc may have any direction in its plane: all axes together give the bound.
   double least = segment.kind == SegmentKind::arc
                      ? segment.length_mm / fastest.norm()
                      : ((segment.end_mm - segment.start_mm).array().abs() / fastest.array()).maxCoeff();

@@ -1,4 +1,4 @@
-// Private: what the moves of a program come to so far, held against the limits of a reading.
+// Private: counts the moves of a program so far and checks them against the limits.
 #pragma once
 
 #include <cstdint>

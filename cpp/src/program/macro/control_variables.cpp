@@ -1,4 +1,4 @@
-// System variables of custom macro B, as far as a program can know them before it runs.
+// System variables of custom macro B, as far as they are known before the program runs.
 #include <fmt/format.h>
 
 #include <cmath>

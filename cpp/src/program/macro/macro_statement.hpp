@@ -22,7 +22,7 @@ enum class MacroStatementKind : std::uint8_t {
   output,      ///< POPEN, PCLOS, BPRNT[...], DPRNT[...]: sends text to a port, moves nothing; its text is not checked
 };
 
-/// How a line is made up; indices count from 0 into the line.
+/// Structure of a line; indices count from 0 in the line.
 struct MacroStatement {
   MacroStatementKind kind = MacroStatementKind::nc_block;
   std::int64_t n_number = -1;  ///< -1: none

@@ -1,7 +1,6 @@
 #pragma once
 
-// What the sources of the custom macro share: characters, errors at an index, and the forms of the evaluator that the
-// public header does not need.
+// Common parts of the custom macro sources: characters, errors at an index, and private parts of the evaluator.
 
 #include <cstddef>
 #include <cstdint>

@@ -9,7 +9,7 @@
 
 namespace shapegcode {
 
-/// The variables from #1000 on. What stands here knows none of them.
+/// The variables from #1000 on. This base class knows none of them.
 class SystemVariables {
  public:
   virtual ~SystemVariables() = default;

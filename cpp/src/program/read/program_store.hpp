@@ -1,4 +1,4 @@
-// Private: the programs of one reading, in one or several files, and where their lines begin.
+// Private: the programs read together, in one or several files, and the start of each line.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Texts, lines, and where they end.
+// Texts, lines, and their ends.
 #include <fmt/format.h>
 
 #include <algorithm>

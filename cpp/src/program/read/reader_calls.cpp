@@ -1,4 +1,4 @@
-// Subprograms M98/M99/M198, macro calls G65/G66/G67, codes that the builder bound to programs.
+// Subprograms M98/M99/M198, macro calls G65/G66/G67, codes bound to programs by the machine builder.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
-// Private: the execution of programs. Lines go in the order in which the control runs them to the Interpreter,
-// plain ones as they stand, all others as the plain blocks that they come to. Spread over three files: texts and lines
-// (reader.cpp), calls (reader_calls.cpp), macro statements (reader_macros.cpp).
+// Private: the execution of programs. Lines go to the Interpreter in the order of execution: simple blocks unchanged,
+// all others expanded to simple blocks. Spread over three files: texts and lines (reader.cpp), calls
+// (reader_calls.cpp), macro statements (reader_macros.cpp).
 #pragma once
 
 #include <deque>

@@ -1,4 +1,4 @@
-// A plain program that was made of a text in another control's words: its lines lead back to that text.
+// Source lines of a program that was translated from another control's dialect.
 #include <fmt/format.h>
 
 #include <algorithm>

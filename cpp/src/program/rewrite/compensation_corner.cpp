@@ -12,8 +12,8 @@
 namespace shapegcode::plane {
 namespace {
 
-// Words rounded to 1 um make small corners where the drawing has none: where the vectors across both blocks are closer
-// than this, one vector on their bisector serves both, if it stays this near to both offset curves.
+// Rounding words to 1 um makes small corners where the drawing has none. If the offset vectors of both blocks are
+// closer than this, one vector on their bisector is used for both, provided that it is this near to both offset curves.
 constexpr double tangent_gap_mm = 2e-3;
 constexpr double tangent_turn_rad = 0.02;
 constexpr double tangent_off_curve_mm = 1e-7;

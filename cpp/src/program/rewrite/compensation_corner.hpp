@@ -5,7 +5,7 @@
 
 #include "program/rewrite/plane_geometry.hpp"
 
-// What cutter compensation does between two blocks that move in the plane.
+// Cutter compensation between two blocks that move in the plane.
 namespace shapegcode::plane {
 
 /// A moving block and its signed offset: positive to the left of the path.

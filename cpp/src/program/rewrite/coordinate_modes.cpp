@@ -34,7 +34,7 @@ Vector3 CoordinateModes::rotate(const Vector3& point, double sense) const noexce
   }
   const ArcFrame plane(rotation_normal);
   const double c = std::cos(rotation_rad);
-  // Where the plane is mirrored, clockwise and counter-clockwise change places, for an angle as for an arc.
+  // In a mirrored plane clockwise and counter-clockwise are exchanged, for angles and arcs.
   const double s = (flips(rotation_normal) ? -sense : sense) * std::sin(rotation_rad);
   const Eigen::Vector2d arm = plane.offset(rotation_centre, point);
   Vector3 turned = point;

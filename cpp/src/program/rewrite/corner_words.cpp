@@ -18,7 +18,7 @@ using plane::pi;
 using plane::Vector2;
 
 constexpr double tangent_rad = pi / 180.0;
-// Sizes in words are rounded: a block may be used up to its last digit.
+// Sizes in words are rounded: a corner may use a whole block, to the last digit.
 constexpr double used_up_by_corner_mm = 1e-6;
 
 Error refusal(const CornerWord& word, int alarm, const std::string& why) {

@@ -20,7 +20,7 @@ using plane::OffsetCurve;
 using plane::pi;
 using plane::Vector2;
 
-// A block reversed by less than this has only been used up by its corners.
+// A block reversed by less than this counts as completely used by its corners.
 constexpr double used_up_mm = 1e-9;
 
 [[noreturn]] void refuse(const std::string& what, std::uint32_t line = 0) {

@@ -8,7 +8,7 @@
 
 namespace shapegcode {
 
-/// One block as programmed, with the cutter compensation in force in it.
+/// One programmed block with its active cutter compensation.
 struct CompensationBlock {
   Segment segment;         ///< mm; a line, rapid or arc, or a block without motion in the plane
   int mode = 40;           ///< G40, G41 (tool left of the path) or G42 (right)

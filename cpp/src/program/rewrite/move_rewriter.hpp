@@ -1,5 +1,5 @@
-// Private: blocks under coordinate modes (G16, G51, G51.1, G68), corner words and cutter compensation, written
-// as plain blocks.
+// Private: blocks under coordinate modes (G16, G51, G51.1, G68), corner words and cutter compensation, written as
+// simple blocks.
 #pragma once
 
 #include <functional>

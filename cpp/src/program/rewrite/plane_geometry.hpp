@@ -7,8 +7,8 @@
 
 #include "shapegcode/path.hpp"
 
-// Lines and circles in the plane across one axis, for cutter compensation and corner words. Lengths in mm, angles in
-// rad; "left" is seen from the positive side of the normal axis.
+// Lines and circles in the plane perpendicular to one axis, for cutter compensation and corner words. Lengths in mm,
+// angles in rad; "left" is seen from the positive side of the normal axis.
 namespace shapegcode::plane {
 
 inline constexpr double pi = std::numbers::pi;

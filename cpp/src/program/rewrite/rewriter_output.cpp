@@ -1,4 +1,4 @@
-// Plain blocks from what was read: corners, compensation, words rounded to the increment.
+// Output of simple blocks: corners, compensation, words rounded to the increment.
 #include <fmt/format.h>
 
 #include <algorithm>

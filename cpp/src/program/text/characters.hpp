@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <string_view>
 
-// Characters of program text. They are ASCII: no locale has a say.
+// Characters of program text. They are ASCII, independent of the locale.
 namespace shapegcode {
 
 [[nodiscard]] constexpr bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }

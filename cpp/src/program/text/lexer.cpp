@@ -46,7 +46,7 @@ bool is_macro_keyword(std::string_view text, std::size_t i) noexcept {
   return false;
 }
 
-// Reads the number behind a letter; i stands on its first character and ends behind it. False at a macro expression or
+// Reads the number after a letter; i is at its first character and ends after it. False at a macro expression or
 // keyword.
 bool scan_operand(std::string_view text, std::uint32_t line, std::size_t& i, std::size_t letter_at, Word& word) {
   const std::size_t n = text.size();

@@ -1,4 +1,4 @@
-// Private: how digits become numbers, for words, macro expressions, sequence numbers and the search for them alike.
+// Private: conversion of digits to numbers, for words, macro expressions, sequence numbers and the search for them.
 #pragma once
 
 #include <algorithm>

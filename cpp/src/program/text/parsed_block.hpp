@@ -1,4 +1,4 @@
-// Private: one line of a program, read once. The reader, the rewriter and the interpreter hand it on.
+// Private: one line of a program, parsed once and passed from reader to rewriter to interpreter.
 #pragma once
 
 #include <cstdint>

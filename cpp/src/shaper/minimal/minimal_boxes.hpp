@@ -7,10 +7,10 @@
 #include "shaper/minimal/minimal_starts.hpp"
 #include "shaper/minimal/minimal_system.hpp"
 
-// Which shapers can there be? The region of times is cut into boxes. In each, the linearisation of minimal_system.hpp
-// with a bound on its second-order rest says in which part of the box solutions can lie, if anywhere: the box is
-// dropped, or shrinks, quadratically fast onto a solution, or is halved. Bounds are on derivatives, taken in floating
-// point; they leave rounding (1e-16) aside.
+// Search for all possible shapers. The range of times is divided into boxes. In each, the linearisation of
+// minimal_system.hpp with a bound on its second-order remainder shows in which part of the box solutions can lie, if
+// any: the box is discarded, or shrinks quadratically to a solution, or is halved. Bounds are on derivatives, evaluated
+// in floating point; they ignore rounding (1e-16).
 
 namespace shapegcode::minimal {
 

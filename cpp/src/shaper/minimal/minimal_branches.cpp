@@ -30,7 +30,7 @@ constexpr double smallest_step = 1e-4;  // of the ratio
 constexpr double farthest = 0.1;        // rad from where the curve is expected
 constexpr int max_failures = 3;         // times in turn that not even the smallest step has an answer of Newton
 
-/// Times of the second and third tap, s.
+/// Times of the second and third impulse, s.
 using Times = Eigen::Vector2d;
 
 struct Curve {

@@ -50,8 +50,8 @@ std::vector<Taps> Collection::taps() const {
 
 namespace {
 
-/// Low-discrepancy starts of three kinds in turn: evenly spread taps with jitter, which converge most often, times
-/// symmetric about their middle, as many solutions of light damping are, and any times at all, which find the rest.
+/// Low-discrepancy starts of three kinds in turn: evenly spread impulses with jitter, which converge most often; times
+/// symmetric about their middle, like many solutions with light damping; and arbitrary times, which find the rest.
 class StartSequence {
  public:
   StartSequence(int modes, double limit) : modes_(static_cast<std::size_t>(modes)), limit_(limit) {

@@ -6,7 +6,7 @@
 
 namespace shapegcode::minimal {
 
-/// Where a search looks, in radians of the fastest mode, and what it accepts.
+/// Range of a search, in radians of the fastest mode, and its limits.
 struct Region {
   double limit = 0.0;        ///< largest phase of the last tap
   double max_abs_sum = 0.0;  ///< of the amplitudes

@@ -1,6 +1,6 @@
 #pragma once
 
-// What every search for minimal shapers keeps to.
+// Limits common to all searches for minimal shapers.
 namespace shapegcode::minimal {
 
 inline constexpr double same_pole = 1e-6;       ///< relative
