@@ -11,7 +11,7 @@ out=build/coverage
 cmake -S . -B "$out" -G Ninja -D CMAKE_BUILD_TYPE=None -D SHAPEGCODE_BUILD_TESTS=ON -D SHAPEGCODE_BUILD_PYTHON=ON \
   -D SHAPEGCODE_WARNINGS_AS_ERRORS=OFF -D CMAKE_CXX_FLAGS='-O1 --coverage -fprofile-update=atomic -w' \
   -D Python_EXECUTABLE="$python" -D pybind11_DIR="$("$python" -m pybind11 --cmakedir)" >/dev/null
-cmake --build "$out" --target core_tests allocation_tests operator_sessions _core
+cmake --build "$out" --target core_tests allocation_tests operator_sessions c_interface c_client_1_0 _core
 find "$out" -name '*.gcda' -delete
 (cd "$out" && ctest -j "$(nproc)" -E install_tree --output-on-failure | tail -3)
 
