@@ -15,9 +15,9 @@ import numpy as np
 from shapegcode.errors import RecordError
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
-from shapegcode.identification.parts import Spectra, moving_parts, transforms
 from shapegcode.identification.result import Identification, as_sweep
 from shapegcode.identification.servo.record import ServoTrace, read_servo_record
+from shapegcode.identification.spectra import Spectra, moving_parts, transforms
 from shapegcode.io.data_file import open_file
 from shapegcode.io.edge_json import is_edge_json
 from shapegcode.io.frequency_response import FEWEST_LINES, FrequencyResponse

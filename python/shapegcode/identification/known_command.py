@@ -21,8 +21,8 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.across import with_moves
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
-from shapegcode.identification.parts import REST_S, Spectra, moving_parts, transforms
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, as_sweep
+from shapegcode.identification.spectra import REST_S, Spectra, moving_parts, transforms
 from shapegcode.identification.sweep_program import commanded
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_records

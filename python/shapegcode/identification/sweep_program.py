@@ -12,7 +12,7 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError
-from shapegcode.identification.parts import moving_parts
+from shapegcode.identification.spectra import moving_parts
 from shapegcode.io.data_file import write_text
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
