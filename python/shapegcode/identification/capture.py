@@ -55,19 +55,14 @@ def find_modes_of_captures(paths: Sequence[Path], options: ReadOptions, sought: 
 def _axis_of(source: str, traces: Sequence[ServoTrace], axis: str | None) -> ServoTrace:
     """The trace of an axis: X, X1, 1 (X1)."""
     linear = [each for each in traces if each.unit == "mm"]
-    named = [each for each in linear if axis is not None and axis in _letters(each.name)]
-    if len(named) == 1 or (axis is not None and len(linear) == 1 and not _letters(linear[0].name)):
+    named = [each for each in linear if axis is not None and axis in each.name.lower()]
+    if len(named) == 1 or (axis is not None and len(linear) == 1 and not set("xyz") & set(linear[0].name.lower())):
         return (named or linear)[0]
     names = ", ".join(f"{each.name}{'' if each in linear else ' (turns)'}" for each in traces)
     wanted = "say --axis x, y or z"
     if axis is not None:
         wanted = f"{'several are' if named else 'no linear one is'} called {axis.upper()}"
     raise RecordError(f"{source}: holds command and actual position of {names}: {wanted}")
-
-
-def _letters(name: str) -> set[str]:
-    """Axes that a name may mean."""
-    return {letter for letter in "xyz" if letter in name.lower()}
 
 
 def _response(

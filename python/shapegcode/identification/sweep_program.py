@@ -162,25 +162,15 @@ def write_sweep(
         ArgumentError: the control does not reach the band within these limits; what it reaches is said.
         OSError: the file cannot be written.
     """
-    found, text = plan_sweep(
-        file, machine, axis, band_hz=band_hz, travel_mm=travel_mm, acceleration_share=acceleration_share,
-        seconds=seconds, number=number,
-    )  # fmt: skip
+    found, text = plan_sweep(file, machine, axis, band_hz, travel_mm, acceleration_share, seconds, number)
     write_text(file, text)
     return found
 
 
 def plan_sweep(
-    file: str | Path,
-    machine: Machine | str | Path,
-    axis: Literal["x", "y", "z"] = "x",
-    *,
-    band_hz: tuple[float, float] | None = None,
-    travel_mm: float = 5.0,
-    acceleration_share: float = 0.3,
-    seconds: float = 60.0,
-    number: int = 7201,
-) -> tuple[SweepProgram, str]:
+    file: str | Path, machine: Machine | str | Path, axis: Literal["x", "y", "z"], band_hz: tuple[float, float] | None,
+    travel_mm: float, acceleration_share: float, seconds: float, number: int = 7201,
+) -> tuple[SweepProgram, str]:  # fmt: skip
     """Plan what `write_sweep` writes: the same, and the text, which is not written."""
     machine = Machine.of(machine)
     for name, value in (("travel_mm", travel_mm), ("acceleration_share", acceleration_share), ("seconds", seconds)):

@@ -124,7 +124,9 @@ def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) 
         around = gains[max(rank - 1, 0)], gains[min(rank + 1, len(gains) - 1)]
         found = minimize_scalar(lambda gain: square(np.array([gain])), bounds=around, method="bounded")
         return solve(0.0, math.exp(min(max(float(found.x), low), high)))[1]
-    lag = _steady_lag(trace, use, period_s)
+    speed = counted([np.gradient(way, period_s) for way in trace.command], use)
+    power = float(speed @ speed)
+    lag = min(max(float(speed @ counted(trace.lag, use)) / power, 0.0), _LONGEST_DEAD_S) if power > 0.0 else 0.0
     starts = [(1e3 * share * lag, math.log(gain)) for share in (0.6, 0.9, 0.99) for gain in (20.0, 60.0)]
     # Two valleys are followed to their ends: from the other starts others only come later to the same one.
     tried = [
@@ -134,14 +136,6 @@ def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) 
     best = min(tried, key=lambda each: float(each.fun)).x
     dead = min(max(float(best[0]) * 1e-3, 0.0), _LONGEST_DEAD_S)
     return solve(dead, math.exp(min(max(float(best[1]), low), high)))[1]
-
-
-def _steady_lag(trace: ServoTrace, use: Masks, period_s: float) -> float:
-    """Lag over speed, by least squares."""
-    speed = counted([np.gradient(way, period_s) for way in trace.command], use)
-    power = float(speed @ speed)
-    error = counted(trace.lag, use)
-    return min(max(float(speed @ error) / power, 0.0), _LONGEST_DEAD_S) if power > 0.0 else 0.0
 
 
 def lag_estimates(
@@ -260,24 +254,16 @@ def _drive_ways(trace: ServoTrace, values: FloatArray, period_s: float, top_spee
     dead_ms, gain, rest, bandwidth, integral, coulomb = values
     friction, smoothing = math.exp(coulomb), _SIGN_RATIO * top_speed * _MM
     parameters = _core.FeedDriveParameters(
-        motor_mass_kg=0.5,
-        table_mass_kg=0.5,
-        stiffness_n_per_m=_STIFFNESS_N_PER_M,
-        damping_n_s_per_m=_DAMPING_N_S_PER_M,
-        position_gain_per_s=math.exp(gain),
-        velocity_gain_n_s_per_m=2.0 * math.pi * math.exp(bandwidth),
-        velocity_integral_time_s=math.exp(integral),
+        motor_mass_kg=0.5, table_mass_kg=0.5, stiffness_n_per_m=_STIFFNESS_N_PER_M,
+        damping_n_s_per_m=_DAMPING_N_S_PER_M, position_gain_per_s=math.exp(gain),
+        velocity_gain_n_s_per_m=2.0 * math.pi * math.exp(bandwidth), velocity_integral_time_s=math.exp(integral),
         velocity_feed_forward_ratio=1.0 - rest,
         table_friction=_core.FrictionParameters(
-            _core.FrictionModel.stribeck,
-            coulomb_n=friction,
-            static_n=friction,
-            stribeck_velocity_m_per_s=smoothing,
-            smoothing_velocity_m_per_s=smoothing,
+            _core.FrictionModel.stribeck, coulomb_n=friction, static_n=friction,
+            stribeck_velocity_m_per_s=smoothing, smoothing_velocity_m_per_s=smoothing,
         ),
-    )
-    found = []
-    count = round(_RUN_UP_S / period_s)
+    )  # fmt: skip
+    found, count = [], round(_RUN_UP_S / period_s)
     for way in trace.command:
         late = delayed(way, dead_ms * 1e-3 / period_s)
         run_up = late[0] + np.arange(-count, 0) * (late[1] - late[0])

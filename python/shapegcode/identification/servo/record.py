@@ -154,11 +154,10 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
             continue
 
         others = [capture.columns.get(f"{signal}|{axis.number}") for signal in ("CONT_DEV", "TORQUE")]
-        deviation, torque = (None if each is None or not np.isfinite(each).all() else (each,) for each in others)
+        measured = [None if each is None or not np.isfinite(each).all() else (each,) for each in others]
         turns = capture.is_rotary(axis.number) or axis.name[:1].upper() in ("A", "B", "C")
-        unit = "deg" if turns else "mm"
         name = f"{axis.number} ({axis.name})" if axis.name != str(axis.number) else axis.name
-        whole = ServoTrace(name, unit, (capture.time_s,), (command,), (actual,), deviation, torque)
+        whole = ServoTrace(name, "deg" if turns else "mm", (capture.time_s,), (command,), (actual,), *measured)
         axes.append(whole._parts([(0, each) for each in ranges]))
     return _checked(ServoRecord(capture.source, capture.cycle_s, tuple(axes), tuple(notes)))
 
