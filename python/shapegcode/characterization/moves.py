@@ -29,14 +29,12 @@ def held_samples(log: ServoLog) -> tuple[int, int]:
     noise = np.maximum(command[: max(3, round(0.1 / log.sampling_s))].std(axis=0), 5e-4)
     increments = np.where(np.abs(increments) > 8.0 * noise, increments, 0.0)
     energy = (increments**2).sum(axis=1)
-    total = float(energy.sum())
-    best = (1, 0)
-    if total > 0.0:
-        for count in range(2, _LONGEST_HOLD + 1):
-            sums = np.array([energy[first::count].sum() for first in range(count)])
-            first = int(sums.argmax())
-            if sums[first] > _HOLD_SHARE * total:
-                best = (count, (first + 1) % count)
+    total, best = float(energy.sum()), (1, 0)
+    for count in range(2, _LONGEST_HOLD + 1) if total > 0.0 else ():
+        sums = np.array([energy[first::count].sum() for first in range(count)])
+        first = int(sums.argmax())
+        if sums[first] > _HOLD_SHARE * total:
+            best = (count, (first + 1) % count)
     return best
 
 
@@ -51,11 +49,8 @@ class _Bends:
 
 
 def _bends(log: ServoLog, count: int) -> _Bends:
-    command = np.nan_to_num(log.command_mm)
-    bend = np.diff(command, 2, axis=0)
-    energy = (bend**2).sum(axis=1)
-    rest = max(3, round(0.1 / log.sampling_s))
-    energy = energy - energy[:rest].mean()
+    energy = (np.diff(np.nan_to_num(log.command_mm), 2, axis=0) ** 2).sum(axis=1)
+    energy = energy - energy[: max(3, round(0.1 / log.sampling_s))].mean()
     sums = np.array([energy[k::count].sum() for k in range(count)])
     pairs = sums + np.roll(sums, -1)
     k = int(pairs.argmax())
@@ -184,12 +179,11 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
 def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> FloatArray:
     """Share of the travel at the times after the start, for a rectangle and moving averages of these lengths in s."""
     used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
-    power = len(used)
+    power, out = len(used), np.zeros_like(times)
     if not power:
         return np.asarray(np.where(times > 0.0, 1.0, 0.0))
-    out = np.zeros_like(times)
     for chosen in itertools.product((0, 1), repeat=power):
-        lag = sum(box for box, taken in zip(used, chosen, strict=True) if taken)
+        lag = sum(itertools.compress(used, chosen))
         out += (-1.0) ** sum(chosen) * np.maximum(times - lag, 0.0) ** power
     return np.asarray(out / (math.factorial(power) * math.prod(used)))
 

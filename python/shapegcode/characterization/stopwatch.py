@@ -65,10 +65,6 @@ class _Fit:
         k = _NAMES.index(name)
         return float(self.values[k]), 1.96 * math.sqrt(float(self.covariance[k, k]))
 
-    @property
-    def timing(self) -> ControllerTiming:
-        return _timing(self.values, self.period, self.end)
-
 
 def fit_stopwatch(results: FilledSheet) -> WatchFacts:
     """Fit everything that the stopwatch times hold."""
@@ -84,7 +80,7 @@ def fit_stopwatch(results: FilledSheet) -> WatchFacts:
     _cutting(best, exponential > 0.0, facts)
     _block_time(best, rows.get("blocks_tiny"), facts)
     for row in used:
-        expected = program_time_s(row.test, best.timing)
+        expected = program_time_s(row.test, _timing(best.values, best.period, best.end))
         if abs(expected - row.time_s) > _CONTRADICTS * row.sigma_s + 0.001 * row.time_s:
             facts.contradictions.append(
                 f"{results.file}:{results.lines[row.test.name]}: {row.test.name}: {row.time_s:.2f} s; what fits all "
@@ -163,7 +159,7 @@ def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
         part = row.test.parts[0]
         per_move = row.time_s / part.count - part.duration_s
         points.append((math.log(part.feed_mm_per_min), per_move, row.sigma_s / part.count))
-    x, y, sigma = (np.array(column) for column in zip(*points, strict=True))
+    x, y, sigma = np.array(points).T
     weight = 1.0 / (sigma**2 + (0.0005**2))
     centre = (weight @ x) / weight.sum()
     spread = float(weight @ (x - centre) ** 2)
@@ -189,9 +185,8 @@ def _discrete(fits: Sequence[_Fit], facts: WatchFacts) -> tuple[_Fit, float | No
     periods = sorted({fit.period for fit in close})
     ends = {fit.end for fit in close}
     name = "interpolation period"
-    period: float | None = None
-    if len(periods) == 1 and periods[0] > NO_PERIOD_S:
-        period = periods[0]
+    period = periods[0] if len(periods) == 1 and periods[0] > NO_PERIOD_S else None
+    if period is not None:
         note = "of the usual periods, the only one that fits"
         facts.add_interval(name, period, period, period, "controller.interpolation_period_s", note)
     else:
@@ -276,10 +271,10 @@ def _fit_rapids(facts: WatchFacts, axis: str, timed: list[TimedTest], period: fl
     # After a rapid comes at least the in-position wait, if that is known.
     least = max(0.0, wait[0] - wait[1]) if wait[1] < _WAIT_UNKNOWN_S else 0.0
     chi2, after = np.empty(len(_RAMPS_S)), np.empty(len(_RAMPS_S))
-    zero = {axis: 0.0}
+    singles, zero = [replace(part, count=1) for part in parts], {axis: 0.0}
     for k, ramp in enumerate(_RAMPS_S):
         timing = ControllerTiming(period or NO_PERIOD_S, "ceil", 0.0, 0.0, {axis: float(ramp)}, zero, zero)
-        moving = np.array([part_time_s(replace(part, count=1), timing) for part in parts])
+        moving = np.array([part_time_s(part, timing) for part in singles])
         after[k] = max(least, float(weight @ (seen - moving)) / float(weight.sum()))
         chi2[k] = float((((seen - moving - after[k]) / sigma) ** 2).sum())
     floor = float(chi2.min())

@@ -40,7 +40,6 @@ from shapegcode.identification.lines import (
     weighted,
 )
 from shapegcode.identification.model_search import (
-    LASTING,
     LOGARITHMS,
     OPPOSED,
     SCATTER_PROBABILITY,
@@ -49,7 +48,6 @@ from shapegcode.identification.model_search import (
     chart_of,
     interval_refusal,
     lasting_refusal,
-    lasting_share,
     mode_estimates,
 )
 from shapegcode.identification.problem import MIN_SWINGS, Starts
@@ -123,15 +121,13 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
             "a frequency response no longer tells overload, double hits or windows: an exponential window adds its "
             "damping, unless --exponential-window states it"
         )
-    measured = _of_responses(merged, sought.exponential_window_s)
-    found = _in_responses(measured, sought)
-    turned: list[str] = []
-    if _all_opposed(found):
-        turned.append(f"{responses[0].source}: {TURNED}")
-        merged = [replace(each, response=-each.response) for each in merged]
-        used = [replace(each, response=-each.response) for each in used]
-        measured = _of_responses(merged, sought.exponential_window_s)
-        found = _in_responses(measured, sought)
+    found = _in_responses(merged, sought)
+    # Whether the significant modes move against the force, counting all that are supported.
+    with_it, against = (sum(_height(m) for m in found.modes if m.refusal == each) for each in ("", OPPOSED))
+    turned = [f"{responses[0].source}: {TURNED}"] if against > with_it else []
+    if turned:
+        merged, used = ([replace(each, response=-each.response) for each in part] for part in (merged, used))
+        found = _in_responses(merged, sought)
     modes = found.modes
     if not responses[0].scaled:
         modes = tuple(replace(m, mass_kg=None, damping_n_s_per_m=None, stiffness_n_per_m=None) for m in modes)
@@ -151,13 +147,6 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
         chart=found.chart,
         fitted_lines=tuple(lines),
     )
-
-
-def _all_opposed(found: FrfModes) -> bool:
-    """Whether the significant modes move against the force, counting all that are supported."""
-    with_it = [_height(mode) for mode in found.modes if not mode.refusal]
-    against = [_height(mode) for mode in found.modes if mode.refusal == OPPOSED]
-    return sum(against) > sum(with_it)
 
 
 def _height(mode: IdentifiedMode) -> float:
@@ -223,13 +212,6 @@ def _merged(used: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
     return [replace(used[0], response=mean, coherence=np.clip(power / (power + scatter + 1e-300), 0.0, 1.0))]
 
 
-def _of_responses(responses: Sequence[FrequencyResponse], applied_s: float | None) -> _Measured:
-    parts = tuple(measured_lines(each, applied_s) for each in responses)
-    low = min(float(lines.omega[0]) for lines in parts)
-    high = max(float(lines.omega[-1]) for lines in parts)
-    return _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
-
-
 def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -> tuple[_Measured, Hits]:
     """The impacts with these responses, as they are fitted."""
     period = ready.records[0].period_s
@@ -281,8 +263,11 @@ def _left(measured: _Measured, hits: Hits, model: ComplexArray) -> ComplexArray:
     return np.where(_inside(measured.parts[0], measured), hits.response - model * hits.force, 0.0)
 
 
-def _in_responses(measured: _Measured, sought: Sought) -> FrfModes:
+def _in_responses(responses: Sequence[FrequencyResponse], sought: Sought) -> FrfModes:
     """Search twice, with the lines weighed by what is left in between, and test every mode."""
+    parts = tuple(measured_lines(each, sought.exponential_window_s) for each in responses)
+    low, high = min(float(each.omega[0]) for each in parts), max(float(each.omega[-1]) for each in parts)
+    measured = _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
     pool, poles = candidates_of(measured.parts)
     windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
     models = _model(measured.parts, windows)
@@ -301,12 +286,14 @@ def _tested(
     """Every mode of the windows with its refusal, if any, and what the model explains."""
     modes = [mode for window in windows for mode in _modes(window, measured, pool, sought)]
     low_hz, high_hz = sought.band_hz or (0.0, np.inf)
-    modes = [each for each in modes if low_hz <= each.frequency_hz.value <= high_hz]
-    modes = _strongest(modes, sought)
+    modes = _strongest([each for each in modes if low_hz <= each.frequency_hz.value <= high_hz], sought)
     model = _model(measured.parts, windows)
+    by_order: dict[int, Starts] = {}
+    for pole in poles:
+        by_order.setdefault(pole.order, []).append((pole.omega, pole.zeta))
     return FrfModes(
-        tuple(sorted(modes, key=lambda mode: mode.frequency_hz.value)), tuple(windows), _chart(poles), tuple(model),
-        _explained(measured, model), _missing_peak(measured, modes),
+        tuple(sorted(modes, key=lambda mode: mode.frequency_hz.value)), tuple(windows),
+        chart_of(sorted(by_order.items())), tuple(model), _explained(measured, model), _missing_peak(measured, modes),
     )  # fmt: skip
 
 
@@ -400,14 +387,6 @@ def doubt_of(found: FrfModes) -> str:
     return ""
 
 
-def _chart(poles: Sequence[Pole]) -> tuple[ChartPole, ...]:
-    """Poles of all bands by the order of their model."""
-    by_order: dict[int, Starts] = {}
-    for pole in poles:
-        by_order.setdefault(pole.order, []).append((pole.omega, pole.zeta))
-    return chart_of(sorted(by_order.items()))
-
-
 # --- The modes of a window --------------------------------------------------------------------------------------------
 def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], sought: Sought) -> list[IdentifiedMode]:
     if not window.inside():
@@ -438,9 +417,9 @@ def _other_fits(window: Window) -> list[ModalFit]:
     found = []
     for parts in (narrow, other):
         columns = (2 + 1 + parts[0].complex_modes) * len(starts) + 6
-        if min(2 * len(lines.s) * lines.independent for lines in parts) > _ENOUGH * columns:
-            found.append(fitted(parts, starts))
-    return [each for each in found if each is not None]
+        enough = min(2 * len(lines.s) * lines.independent for lines in parts) > _ENOUGH * columns
+        found += [fit] if enough and (fit := fitted(parts, starts)) is not None else []
+    return found
 
 
 def _logarithms(
@@ -529,9 +508,9 @@ def _record_refusal(hertz: float, zeta: float, measured: _Measured) -> str:
             f"its half-power width of {width:.3g} Hz is less than the {measured.resolution_hz:.3g} Hz between two "
             "lines: window and length of the record make such a peak; needed is a finer resolution, or the time record"
         )
-    lasting = lasting_share(hertz, zeta, measured.record_s)
-    if lasting > LASTING:
-        return lasting_refusal(lasting, measured.record_s)
+    refusal, lasting = lasting_refusal(hertz, zeta, measured.record_s)
+    if refusal:
+        return refusal
     mains = min((k * base for base in _MAINS_HZ for k in range(1, _HARMONICS)), key=lambda each: abs(each - hertz))
     if lasting > _HUM and abs(mains - hertz) < min(_HUM_WIDTH * measured.resolution_hz, _MAINS_WIDTH_HZ):
         return f"beside {mains:g} Hz, a harmonic of the mains, and still at {100.0 * lasting:.0f} %: it may be hum"

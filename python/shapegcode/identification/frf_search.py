@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg
 
 from shapegcode.errors import ArgumentError
-from shapegcode.identification.frf_model import Lines, ModalFit, fit_modes, mode_columns, modelled
+from shapegcode.identification.frf_model import Lines, ModalFit, fit_modes, mode_columns
 from shapegcode.identification.problem import Starts
 from shapegcode.io.frequency_response import ComplexArray
 from shapegcode.io.units import FloatArray
@@ -62,10 +62,9 @@ def candidates_of(parts: Sequence[Lines]) -> tuple[list[StablePole], list[Pole]]
         last = end if end == high else end / _EDGE
         kept = [pole for pole in poles if first <= pole.omega <= last]
         everything += kept
-        if kept:
-            highest = max(pole.order for pole in poles)
-            orders = {pole.order for pole in poles if pole.order > highest // 3}
-            found += _clusters([pole for pole in kept if pole.order in orders], len(orders))
+        highest = max((pole.order for pole in poles), default=0)
+        orders = {pole.order for pole in poles if pole.order > highest // 3}
+        found += _clusters([pole for pole in kept if pole.order in orders], len(orders))
         begin *= _STEP
     candidates: list[StablePole] = []
     for each in sorted(found, key=lambda each: -each.share):
@@ -112,11 +111,10 @@ def search(
     parts: Sequence[Lines], low: float, high: float, most: int, candidates: Sequence[StablePole], starts: Starts | None
 ) -> list[Window]:
     """Fit windows, each without what the modes outside of it do in it; from poles that are stable, or from `starts`."""
-    spare = [(each.omega, each.zeta) for each in candidates]
-    final = starts is not None
+    final, least = starts is not None, STABLE if starts is None else np.inf
+    spare = [(each.omega, each.zeta) for each in candidates if each.share < least]
     if starts is None:
         starts = [(each.omega, each.zeta) for each in candidates if each.share >= STABLE]
-        spare = [(each.omega, each.zeta) for each in candidates if each.share < STABLE]
     known = _linear(parts, starts)
     windows: list[Window] = []
     begin = low
@@ -169,7 +167,9 @@ def _without(lines: Lines, modes: Starts, residues: ComplexArray) -> Lines:
     if not modes:
         return lines
     omega, zeta = np.array(modes).T
-    return replace(lines, response=lines.response - modelled(lines, omega, zeta, residues))
+    # The imaginary part of a residue goes with s/omega.
+    gain = residues.real + residues.imag * (lines.s[:, None] / omega)
+    return replace(lines, response=lines.response - np.sum(mode_columns(lines, omega, zeta)[0] * gain, axis=1))
 
 
 def cut(lines: Lines, low: float, high: float, complex_modes: bool, degree: int = _DEGREE) -> Lines:

@@ -125,18 +125,10 @@ def identify(
 
 
 def _identified(
-    sources: Sequence[Any],
-    names: tuple[str, ...],
-    options: ReadOptions,
-    sought: model_search.Sought,
-    start_s: float | None,
-    sweep: Program | str | Path | None,
-    machine: Machine | str | Path | None,
-    *,
-    stops: bool,
-    across: bool,
-    strict: bool,
-) -> Identification:
+    sources: Sequence[Any], names: tuple[str, ...], options: ReadOptions, sought: model_search.Sought,
+    start_s: float | None, sweep: Program | str | Path | None, machine: Machine | str | Path | None, *, stops: bool,
+    across: bool, strict: bool,
+) -> Identification:  # fmt: skip
     """The modes along one axis; of a sweep what they move across too."""
     ready: Prepared | None = None
     band_hz = sought.band_hz
@@ -271,9 +263,8 @@ def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quanti
 
 def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
     """The record of a resonance sweep, if that is what the file holds; None: it is anything else."""
-    paths = [Path(each) for each in sources if isinstance(each, str | Path)]
     found = []
-    for path in paths:
+    for path in [Path(each) for each in sources if isinstance(each, str | Path)]:
         if path.is_file():
             with open_file(path) as file:
                 found += [path] if is_klipper(file.read(400)) else []
@@ -284,8 +275,7 @@ def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
     return read_sweep(found[0], options)
 
 
-_FEW_MODES, _MORE = 4, 2  # that are fitted over time; beyond those that are seen at once
-_START_DAMPING = 0.02
+_FEW_MODES, _MORE, _START_DAMPING = 4, 2, 0.02  # that are fitted over time; beyond those that are seen at once
 _SAMPLES_IN_TIME = 20_000  # of all records together; more take too long
 _EXPLAINED, _NOISE_SHARE = 0.003, 1.5  # of the record's RMS that few modes may leave; or times its noise
 _MANY = "many modes, or more than modes: fitted over frequency, band by band, in what the hits excite"
@@ -396,13 +386,9 @@ def _choose_course(
 
 
 def _result(
-    ready: Prepared,
-    files: tuple[str, ...],
-    problem: FitProblem,
-    models: model_search.Search,
-    others: Sequence[Fit],
+    ready: Prepared, files: tuple[str, ...], problem: FitProblem, models: model_search.Search, others: Sequence[Fit],
     sought: model_search.Sought,
-) -> Identification:
+) -> Identification:  # fmt: skip
     order = sought.order(models)
     warnings = _warnings_of(ready)
     squares = sum(float(np.sum(response**2)) for response in problem.responses)

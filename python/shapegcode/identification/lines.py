@@ -15,8 +15,7 @@ from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.units import FloatArray
 
 _END = 1e-2  # of the exponential window
-_LEAD = 4  # samples before a pulse
-_LAGS = 64
+_LEAD, _LAGS = 4, 64  # samples before a pulse
 _QUIETEST = 1e-6  # of the largest line: no sensor has less noise
 _LATE = 0.4  # a steady disturbance is looked for behind this share of the record
 _STANDS_OUT = 8.0  # times the median of the spectrum there
@@ -48,10 +47,9 @@ def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, lis
     if not chosen:
         return np.zeros(samples), []
     time_s = np.arange(samples) * period_s
-    columns = [np.ones(samples), time_s]
-    for hertz in chosen:
-        columns += [np.cos(2.0 * np.pi * hertz * time_s), np.sin(2.0 * np.pi * hertz * time_s)]
-    stacked = np.array(columns).T
+    turns = [2.0 * np.pi * hertz * time_s for hertz in chosen]
+    waves = [wave(turn) for turn in turns for wave in (np.cos, np.sin)]
+    stacked = np.array([np.ones(samples), time_s, *waves]).T
     late = slice(samples - 2 * half, samples)
     factors = np.linalg.lstsq(stacked[late], response[late], rcond=None)[0]
     return np.asarray(stacked[:, 2:] @ factors[2:], dtype=np.float64), chosen

@@ -175,7 +175,7 @@ def _attempt(problem: FitProblem, starts: Starts, **how: Any) -> Fit | None:
 ACCEPTED_PERCENT = 5.0  # A damping ratio or stiffness less certain is refused: 10 % are four standard deviations off
 _FREQUENCY_PERCENT, _NOT_AT_ALL_PERCENT = 2.0, 1000.0
 _NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
-LASTING = 0.8  # What has not fallen to this share at the end does not decay: mains hum, a pump, a turning spindle
+_LASTING = 0.8  # What has not fallen to this share at the end does not decay: mains hum, a pump, a turning spindle
 _RIVAL_PROBABILITY = 0.05  # A model with a mode more is a rival while chance alone would seldom make it fit better
 _UNKNOWN = 7.0  # half width of a logarithm that says nothing: a factor of a thousand
 SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
@@ -307,11 +307,8 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
             f"{frequency.value * doubts.record_s:.1f} swings in the record of {doubts.record_s:.3g} s: "
             f"{MIN_SWINGS:g} or more are needed"
         )
-    lasting = lasting_share(frequency.value, damping.value, doubts.record_s)
-    if lasting > LASTING:
-        return lasting_refusal(lasting, doubts.record_s)
-    folded = 100.0 * doubts.aliased(frequency.value)
-    refusal = interval_refusal(mode, doubts.limit_percent, folded)
+    refusal = lasting_refusal(frequency.value, damping.value, doubts.record_s)[0]
+    refusal = refusal or interval_refusal(mode, doubts.limit_percent, 100.0 * doubts.aliased(frequency.value))
     if refusal:
         return refusal
     if mode.refusal or doubts.rival is None:
@@ -331,17 +328,14 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
     return ""
 
 
-def lasting_share(frequency_hz: float, damping_ratio: float, record_s: float) -> float:
-    """What is left of a mode at the end of a record."""
-    return float(np.exp(-2.0 * np.pi * frequency_hz * damping_ratio * record_s))
-
-
-def lasting_refusal(lasting: float, record_s: float) -> str:
-    """Why what does not decay is refused."""
-    return (
+def lasting_refusal(frequency_hz: float, damping_ratio: float, record_s: float) -> tuple[str, float]:
+    """Why what does not decay is refused, empty where it does; what is left at the end of the record."""
+    lasting = float(np.exp(-2.0 * np.pi * frequency_hz * damping_ratio * record_s))
+    said = (
         f"still at {100.0 * lasting:.0f} % after {record_s:.3g} s: a steady disturbance (mains, pump, "
         "spindle), or a record too short for a mode of so little damping"
     )
+    return said if lasting > _LASTING else "", lasting
 
 
 def interval_refusal(mode: IdentifiedMode, limit_percent: float, folded_percent: float = 0.0) -> str:

@@ -345,13 +345,17 @@ def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[lis
     return found
 
 
+def plain_name(name: str) -> str:
+    """A name as a comment of any control may hold it."""
+    return "".join(sign for sign in name.upper() if sign.isalnum() or sign in " -.")[:30]
+
+
 def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) -> str:
     """The program."""
     decimals = max(1, round(-math.log10(machine.controller.least_increment_mm)))
     reach = max(stroke.length_mm for band in bands for stroke in band)
-    plain = "".join(sign for sign in machine.name.upper() if sign.isalnum() or sign in " -.")[:30]
     lines = [
-        "%", f"O{number:04d}(SWEEP {axis.upper()})", f"(SWEEP BY SHAPEGCODE FOR {plain})",
+        "%", f"O{number:04d}(SWEEP {axis.upper()})", f"(SWEEP BY SHAPEGCODE FOR {plain_name(machine.name)})",
         f"(SHAKES {axis.upper()}: 0 TO +{reach:.{decimals}f} MM FROM THE START POINT)",
         "(AIR ONLY: NO SPINDLE, NO OTHER AXIS MOVES, ENDS WHERE IT BEGAN)",
         "(START THE LOGGER FIRST, STOP IT LAST. OVERRIDE 100 PERCENT)",

@@ -1,7 +1,6 @@
 """A machine as the core simulates it: made once from the machine file, used by every simulation.
 
-Whether a path is planned or simulated block by block is decided in `SimulatedController` alone. At the end: which lines
-of LinuxCNC's INI file a shaped program needs.
+Whether a path is planned or simulated block by block is decided in `SimulatedController` alone.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, TypedDict, Unpack
 
 import numpy as np
 
@@ -147,12 +146,8 @@ def _limit(value: float | None) -> float:
     return math.inf if value is None else value
 
 
-BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
-"""Both rules of block timing."""
-
-PLANTS = ("modal", "feed-drive")
-"""The plants that there are: modes behind an ideal servo, or motor, ball screw and table with their servo loops."""
-
+BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)  # both rules of block timing
+PLANTS = ("modal", "feed-drive")  # modes behind an ideal servo; motor, ball screw and table with their servo loops
 _DRIVE_REST_S = 0.5  # how long behind a stop the error of feed drives is looked at
 _LEAST_DECAY_PER_S = 0.01  # below it a mode has no damping to speak of
 
@@ -188,12 +183,10 @@ class SimulatedController:
         self.model = model
         self._override = override
         model.limits.feed_override *= override
-        self.filters = _core.acceleration_filters(model)
-        """Filters of acceleration/deceleration after interpolation."""
+        self.filters = _core.acceleration_filters(model)  # of acceleration/deceleration after interpolation
 
     def _planned(self, path: _core.Path) -> tuple[_core.Path, _core.SpeedProfile] | None:
-        """Motion that the planner computes for a path, and its speed along it; None if the control executes block by
-        block."""
+        """Motion that the planner computes for a path, and its speed; None if the control executes block by block."""
         model = self.model
         look_ahead = model.motion == _core.MotionKind.look_ahead or model.planner.kind != _core.ControllerKind.fanuc
         return _core.controlled_motion(path, model.limits, model.planner) if look_ahead else None
@@ -230,41 +223,37 @@ class SimulatedController:
         return _core.travel_blocks(path, along, self.model.block_end, stations_mm, period_s, self.filters, window_s)
 
 
+class _Given(TypedDict, total=False):
+    """What simulations of a cut pass on to `MachineModel.options`."""
+
+    shift: float
+    only: str | None
+    offset: Offset
+
+
 class MachineModel:
     """Controller, limits and plant of a machine for the core."""
 
     def __init__(self, machine: Machine) -> None:
-        self.machine = machine
-        """What the machine file says."""
-        self.name = machine.name
-        """Of the machine."""
+        self.machine, self.name = machine, machine.name
         self.period_s = machine.controller.interpolation_period_s
-        """Interpolation period."""
         self.own_rule: _core.BlockEnd = getattr(_core.BlockEnd, machine.controller.block_end)
-        """The controller's own rule of block timing."""
+        # Whether the control plans shaped blocks too: its planner cannot be switched off.
         self.always_plans = machine.controller.kind != "fanuc"
-        """Whether the control plans shaped blocks too: its planner cannot be switched off."""
+        # Rules of block timing under which emitted blocks are simulated; a planner has one of its own.
         self.block_rules = (self.own_rule,) if self.always_plans else BLOCK_ENDS
-        """Rules of block timing under which emitted blocks are simulated; a planner has one of its own."""
-        rates = [
-            damping * 2.0 * math.pi * frequency
-            for axis in machine.axes.as_tuple()
-            for mode in axis.modes
-            for frequency, damping in (slowest_mode(mode),)
-        ]
-        self.slowest_decay_per_s = min(rates, default=math.inf)
-        """Decay rate of the mode that rings longest: damping ratio times angular frequency; infinite without modes."""
+        slowest = [slowest_mode(mode) for axis in machine.axes.as_tuple() for mode in axis.modes]
+        rates = [damping * 2.0 * math.pi * frequency for frequency, damping in slowest]
+        self.slowest_decay_per_s = min(rates, default=math.inf)  # of the mode that rings longest
 
     def __reduce__(self) -> tuple[type[MachineModel], tuple[Machine]]:
         """Built again from the machine: what the core holds does not travel."""
         return MachineModel, (self.machine,)
 
     def __eq__(self, other: object) -> bool:
-        """Whether it is the same machine."""
         return self.machine == other.machine if isinstance(other, MachineModel) else NotImplemented
 
     def __hash__(self) -> int:
-        """That of the machine."""
         return hash(self.machine)
 
     @cached_property
@@ -282,13 +271,10 @@ class MachineModel:
     @cached_property
     def shaped_filter(self) -> OwnFilter:
         """Acceleration/deceleration after interpolation for shaped blocks."""
-        controller, filters = self.machine.controller, self.shaped.filters
-        return OwnFilter(
-            controller.shaped_filter_shape,
-            controller.shaped_time_constant_s,
-            controller.shaped_bell_time_s,
-            sum(each.duration_samples + 1 for each in filters) * self.period_s,
-        )
+        control = self.machine.controller
+        times_s = control.shaped_time_constant_s, control.shaped_bell_time_s
+        duration_s = sum(each.duration_samples + 1 for each in self.shaped.filters) * self.period_s
+        return OwnFilter(control.shaped_filter_shape, *times_s, duration_s)
 
     def simulated(self, *, shaped: bool) -> SimulatedController:
         """One of the two: `shaped` for a program that shapegcode wrote."""
@@ -316,14 +302,9 @@ class MachineModel:
         return region_offset(region, self.machine)
 
     def options(
-        self,
-        *,
-        plant: str = "modal",
-        filters: Sequence[_core.Fir] = (),
-        shift: float = 0.0,
-        only: str | None = None,
+        self, *, plant: str = "modal", filters: Sequence[_core.Fir] = (), shift: float = 0.0, only: str | None = None,
         offset: Offset = NO_OFFSET,
-    ) -> _core.SimulationOptions:
+    ) -> _core.SimulationOptions:  # fmt: skip
         """Interpolation period and plant, with acceleration filters after interpolation."""
         if plant not in PLANTS:
             raise _core.ArgumentError(f"plant = {plant!r}: must be one of {', '.join(PLANTS)}")
@@ -338,40 +319,22 @@ class MachineModel:
         options.axis_filters = list(filters)
         return options
 
-    def verdict_options(
-        self,
-        *,
-        filters: Sequence[_core.Fir] = (),
-        shift: float = 0.0,
-        only: str | None = None,
-        offset: Offset = NO_OFFSET,
-    ) -> _core.SimulationOptions:
-        """Simulation options with the plant of the verdict.
-
-        With feed drives the residual is the vibration of the table relative to its motor after its arrival: the lag
-        that runs out at a stop is no vibration.
-        """
+    def verdict_options(self, *, filters: Sequence[_core.Fir] = (), **given: Unpack[_Given]) -> _core.SimulationOptions:
+        """Simulation options with the plant of the verdict."""
         plant = self.machine.verdict.plant
-        options = self.options(plant=plant, filters=filters, shift=shift, only=only, offset=offset)
+        options = self.options(plant=plant, filters=filters, **given)
         if plant != "modal":
+            # The lag that runs out at a stop is no vibration: the residual is that of table against motor.
             options.settling_limit_s = _DRIVE_REST_S
             options.arrived_mm = min(self.machine.controller.in_position_width_um.as_tuple()) * 1e-3
         return options
 
     def simulate_original(
-        self,
-        path: _core.Path,
-        *,
-        against: _core.Path | None = None,
-        override: float = 1.0,
-        shift: float = 0.0,
-        only: str | None = None,
-        record_samples: int = 0,
-        offset: Offset = NO_OFFSET,
-        emitted: bool = False,
-    ) -> _core.SimulationFigures:
+        self, path: _core.Path, *, against: _core.Path | None = None, override: float = 1.0, record_samples: int = 0,
+        emitted: bool = False, **given: Unpack[_Given],
+    ) -> _core.SimulationFigures:  # fmt: skip
         """A cut as the controller executes an ordinary program; `emitted`: with arcs as they are emitted."""
-        options = self.verdict_options(shift=shift, only=only, offset=offset)
+        options = self.verdict_options(**given)
         options.record_samples = record_samples
         controller = self._at_override(override, shaped=emitted and self.always_plans)
         return controller.simulate(path, options, against=against)
@@ -397,28 +360,14 @@ class MachineModel:
         return _core.simulate_samples(np.asfortranarray(samples), still, options)
 
     def simulate_emitted(
-        self,
-        blocks: _core.Path,
-        path: _core.Path,
-        block_end: _core.BlockEnd | None = None,
-        *,
-        override: float = 1.0,
-        contour: bool = True,
-        command_contour: bool = True,
-        response_contour: bool = True,
-        last_seconds: float = 0.0,
-        shift: float = 0.0,
-        only: str | None = None,
-        record_samples: int = 0,
-        offset: Offset = NO_OFFSET,
-        starved_blocks: Sequence[int] = (),
-        memory_s: float = 0.0,
-        other_overrides: Sequence[float] = (),
-        tracker: _core.ContourTracker | None = None,
-        increment_mm: float | None = None,
-    ) -> _core.SimulationFigures:
+        self, blocks: _core.Path, path: _core.Path, block_end: _core.BlockEnd | None = None, *, override: float = 1.0,
+        contour: bool = True, command_contour: bool = True, response_contour: bool = True, last_seconds: float = 0.0,
+        record_samples: int = 0, starved_blocks: Sequence[int] = (), memory_s: float = 0.0,
+        other_overrides: Sequence[float] = (), tracker: _core.ContourTracker | None = None,
+        increment_mm: float | None = None, **given: Unpack[_Given],
+    ) -> _core.SimulationFigures:  # fmt: skip
         """Emitted blocks as the controller simulates them, measured against the programmed path."""
-        options = self.verdict_options(filters=self.shaped.filters, shift=shift, only=only, offset=offset)
+        options = self.verdict_options(filters=self.shaped.filters, **given)
         options.measure_contour = contour
         if tracker is not None:
             options.tracker = tracker
@@ -439,13 +388,9 @@ class MachineModel:
         return _core.simulate_blocks(blocks, path, block_end or self.own_rule, override, options)
 
     def simulate_planned(
-        self,
-        blocks: _core.Path,
-        path: _core.Path,
-        *,
-        offset: Offset = NO_OFFSET,
+        self, blocks: _core.Path, path: _core.Path, *, offset: Offset = NO_OFFSET,
         tracker: _core.ContourTracker | None = None,
-    ) -> _core.SimulationFigures:
+    ) -> _core.SimulationFigures:  # fmt: skip
         """Emitted blocks as the look-ahead plans them again if it is left on, against the programmed path."""
         ticks = round(self.machine.controller.look_ahead_filter_time_constant_s / self.period_s)
         filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []

@@ -18,12 +18,9 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import AxisMode, Machine
 from shapegcode.machine.axes import Drive
 
+#: Machine position minus program position of X, Y, Z in mm; None where it is not known.
 Offset = tuple[float | None, float | None, float | None]
-"""Machine position minus program position of X, Y, Z in mm; None where it is not known."""
-
 NO_OFFSET: Offset = (0.0, 0.0, 0.0)
-"""Program positions are machine positions."""
-
 _AXES = "xyz"
 
 
@@ -265,49 +262,30 @@ def drive_parameters(
         MachineError: an axis has no such table, or its loop is unstable.
     """
     machine = Machine.of(machine)
-    missing = [
-        Problem(f"axes.{name}.drive", "", "required for a simulation with feed drives, but missing")
-        for name, axis in zip("xyz", machine.axes.as_tuple(), strict=True)
-        if axis.drive is None
-    ]
-    if missing:
-        raise MachineError(machine.name, tuple(missing))
-    gains = machine.controller.position_gain_per_s.as_tuple()
-    ratios = machine.controller.feed_forward_ratio.as_tuple()
-    parameters = [
-        _of_axis(modes, axis.drive, gain, ratio)
-        for axis, modes, gain, ratio in zip(
-            machine.axes.as_tuple(), own_modes(machine, shift, only), gains, ratios, strict=True
-        )
-        if axis.drive is not None
-    ]
-    unstable = [
-        problem
-        for name, axis, gain in zip("xyz", machine.axes.as_tuple(), gains, strict=True)
-        if axis.drive is not None
-        for problem in _instability(name, axis.drive, gain)
-    ]
+    control, axes = machine.controller, machine.axes.as_tuple()
+    drives = {f"axes.{name}.drive": axis.drive for name, axis in zip(_AXES, axes, strict=True)}
+    absent = "required for a simulation with feed drives, but missing"
+    if missing := tuple(Problem(key, "", absent) for key, drive in drives.items() if drive is None):
+        raise MachineError(machine.name, missing)
+    loops = zip(control.position_gain_per_s.as_tuple(), control.feed_forward_ratio.as_tuple(), strict=True)
+    parameters, unstable = [], []
+    for (key, drive), modes, (gain, ratio) in zip(drives.items(), own_modes(machine, shift, only), loops, strict=True):
+        assert drive is not None
+        parameters.append(_of_axis(modes, drive, gain, ratio))
+        # Whether the loop grows by itself, dry friction, backlash and force limit left out.
+        linear = _of_axis([], drive.model_copy(update=_LINEAR), gain, 0.0)
+        poles = np.linalg.eigvals(np.array(_core.linear_model(linear)[0]))
+        worst = poles[np.argmax(poles.real)]
+        if worst.real > _GROWING_PER_S:
+            said = (
+                f"the loop is unstable: it grows by a factor e in {1.0 / worst.real:.3g} s at "
+                f"{abs(worst.imag) / (2.0 * math.pi):.4g} Hz; lower controller.position_gain_per_s ({gain:g}), raise "
+                "velocity_bandwidth_hz or velocity_integral_time_s"
+            )
+            unstable.append(Problem(key, "", said))
     if unstable:
         raise MachineError(machine.name, tuple(unstable))
     return parameters
-
-
-def _instability(name: str, drive: Drive, gain_per_s: float) -> list[Problem]:
-    """The problem of a loop of an axis that grows by itself, dry friction, backlash and force limit left out."""
-    linear = _of_axis([], drive.model_copy(update=_LINEAR), gain_per_s, 0.0)
-    poles = np.linalg.eigvals(np.array(_core.linear_model(linear)[0]))
-    worst = poles[np.argmax(poles.real)]
-    if worst.real <= _GROWING_PER_S:
-        return []
-    return [
-        Problem(
-            f"axes.{name}.drive",
-            "",
-            f"the loop is unstable: it grows by a factor e in {1.0 / worst.real:.3g} s at "
-            f"{abs(worst.imag) / (2.0 * math.pi):.4g} Hz; lower controller.position_gain_per_s ({gain_per_s:g}), raise "
-            "velocity_bandwidth_hz or velocity_integral_time_s",
-        )
-    ]
 
 
 def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: float) -> _core.FeedDriveParameters:
@@ -315,38 +293,29 @@ def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: fl
     motor_mass = drive.motor_inertia_kg_m2 * rad_per_m**2
     reduced_mass = motor_mass * drive.table_mass_kg / (motor_mass + drive.table_mass_kg)
     stiffness = drive.stiffness_n_per_um * _N_PER_UM
-    return _core.FeedDriveParameters(
-        motor_mass_kg=motor_mass,
-        table_mass_kg=drive.table_mass_kg,
-        stiffness_n_per_m=stiffness,
-        damping_n_s_per_m=2.0 * drive.damping_ratio * math.sqrt(stiffness * reduced_mass),
-        position_gain_per_s=gain_per_s,
-        velocity_gain_n_s_per_m=2.0 * math.pi * drive.velocity_bandwidth_hz * (motor_mass + drive.table_mass_kg),
-        velocity_integral_time_s=drive.velocity_integral_time_s,
-        velocity_feed_forward_ratio=ratio,
-        acceleration_feed_forward_ratio=drive.acceleration_feed_forward_ratio,
-        position_feedback=getattr(_core.PositionFeedback, drive.position_feedback),
-        backlash_m=drive.backlash_um * _UM,
-        force_limit_n=0.0 if drive.torque_limit_n_m is None else drive.torque_limit_n_m * rad_per_m,
-        table_friction=_table_friction(drive),
-        motor_friction=_core.FrictionParameters(
-            viscous_n_s_per_m=drive.motor_friction_viscous_n_m_s_per_rad * rad_per_m**2
-        ),
-        modes=modes,
-    )
-
-
-def _table_friction(drive: Drive) -> _core.FrictionParameters:
-    return _core.FrictionParameters(
+    table_friction = _core.FrictionParameters(
         getattr(_core.FrictionModel, drive.friction_model),
         viscous_n_s_per_m=drive.friction_viscous_n_s_per_m,
-        coulomb_n=drive.friction_coulomb_n or 0.0,
-        static_n=drive.friction_static_n or 0.0,
+        coulomb_n=drive.friction_coulomb_n or 0.0, static_n=drive.friction_static_n or 0.0,
         stribeck_velocity_m_per_s=drive.friction_stribeck_velocity_mm_per_s * _MM,
         smoothing_velocity_m_per_s=drive.friction_smoothing_velocity_mm_per_s * _MM,
         bristle_stiffness_n_per_m=drive.friction_bristle_stiffness_n_per_um * _N_PER_UM,
         bristle_damping_n_s_per_m=drive.friction_bristle_damping_n_s_per_m,
-    )
+    )  # fmt: skip
+    motor_viscous = drive.motor_friction_viscous_n_m_s_per_rad * rad_per_m**2
+    return _core.FeedDriveParameters(
+        motor_mass_kg=motor_mass, table_mass_kg=drive.table_mass_kg, stiffness_n_per_m=stiffness,
+        damping_n_s_per_m=2.0 * drive.damping_ratio * math.sqrt(stiffness * reduced_mass),
+        position_gain_per_s=gain_per_s,
+        velocity_gain_n_s_per_m=2.0 * math.pi * drive.velocity_bandwidth_hz * (motor_mass + drive.table_mass_kg),
+        velocity_integral_time_s=drive.velocity_integral_time_s, velocity_feed_forward_ratio=ratio,
+        acceleration_feed_forward_ratio=drive.acceleration_feed_forward_ratio,
+        position_feedback=getattr(_core.PositionFeedback, drive.position_feedback),
+        backlash_m=drive.backlash_um * _UM,
+        force_limit_n=0.0 if drive.torque_limit_n_m is None else drive.torque_limit_n_m * rad_per_m,
+        table_friction=table_friction, motor_friction=_core.FrictionParameters(viscous_n_s_per_m=motor_viscous),
+        modes=modes,
+    )  # fmt: skip
 
 
 _WANTED = (

@@ -5,7 +5,7 @@ Memory does not grow with the length of a program: each piece is thinned as soon
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
-from shapegcode.model.machine_model import MachineModel, fanuc_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.model.modes import axis_modes
 from shapegcode.model.stream import Chunk, cuts_of_lines, stream
 from shapegcode.program import Program
@@ -31,10 +31,7 @@ from shapegcode.results.page.scene import (
     Variant,
 )
 
-MOST_POINTS = 60_000
-"""Samples of a program that a page shows, at most."""
-
-
+MOST_POINTS = 60_000  # samples of a program that a page shows, at most
 _HALF_PIXEL = 0.5
 _LEAST_EXTENT_MM = 1e-3
 _FLAT = {"deviation": 1e-3, "vibration": 1e-3, "speed": 1e-3, "acceleration": 1e-6}  # a curve within so little is flat
@@ -74,7 +71,6 @@ def scene_of(
 ) -> Scene:
     """Simulate a program and its emitted program for a page."""
     programs = [original, *([emitted] if emitted is not None else [])]
-    period_s = MachineModel(machine).period_s
     variants, spectra, notes = [], [], []
     for rank, (program, label) in enumerate(zip(programs, labels, strict=False)):
         key = ("original", "emitted")[rank]
@@ -89,12 +85,17 @@ def scene_of(
             f"{label}: {len(variant.sample)} of {variant.samples} samples, path within {kept.path_pixels:.1f} pixel of "
             f"{PIXELS_WIDE}, curves within {kept.pixels / PIXELS_HIGH * 100.0:.1f} % of their range"
         )
+    of_mode = "mode of {}, {:g} Hz".format
     return Scene(
-        period_s=period_s,
+        period_s=machine.controller.interpolation_period_s,
         variants=tuple(variants),
         thinned=f"Thinned for display, extremes kept ({'; '.join(notes)}). The figures are not thinned.",
         spectra=tuple(spectra),
-        modes=tuple(_mode_lines(machine)),
+        modes=tuple(
+            ModeLine(axis, mode.frequency_hz, of_mode(axis.upper(), mode.frequency_hz))
+            for axis, modes in zip("xyz", axis_modes(machine), strict=True)
+            for mode in modes
+        ),
         link_lines=tuple(
             (made.first_line, made.last_line, own.first_line, own.last_line)
             for made, own in (() if emitted is None else paired_regions(emitted, original))
@@ -103,15 +104,10 @@ def scene_of(
 
 
 def _variant(
-    key: str,
-    label: str,
-    program: Program,
-    nominal: Program,
-    machine: Machine,
-    plant: str,
+    key: str, label: str, program: Program, nominal: Program, machine: Machine, plant: str,
     on_progress: Callable[[float], None],
-) -> tuple[Variant, list[SceneSpectrum], Kept]:
-    period_s = MachineModel(machine).period_s
+) -> tuple[Variant, list[SceneSpectrum], Kept]:  # fmt: skip
+    period_s = machine.controller.interpolation_period_s
     whole_s = _core.time_program(program.core, fanuc_model(machine)).total_s or period_s
     cuts = [(mine, other.path) for mine, other in paired_regions(program, nominal)]
     followed = _Followed(sorted(cuts, key=lambda cut: cut[0].first_line))
@@ -182,9 +178,3 @@ def _most_hz(machine: Machine, period_s: float) -> float:
     """Highest frequency of a spectrum: twice the highest mode and at least 200 Hz, within half the sample rate."""
     highest = max((mode.frequency_hz for modes in axis_modes(machine) for mode in modes), default=0.0)
     return min(max(2.0 * highest, 200.0), 0.5 / period_s)
-
-
-def _mode_lines(machine: Machine) -> Iterator[ModeLine]:
-    for axis, modes in zip("xyz", axis_modes(machine), strict=True):
-        for mode in modes:
-            yield ModeLine(axis, mode.frequency_hz, f"mode of {axis.upper()}, {mode.frequency_hz:g} Hz")

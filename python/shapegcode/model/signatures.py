@@ -53,17 +53,12 @@ def _signature(doc: str | None) -> inspect.Signature | None:
     if not isinstance(found, ast.FunctionDef):
         return None
     free, named = found.args.args, found.args.kwonlyargs
+    defaults = [None] * (len(free) - len(found.args.defaults)) + list(found.args.defaults)
+    kinds = inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY
     parameters = [
         inspect.Parameter(each.arg, kind, default=_value(default), annotation=_words(each.annotation))
-        for kind, arguments, defaults in (
-            (
-                inspect.Parameter.POSITIONAL_OR_KEYWORD,
-                free,
-                [None] * (len(free) - len(found.args.defaults)) + list(found.args.defaults),
-            ),
-            (inspect.Parameter.KEYWORD_ONLY, named, found.args.kw_defaults),
-        )
-        for each, default in zip(arguments, defaults, strict=True)
+        for kind, arguments, given in ((kinds[0], free, defaults), (kinds[1], named, found.args.kw_defaults))
+        for each, default in zip(arguments, given, strict=True)
     ]
     return inspect.Signature(parameters, return_annotation=_words(found.returns))
 

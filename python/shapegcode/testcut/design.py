@@ -17,6 +17,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.cutting.tool import Tool
 from shapegcode.errors import ArgumentError
+from shapegcode.identification.sweep_program import plain_name
 from shapegcode.io.data_file import write_text
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
@@ -130,8 +131,8 @@ class CornerShape:
 
     def _sizes_mm(self, diameter_mm: float) -> _Sizes:
         """The three values for a tool; of what is not given, case 1 of the paper."""
-        given = (self.allowance_mm, self.rough_radius_mm, self.finish_radius_mm)
         usual = (0.1 * diameter_mm, diameter_mm, diameter_mm)
+        given = (self.allowance_mm, self.rough_radius_mm, self.finish_radius_mm)
         allowance, rough, finish = (other if own is None else own for own, other in zip(given, usual, strict=True))
         return allowance, rough, finish
 
@@ -262,14 +263,9 @@ def interval_cut(
 
 
 def _design(
-    given: CutConditions,
-    edge: Edge,
-    stock_mm: float,
-    passes: Sequence[tuple[str, Sequence[_Block]]],
-    about: TaperDetails | CornerDetails | IntervalDetails,
-    *,
-    met: Edge | None = None,
-) -> CutDesign:
+    given: CutConditions, edge: Edge, stock_mm: float, passes: Sequence[tuple[str, Sequence[_Block]]],
+    about: TaperDetails | CornerDetails | IntervalDetails, *, met: Edge | None = None,
+) -> CutDesign:  # fmt: skip
     """The design of measuring passes over one edge."""
     kind = next(kind for kind, figures in FIGURES.items() if isinstance(about, figures))
     warnings = []
@@ -280,16 +276,10 @@ def _design(
             "the corner: there its edge is hollow more sharply than the tool is round; the side file has what is met"
         )
     cut = TestCut(
-        kind=kind,
-        program="",
-        machine=given.machine.name,
-        tool=given._cut_tool(),
-        spindle_rev_per_min=given.spindle,
-        axial_depth_mm=given.axial_depth_mm,
-        milling="up" if given.up else "down",
-        passes=tuple(_measuring_pass(given, met or edge, stock_mm, name, blocks) for name, blocks in passes),
-        about=about,
-    )
+        kind, "", given.machine.name, given._cut_tool(), given.spindle, given.axial_depth_mm,
+        "up" if given.up else "down",
+        tuple(_measuring_pass(given, met or edge, stock_mm, name, blocks) for name, blocks in passes), about,
+    )  # fmt: skip
     return CutDesign(cut, (), tuple(warnings), edge, stock_mm, given.machine)
 
 
@@ -349,8 +339,7 @@ def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[FloatArray, Floa
 _SKIM_MM = 0.2
 _ROUGH_SHARE = 0.1  # of the diameter: largest radial depth of the cuts that mill the edge
 _RAW_MM = 0.5  # by which the raw edge may stand out
-_CLEAR_Z_MM = 10.0
-_NEAR_Z_MM = 2.0
+_CLEAR_Z_MM, _NEAR_Z_MM = 10.0, 2.0
 _BLOCKS_OF_EDGE = 3.0  # times the block time that a block of the edge lasts at least
 _SAMPLES_PER_TOOTH = 12.3  # no whole number: samples should not fall on the same angles over and over
 _TITLES = {"taper": "TAPER TEST CUT", "corner": "CORNER ON A STRAIGHT LINE", "interval": "FEED INTERVAL TEST"}
@@ -380,12 +369,11 @@ def write_test_cut(design: CutDesign, file: str | Path, number: int = 7101) -> C
     side = output.with_suffix(".json")
     named = replace(design, cut=replace(design.cut, program=output.name), files=(str(output), str(side)))
     write_text(side, to_text(named.cut.data()))
-    write_text(output, program_text(named, number))
+    write_text(output, _program_text(named, number))
     return named
 
 
-def program_text(design: CutDesign, number: int = 7101) -> str:
-    """The program of a test cut."""
+def _program_text(design: CutDesign, number: int) -> str:
     writer = _Writer(design)
     lines = ["%", f"O{number:04d}({_TITLES[design.cut.kind]})", *(f"({line})" for line in writer.head())]
     lines += ["G21 G17 G90 G94 G64 G40 G49 G80", "G54"]
@@ -406,7 +394,7 @@ class _Writer:
         self.design, self.cut, self.controller = design, design.cut, design.machine.controller
         self.decimals = max(1, round(-math.log10(self.controller.least_increment_mm)))
         self.radius = self.cut.tool.radius_mm
-        self.side = -1.0 if not self.cut.up else 1.0  # of the material, along Y: what lies within the raw edge
+        self.side = 1.0 if self.cut.up else -1.0  # of the material, along Y: what lies within the raw edge
         # How far each wall lies within the raw edge.
         self.walls = list(accumulate(round(max(each.edge_height_mm) + _SKIM_MM, 3) for each in self.cut.passes))
 
@@ -418,7 +406,7 @@ class _Writer:
         text = (resources.files("shapegcode") / "data" / "testcut_head.txt").read_text(encoding="ascii")
         yield from _PURPOSES[cut.kind]
         yield from text.format(
-            cut=cut, machine=_plain(cut.machine), stock_mm=self.design.stock_mm, rate=rate, clear_z_mm=_CLEAR_Z_MM,
+            cut=cut, machine=plain_name(cut.machine), stock_mm=self.design.stock_mm, rate=rate, clear_z_mm=_CLEAR_Z_MM,
             edge="REAR EDGE" if self.side < 0.0 else "FRONT EDGE", near=min(ends), far=max(ends),
             wide=math.ceil(self.walls[-1] + 5.0), deep=math.ceil(cut.axial_depth_mm + 2.0), override=OVERRIDE.comment,
             left=min(each.start_mm for each in cut.passes), right=max(each.end_mm for each in cut.passes),
@@ -430,18 +418,15 @@ class _Writer:
 
     def passes(self, k: int) -> Iterator[str]:
         """The edge of a pass, a stop, and the pass."""
-        each = self.cut.passes[k]
-        wall = self.walls[k]
-        before = self.walls[k - 1] if k else -_RAW_MM
+        each, wall = self.cut.passes[k], self.walls[k]
         path = offset_line(self.design.edge, self.radius, each.start_mm, each.end_mm)
         path = on_increments(path, self.controller.least_increment_mm)
         yield f"(PASS {k + 1}: MILL THE EDGE)"
-        for offset in _offsets(self.design.edge, before, wall, self.design.stock_mm, self.cut.tool.diameter_mm):
+        for offset in self._offsets(self.walls[k - 1] if k else -_RAW_MM, wall):
             yield from self._edge(path, wall, offset, min(feed for _, feed in each.feeds))
         yield f"G00 Z{_text(_CLEAR_Z_MM)}"
         yield f"M00 (START RECORD {k + 1}: {each.name})"
-        # The control may have stopped the spindle.
-        yield f"S{self.cut.spindle_rev_per_min:g} M03"
+        yield f"S{self.cut.spindle_rev_per_min:g} M03"  # The control may have stopped the spindle
         yield "G04 P3000"
         yield from self._begin(each.start_mm, self.side * (wall - self.radius), each.feed_mm_per_min)
         for end, feed in each.feeds:
@@ -468,16 +453,12 @@ class _Writer:
             first = ""
         yield f"G00 Z{_text(_NEAR_Z_MM)}"
 
-
-def _offsets(edge: Edge, before: float, wall: float, stock: float, diameter: float) -> list[float]:
-    """How far outside of the edge each cut runs: none takes off much, the last one little, so that it bends little."""
-    x = np.linspace(0.0, stock, 200)
-    most = float(np.max(wall - edge.at(x) - before))
-    if most <= _SKIM_MM:
-        return [0.0]
-    rough = math.ceil((most - _SKIM_MM) / (_ROUGH_SHARE * diameter))
-    return [round(_SKIM_MM + (most - _SKIM_MM) * k / rough, 3) for k in range(rough - 1, -1, -1)] + [0.0]
-
-
-def _plain(name: str) -> str:
-    return "".join(sign for sign in name.upper() if sign.isalnum() or sign in " -.")[:30]
+    def _offsets(self, before: float, wall: float) -> list[float]:
+        """How far outside of the edge each cut runs: none takes off much, the last one little: it bends little."""
+        more = (
+            float(np.max(wall - self.design.edge.at(np.linspace(0.0, self.design.stock_mm, 200)) - before)) - _SKIM_MM
+        )
+        if more <= 0.0:
+            return [0.0]
+        rough = math.ceil(more / (_ROUGH_SHARE * self.cut.tool.diameter_mm))
+        return [round(_SKIM_MM + more * k / rough, 3) for k in range(rough - 1, -1, -1)] + [0.0]

@@ -1,5 +1,4 @@
-"""Evaluate the records of a test cut: coefficients of a taper, resultant in a corner, interval that the control
-follows."""
+"""Evaluate the records of a test cut: coefficients of a taper, resultant in a corner, interval that is followed."""
 
 from __future__ import annotations
 
@@ -95,9 +94,7 @@ def fit_test_cut(
     return _fit_corner(known, measured) if known.kind == "corner" else _fit_interval(known, measured)
 
 
-_BINS_PER_PASS = 60
-_MIN_TURNS = 4
-_ROUNDS = 2
+_BINS_PER_PASS, _MIN_TURNS, _ROUNDS = 60, 4, 2
 _ONE_FILE = np.zeros(0, dtype=np.intp)  # its number is given where files are joined
 _PLACE = 0.25  # Standard error of the place of the tool, found from entry and exit, in feeds per revolution
 _PER_MINUTE = 60.0
@@ -163,8 +160,7 @@ def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
 def _reduced(
     cut: TestCut, measured: Mapping[int, ForceRecord], law: CuttingLaw
 ) -> tuple[list[MeanForces], list[TaperPass], list[LeftOut], list[str]]:
-    """Reduce the records to mean forces (as recorded, or of the revolutions in full engagement without chatter); and
-    warnings."""
+    """Reduce the records to mean forces, as recorded or of revolutions in full engagement without chatter."""
     rows: list[MeanForces] = []
     passes: list[TaperPass] = []
     left_out: list[LeftOut] = []
@@ -244,16 +240,11 @@ def _joined(rows: Sequence[MeanForces]) -> MeanForces:
 
     # A torque that only some of the files have does not help the others.
     torques = [each.torque_nm for each in rows if each.torque_nm is not None]
-    return MeanForces(
-        Engagement.joined([each.met for each in rows]),
-        column("feed_mm_per_min"),
-        column("spindle_rev_per_min"),
-        column("force_n"),
-        column("revolutions"),
-        np.repeat(np.arange(len(rows)), [len(each.force_n) for each in rows]),
-        Engagement.joined([each.displaced or each.met for each in rows]),
-        np.concatenate(torques) if len(torques) == len(rows) else None,
-    )
+    torque = np.concatenate(torques) if len(torques) == len(rows) else None
+    met, displaced = ([each.met for each in rows], [each.displaced or each.met for each in rows])
+    group = np.repeat(np.arange(len(rows)), [len(each.force_n) for each in rows])
+    feed, speed, force, turns = map(column, ("feed_mm_per_min", "spindle_rev_per_min", "force_n", "revolutions"))
+    return MeanForces(Engagement.joined(met), feed, speed, force, turns, group, Engagement.joined(displaced), torque)
 
 
 # --- corner: measured against expected resultant (paper 001, figure 7) ------------------------------------------------
@@ -262,16 +253,24 @@ _MARGIN_REVS = 4.0
 
 
 def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResult:
-    passes = {number: _pass(cut, number, record) for number, record in measured.items()}
+    passes = {}
+    for number, record in measured.items():
+        measuring = cut.passes[number - 1]
+        forecast = expected(cut, measuring)
+        found = revolutions(place_samples(record, cut, measuring, forecast))
+        seen = _inside(cut, number, found.x_mm) & ~found.chatter
+        far = _inside(cut, number, forecast.x_mm)
+        recorded = float(found.resultant_n[seen].max()), float(found.peak_n[seen].max())
+        wanted = float(forecast.mean_resultant_n[far].max()), float(forecast.peak_resultant_n[far].max())
+        passes[number] = CornerPass(number, *recorded, *wanted, found, forecast)
     first = passes[min(passes)]
     seen = _inside(cut, first.number, first.record.x_mm) & ~first.record.chatter
     there = np.interp(first.record.x_mm[seen], first.forecast.x_mm, first.forecast.mean_resultant_n)
     ratio = None
     if {1, 2} <= set(passes):
         before, after = passes[1], passes[2]
-        ratio = ForceRatio(
-            after.measured_mean_n / before.measured_mean_n, after.expected_mean_n / before.expected_mean_n
-        )
+        of_mean = after.measured_mean_n / before.measured_mean_n
+        ratio = ForceRatio(of_mean, after.expected_mean_n / before.expected_mean_n)
     return CornerResult(
         program=cut.program,
         machine=cut.machine,
@@ -279,23 +278,6 @@ def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResu
         ratio=ratio,
         scale=float(there @ first.record.resultant_n[seen] / (there @ there)),
         warnings=tuple(note for each in passes.values() for note in each.record.record.notes),
-    )
-
-
-def _pass(cut: TestCut, number: int, record: ForceRecord) -> CornerPass:
-    measuring = cut.passes[number - 1]
-    forecast = expected(cut, measuring)
-    found = revolutions(place_samples(record, cut, measuring, forecast))
-    seen = _inside(cut, number, found.x_mm) & ~found.chatter
-    far = _inside(cut, number, forecast.x_mm)
-    return CornerPass(
-        number=number,
-        measured_mean_n=float(found.resultant_n[seen].max()),
-        measured_peak_n=float(found.peak_n[seen].max()),
-        expected_mean_n=float(forecast.mean_resultant_n[far].max()),
-        expected_peak_n=float(forecast.peak_resultant_n[far].max()),
-        record=found,
-        forecast=forecast,
     )
 
 
@@ -307,17 +289,14 @@ def _inside(cut: TestCut, number: int, x_mm: FloatArray) -> npt.NDArray[np.bool_
 
 # --- interval test: at which interval the controller follows the commanded feeds --------------------------------------
 
-_DEVIATION_LIMIT = 0.05
-_NOISE_SHARE = 2.0
+_DEVIATION_LIMIT, _NOISE_SHARE = 0.05, 2.0
 _LAGS_S = np.concatenate([[0.0], np.geomspace(2e-3, 0.5, 49)])
 _FEEDS = 40
 
 
 def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> IntervalResult:
-    records = {}
-    for number, record in measured.items():
-        measuring = cut.passes[number - 1]
-        records[number] = place_samples(record, cut, measuring, expected(cut, measuring))
+    passes = [(number, cut.passes[number - 1], record) for number, record in measured.items()]
+    records = {number: place_samples(each, cut, at, expected(cut, at)) for number, at, each in passes}
     found = sorted((_followed(cut, number, record) for number, record in records.items()), key=lambda p: p.interval_mm)
     good = [each.interval_mm for each in takewhile(lambda each: each.ok, reversed(found))]
     fastest = max(feed for each in cut.passes for _, feed in each.feeds)
@@ -364,19 +343,9 @@ def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
     off = np.abs(seen - wanted) / wanted
     noise = _noise(record.x_mm[straight], force[straight], 0.5 * interval)
     worst = int(np.argmax(off))
-    return FollowedPass(
-        number=number,
-        interval_mm=interval,
-        deviation=float(off[worst]),
-        at_mm=float(ends[worst]),
-        noise=noise,
-        lag_s=lag,
-        ok=bool(off[worst] <= _DEVIATION_LIMIT + _NOISE_SHARE * noise),
-        time_s=time,
-        force_n=size,
-        immediate_n=immediate,
-        lagging_n=course(lag),
-    )
+    ok = bool(off[worst] <= _DEVIATION_LIMIT + _NOISE_SHARE * noise)
+    told = number, interval, float(off[worst]), float(ends[worst]), noise, lag, ok
+    return FollowedPass(*told, time, size, immediate, course(lag))
 
 
 def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> tuple[FloatArray, FloatArray]:

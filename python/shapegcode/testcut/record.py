@@ -109,16 +109,13 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
 
 _PER_MINUTE = 60.0
 MIN_SAMPLES = 6.0  # Samples per revolution from which on a file is a record and not a table of means
-_MIN_AIR_REVS = 5
+_MIN_AIR_REVS, _GUARD_REVS = 5, 2
 _FEW_PER_TOOTH, _IN_STEP = 16.0, 0.01
 _TELL_SPEED, _TELL_FEED = 0.002, 0.005
-_GUARD_REVS = 2
 _ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04  # Of the noise in the air, and of the largest force: what is more is a cut
-_SPEED_RANGE = 0.05
+_SPEED_RANGE, _MIN_FOR_SPEED = 0.05, 20.0
 _CLEAR_LINE = 8.0  # times the median of the spectrum around it
-_MIN_FOR_SPEED = 20.0
-_MAX_SHIFT_MM = 1.0
-_SHIFT_STEPS = 81
+_MAX_SHIFT_MM, _SHIFT_STEPS = 1.0, 81
 #: The cut may last so much longer or shorter: at another feed override; where the place or the feeds are stated.
 _OTHER_FEED, _OTHER_LENGTH = 0.6, 0.03
 
@@ -265,48 +262,36 @@ def _without_offset(force: FloatArray, begin: int, end: int, guard: int) -> tupl
 
 
 def _positions(
-    record: ForceRecord,
-    measuring: MeasuringPass,
-    forecast: Expected,
-    size: FloatArray,
-    time: FloatArray,
-    moved: FloatArray,
-    contact: tuple[int, int],
-    notes: list[str],
-) -> FloatArray:
+    record: ForceRecord, measuring: MeasuringPass, forecast: Expected, size: FloatArray, time: FloatArray,
+    moved: FloatArray, contact: tuple[int, int], notes: list[str],
+) -> FloatArray:  # fmt: skip
     """X of the axis at each sample: entry and exit of the record laid over those that are expected."""
     seen = np.flatnonzero(forecast.mean_n > _ABOVE_SHARE * forecast.mean_n.max())
-    wanted = forecast.x_mm[seen[0]], forecast.x_mm[seen[-1]]
+    wanted, first = (forecast.x_mm[seen[0]], forecast.x_mm[seen[-1]]), contact[0]
     if record.position_mm is None and not measuring.constant_feed:
         # The travel over time is that of the blocks; only where it begins is looked for.
-        moved = _travel_of_blocks(measuring, time - time[contact[0]], wanted[0])
-    scale = (wanted[1] - wanted[0]) / (moved[contact[1]] - moved[contact[0]])
+        ends_mm = np.array([measuring.start_mm, *(end for end, _ in measuring.feeds)])
+        pace = _PER_MINUTE / np.array([feed for _, feed in measuring.feeds])
+        at = np.concatenate([[0.0], np.cumsum(np.diff(ends_mm) * pace)])
+        moved = np.interp(time - time[first] + np.interp(wanted[0], ends_mm, at), at, ends_mm)
+    length, wanted_length = moved[contact[1]] - moved[first], wanted[1] - wanted[0]
     free = record.position_mm is None and measuring.constant_feed
-    if abs(scale - 1.0) > (_OTHER_FEED if free else _OTHER_LENGTH):
+    if abs(wanted_length / length - 1.0) > (_OTHER_FEED if free else _OTHER_LENGTH):
         raise ArgumentError(
-            f"{record.file}: the cut is {moved[contact[1]] - moved[contact[0]]:.2f} mm long, it should be "
-            f"{wanted[1] - wanted[0]:.2f} mm: is it the right pass, and was the feed override 100 %?"
+            f"{record.file}: the cut is {length:.2f} mm long, it should be {wanted_length:.2f} mm: is it the right "
+            "pass, and was the feed override 100 %?"
         )
-    x = wanted[0] + (moved - moved[contact[0]]) * (scale if free else 1.0)
+    x = wanted[0] + (moved - moved[first]) * (wanted_length / length if free else 1.0)
     ends = [_shift(forecast, x, size, side) for side in wanted]
-    if free:
-        # Both ends: offset and rate.
-        share = (x - wanted[0]) / (wanted[1] - wanted[0])
-        x = x + ends[0] * (1.0 - share) + ends[1] * share
-        rate = float(np.polyfit(time, x, 1)[0]) * _PER_MINUTE
-        if abs(rate / measuring.feed_mm_per_min - 1.0) > _TELL_FEED:
-            notes.append(f"the feed was {rate:.1f} mm/min, {measuring.feed_mm_per_min:g} were commanded")
-    else:
-        x = x + ends[0]
+    if not free:
+        return np.asarray(x + ends[0])
+    # Both ends: offset and rate.
+    share = (x - wanted[0]) / wanted_length
+    x = x + ends[0] * (1.0 - share) + ends[1] * share
+    rate = float(np.polyfit(time, x, 1)[0]) * _PER_MINUTE
+    if abs(rate / measuring.feed_mm_per_min - 1.0) > _TELL_FEED:
+        notes.append(f"the feed was {rate:.1f} mm/min, {measuring.feed_mm_per_min:g} were commanded")
     return np.asarray(x)
-
-
-def _travel_of_blocks(measuring: MeasuringPass, time_s: FloatArray, entry_mm: float) -> FloatArray:
-    """X over time at the commanded feeds, at `entry_mm` at time 0."""
-    ends = np.array([measuring.start_mm, *(end for end, _ in measuring.feeds)])
-    pace = _PER_MINUTE / np.array([feed for _, feed in measuring.feeds])
-    at = np.concatenate([[0.0], np.cumsum(np.diff(ends) * pace)])
-    return np.asarray(np.interp(time_s + np.interp(entry_mm, ends, at), at, ends))
 
 
 def _shift(forecast: Expected, x: FloatArray, size: FloatArray, side: float) -> float:
