@@ -40,9 +40,8 @@ class AirBox:
         values = [float(word) for word in found.groups()]
         for axis, low, high in zip(AXES, values[::2], values[1::2], strict=True):
             if not low <= 0.0 <= high or low == high:
-                raise ArgumentError(
-                    f"--box {text}: {axis} from {low:g} to {high:g} mm does not hold the start point, which is 0"
-                )
+                span = f"{axis} from {low:g} to {high:g} mm"
+                raise ArgumentError(f"--box {text}: {span} does not hold the start point, which is 0")
             if max(-low, high) > _LARGEST_BOX_MM:
                 raise ArgumentError(f"--box {text}: {axis} reaches {max(-low, high):g} mm, the limit is 10000")
         return cls(tuple(values[::2]), tuple(values[1::2]))  # type: ignore[arg-type]
@@ -54,7 +53,6 @@ class AirBox:
         return high if high >= -low else low
 
     def __str__(self) -> str:
-        """As :meth:`parse` reads it."""
         return ",".join(f"{low:g}:{high:g}" for low, high in zip(self.low, self.high, strict=True))
 
 
@@ -148,8 +146,6 @@ _PER_MINUTE = 60.0
 
 
 class _Maker:
-    """Designs the parts of tests for one machine and one box."""
-
     def __init__(self, machine: Machine, box: AirBox) -> None:
         self._box = box
         self._step = machine.controller.least_increment_mm
@@ -161,16 +157,13 @@ class _Maker:
         self.feed = usable[0]
         self.rapid = {name: axis.rapid_mm_per_min for name, axis in zip(AXES, axes, strict=True)}
 
-    def _room(self, axis: str) -> float:
-        return abs(self._box.travel_mm(axis)) + 1e-9
-
     def _signed(self, axis: str, increments: int) -> float:
         """A length towards the farther side of the box."""
-        length = round(increments * self._step, 9)
-        if not 0.0 < length <= self._room(axis):
-            needed, room = max(length, self._step), abs(self._box.travel_mm(axis))
-            raise ArgumentError(f"--box {self._box}: {axis} has {room:g} mm, a test needs {needed:.3f} mm")
-        return math.copysign(length, self._box.travel_mm(axis))
+        length, travel = round(increments * self._step, 9), self._box.travel_mm(axis)
+        if not 0.0 < length <= abs(travel) + 1e-9:
+            needed = max(length, self._step)
+            raise ArgumentError(f"--box {self._box}: {axis} has {abs(travel):g} mm, a test needs {needed:.3f} mm")
+        return math.copysign(length, travel)
 
     def _length(self, axis: str, duration_s: float, feed: float, side: int) -> float:
         """Signed length for a duration; *side* -1 and +1: just below and just above it, whatever the increment."""
@@ -190,12 +183,11 @@ class _Maker:
     def run(self, axis: str, count: int, duration_s: float, side: int = 0) -> Part:
         """Continuous moves, there and back over as much of the box as they fill evenly."""
         length = self._length(axis, duration_s, self.feed, side)
-        stride = min(int(self._room(axis) / abs(length)), count // 2)
+        stride = min(int((abs(self._box.travel_mm(axis)) + 1e-9) / abs(length)), count // 2)
         turns = max(1, round(count / (2 * stride)))
         return Part("continuous", axis, 2 * stride * turns, length, self.feed, stride)
 
     def rapids(self, axis: str, ratio: float, count: int) -> Part:
-        """Rapids over a part of the box."""
         increments = math.floor(ratio * abs(self._box.travel_mm(axis)) / self._step + 1e-9)
         return Part("rapid", axis, count, self._signed(axis, increments), self.rapid[axis])
 
@@ -205,7 +197,7 @@ class _Maker:
 
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:
         """Pieces of one length, alternately fast and slow, and back; none where they have no room."""
-        room = int(self._room(axis) / length_mm)
+        room = int((abs(self._box.travel_mm(axis)) + 1e-9) / length_mm)
         wanted = max(8, 2 * math.ceil(_STEPS_WAY_S * self.feed / _PER_MINUTE / (2.0 * length_mm)))
         stride = min(wanted, room - room % 2)
         if stride < 4:

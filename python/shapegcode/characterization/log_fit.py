@@ -123,7 +123,6 @@ def _dwells(facts: LogFacts, part: moves.PartLog) -> float:
 
 
 def _in_position(facts: LogFacts, parts: list[moves.PartLog], stop_pitch: float | None) -> dict[str, _Interval]:
-    """In-position time of each axis from exact stops."""
     out = {}
     for part in parts:
         pitch, half = part.pitch_s()

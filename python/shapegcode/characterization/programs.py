@@ -151,8 +151,6 @@ class _PartTable(InlineTable):
 
 
 class _TestTable(TomlTable):
-    """One test."""
-
     program: Annotated[Text, Field(pattern=_PROGRAM)] = key("name of its file, such as O7001.nc")
     override_percent: Annotated[Count, Field(ge=1, le=254)] = key("feed override", default=100)
     times_s: tuple[_Time, ...] = key("stopwatch times", default=())
@@ -161,8 +159,6 @@ class _TestTable(TomlTable):
 
 
 class _SheetTable(TomlTable):
-    """The file."""
-
     resolution_s: Annotated[Float, Field(ge=1e-6, le=10)] = key("step of the stopwatch", default=0.1)
     reaction_s: Annotated[Float, Field(ge=0, le=10)] = key("scatter of start and stop", default=0.1)
     tests: Annotated[dict[str, _TestTable], Field(min_length=1)] = key(

@@ -37,8 +37,6 @@ _OUT_OF_PHASE = 1.0  # tan of the phase beyond which two directions do not move 
 
 @dataclass(frozen=True, eq=False)
 class _Poles:
-    """The modes that are known."""
-
     omega: FloatArray  # (m,) rad/s
     zeta: FloatArray  # (m,)
     applied: float  # 1/s, by which a window makes responses decay faster

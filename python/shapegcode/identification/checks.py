@@ -104,7 +104,6 @@ def _is_opposed(record: Record, hit: Hit, response: FloatArray, force: FloatArra
 
 
 def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> Usable:
-    """Check a record with force."""
     force = record.force_n
     assert force is not None
     if not np.ptp(force) > 0.0:
@@ -208,7 +207,6 @@ def _windowed(
 
 
 def _decay(record: Record, band_hz: float | None, start_s: float | None, warnings: list[str]) -> Usable:
-    """Check a record without force."""
     free = find_decay(record, start_s)
     if is_clipped(free.response):
         raise RecordError(
@@ -245,7 +243,6 @@ def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s:
 
 
 def _refuse_mixture(records: Sequence[Record]) -> None:
-    """Refuse records that do not belong together."""
     first = records[0]
     for other in records[1:]:
         pairs = [

@@ -81,8 +81,6 @@ POOR = 0.3  # share of the response in the band that a model which is used may l
 
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """What is fitted and what is known of it."""
-
     parts: tuple[Lines, ...]
     low: float  # rad/s
     high: float
@@ -112,10 +110,8 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
     merged = _merged(used) if one_point else used
     notes = list(dict.fromkeys(note for each in responses for note in each.notes))
     if len(used) > 1:
-        said = "agree and are averaged: one point" if one_point else (
-            f"are of several points: the modes are those of all, masses those at {used[0].source}"
-        )  # fmt: skip
-        notes.append(f"{len(used)} frequency responses {said}")
+        said = f"are of several points: the modes are those of all, masses those at {used[0].source}"
+        notes.append(f"{len(used)} frequency responses {'agree and are averaged: one point' if one_point else said}")
     if sought.exponential_window_s is None and sought.phase_known:
         notes.append(
             "a frequency response no longer tells overload, double hits or windows: an exponential window adds its "
@@ -176,7 +172,7 @@ def _chosen(
                 f"{highest:g} Hz"
             )
         used = [_within(each, (1.0 - _BESIDE) * band_hz[0], (1.0 + _BESIDE) * band_hz[1]) for each in used]
-    first_hz, last_hz = (np.array([each.frequency_hz[end] for each in used]) for end in (0, -1))
+    first_hz, last_hz = np.array([each.frequency_hz[[0, -1]] for each in used]).T
     common, whole = last_hz.min() - first_hz.max(), last_hz.max() - first_hz.min()
     if common < _COMMON * whole:
         raise RecordError(
@@ -184,12 +180,11 @@ def _chosen(
             "identify responses of different bands apart"
         )
     used = [_within(each, first_hz.max(), last_hz.min()) for each in used]
-    alike = all(np.array_equal(each.frequency_hz, used[0].frequency_hz) for each in used[1:])
-    mean = np.mean([each.response for each in used], axis=0) if alike else None
-    one_point = len(used) > 1 and mean is not None and all(
-        float(np.linalg.norm(each.response - mean)) < _SAME_POINT * float(np.linalg.norm(mean)) for each in used
-    )  # fmt: skip
-    return used, one_point
+    if len(used) < 2 or not all(np.array_equal(each.frequency_hz, used[0].frequency_hz) for each in used[1:]):
+        return used, False
+    mean = np.mean([each.response for each in used], axis=0)
+    most = _SAME_POINT * float(np.linalg.norm(mean))
+    return used, all(float(np.linalg.norm(each.response - mean)) < most for each in used)
 
 
 def _within(each: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyResponse:
@@ -204,7 +199,7 @@ def _of_lines(each: FrequencyResponse, inside: npt.NDArray[np.bool_]) -> Frequen
 
 
 def _merged(used: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
-    """One response, the mean of several of one point, with what they differ by as coherence."""
+    """The mean of several responses of one point, with what they differ by as coherence."""
     stacked = np.array([each.response for each in used])
     mean = np.mean(stacked, axis=0)
     scatter = np.sum(np.abs(stacked - mean) ** 2, axis=0) / (len(used) - 1) / len(used)
@@ -288,12 +283,15 @@ def _tested(
     low_hz, high_hz = sought.band_hz or (0.0, np.inf)
     modes = _strongest([each for each in modes if low_hz <= each.frequency_hz.value <= high_hz], sought)
     model = _model(measured.parts, windows)
+    parts = measured.parts
+    left = [lines.weight * (lines.response - each) for lines, each in zip(parts, model, strict=True)]
+    unexplained = _share_left(parts, left, [_inside(lines, measured) for lines in parts])
     by_order: dict[int, Starts] = {}
     for pole in poles:
         by_order.setdefault(pole.order, []).append((pole.omega, pole.zeta))
     return FrfModes(
         tuple(sorted(modes, key=lambda mode: mode.frequency_hz.value)), tuple(windows),
-        chart_of(sorted(by_order.items())), tuple(model), _explained(measured, model), _missing_peak(measured, modes),
+        chart_of(sorted(by_order.items())), tuple(model), 100.0 * (1.0 - unexplained), _missing_peak(measured, modes),
     )  # fmt: skip
 
 
@@ -344,14 +342,12 @@ def _inside(lines: Lines, measured: _Measured) -> npt.NDArray[np.bool_]:
     return (lines.omega >= measured.low) & (lines.omega < measured.high)
 
 
-def _explained(measured: _Measured, model: Sequence[ComplexArray]) -> float:
-    """Percent of the lines between the ends that the model explains."""
-    left = total = 0.0
-    for lines, fitted_lines in zip(measured.parts, model, strict=True):
-        inside = _inside(lines, measured)
-        left += float(np.sum(np.abs((lines.weight * (lines.response - fitted_lines))[inside]) ** 2))
-        total += float(np.sum(np.abs((lines.weight * lines.response)[inside]) ** 2))
-    return 100.0 * (1.0 - float(np.sqrt(left / max(total, 1e-300))))
+def _share_left(parts: Sequence[Lines], left: Sequence[ComplexArray], inside: Sequence[npt.NDArray[np.bool_]]) -> float:
+    """Root of the power of weighted residuals over that of the response, in some lines of each."""
+    rest = sum(float(np.sum(np.abs(each[near]) ** 2)) for each, near in zip(left, inside, strict=True))
+    pairs = zip(parts, inside, strict=True)
+    total = sum(float(np.sum(np.abs((lines.weight * lines.response)[near]) ** 2)) for lines, near in pairs)
+    return float(np.sqrt(rest / max(total, 1e-300)))
 
 
 def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float | None:
@@ -369,11 +365,10 @@ def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float
     if not len(tops):
         return None
     top = float(lines.omega[inside][tops[int(np.argmax(level[tops]))]]) / (2.0 * np.pi)
-    for mode in modes:
-        width = mode.frequency_hz.value * (2.0 * mode.damping_ratio.value + 0.01)
-        if mode.refusal in ("", _BEYOND) and abs(mode.frequency_hz.value - top) < width:
-            return None
-    return top
+    supported = [mode for mode in modes if mode.refusal in ("", _BEYOND)]
+    widths = [mode.frequency_hz.value * (2.0 * mode.damping_ratio.value + 0.01) for mode in supported]
+    there = any(abs(each.frequency_hz.value - top) < width for each, width in zip(supported, widths, strict=True))
+    return None if there else top
 
 
 def doubt_of(found: FrfModes) -> str:
@@ -570,12 +565,8 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
 
 
 def _local_refusal(window: Window, omega: float, width: float) -> str:
-    left = total = 0.0
-    for lines, rest in zip(window.parts, window.fit.left, strict=True):
-        near = lines.near(omega, _LOCAL_WIDTHS * width)
-        left += float(np.sum(np.abs(rest[near]) ** 2))
-        total += float(np.sum(np.abs((lines.weight * lines.response)[near]) ** 2))
-    percent = 100.0 * float(np.sqrt(left / max(total, 1e-300)))
+    near = [lines.near(omega, _LOCAL_WIDTHS * width) for lines in window.parts]
+    percent = 100.0 * _share_left(window.parts, window.fit.left, near)
     if percent <= _LOCAL:
         return ""
     return f"the model leaves {percent:.0f} % of the response around it unexplained (limit {_LOCAL:g} %)"

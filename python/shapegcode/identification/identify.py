@@ -185,7 +185,6 @@ def _refuse_of_sensors(
 
 
 def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: bool = False) -> None:
-    """Refuse options for a decay or impact that would have no effect."""
     for option, is_said in (("--stops", stops), ("--start", start_s is not None), ("--across", across)):
         if is_said:
             raise ArgumentError(f"{what}, in which {option} changes nothing: it goes with the record of a tap or decay")
@@ -205,7 +204,6 @@ def _turned_if_opposed(ready: Prepared, found: Identification, sought: model_sea
 
 
 def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record], list[FrequencyResponse]]:
-    """Records over time or frequency responses: either of both is empty."""
     found = measured(sources, options)
     records = [each for each in found if isinstance(each, Record)]
     responses = [each for each in found if isinstance(each, FrequencyResponse)]
@@ -242,7 +240,6 @@ def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: m
 
 
 def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quantity: Quantity) -> Record:
-    """Arrays as a record."""
     times = np.asarray(time_s, dtype=np.float64)
     samples = np.asarray(response, dtype=np.float64)
     if times.shape != samples.shape or times.ndim != 1 or len(times) < _MIN_SAMPLES:

@@ -314,7 +314,6 @@ class _Clock:
     def _spectra(
         self, band_hz: tuple[float, float] | None, rate: float | None = None, rows: npt.NDArray[np.intp] | None = None
     ) -> Spectra:
-        """Lines of command and response of each part."""
         stretch = 1.0 + (self.rate if rate is None else rate)
         period = self.record.period_s * stretch
         low, high = band_hz or (_LOWEST_HZ, np.inf)
@@ -335,7 +334,6 @@ class _Clock:
         return Spectra(hertz, transforms(kicks, first * every, every, hertz), response)
 
     def _clear_parts(self) -> npt.NDArray[np.intp]:
-        """Parts of the program that the record shows beyond doubt."""
         rows = np.flatnonzero(self.shares >= _CORRELATED)
         if len(rows) < _FEWEST_PARTS:
             few = f"{len(rows)} of {np.count_nonzero(self.shares)} parts of the program correlate with it, the best by"
@@ -392,7 +390,6 @@ class _Clock:
         self.places_s = self.places_s + _WAIT_GRID_S[int(np.argmax(agreed))] * late / (1.0 + self.rate)
 
     def _notes(self, rows: npt.NDArray[np.intp]) -> list[str]:
-        """Notes on the clock, and on parts that are not used."""
         first = int(rows[0])
         begins_s = self.places_s[first] - self.middles[first] / (1.0 + self.rate)
         waits = np.polyfit(rows, self.places_s[rows] * (1.0 + self.rate) - self.middles[rows], 1)[0]

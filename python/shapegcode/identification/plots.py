@@ -276,7 +276,6 @@ def _quantity(record: Record) -> str:
 
 
 def _as_fitted(found: Identification) -> list[Record]:
-    """The same with the model's response."""
     return [
         replace(record, response=np.asarray(fitted))
         for record, fitted in zip(found.fitted_records, found.fitted, strict=True)
@@ -301,7 +300,6 @@ def _seen(frequency_hz: FloatArray, found: Identification, peaks_hz: Sequence[fl
 
 
 def _mark_modes(column: list[Axes], found: Identification) -> None:
-    """Thin lines at the modes, refused ones dotted, their frequencies above."""
     for mode in (*found.modes, *found.refused):
         hertz, style = mode.frequency_hz.value, ":" if mode.refusal else "--"
         for panel in column:

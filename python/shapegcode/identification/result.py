@@ -37,7 +37,6 @@ class Estimate:
     high: float
 
     def __post_init__(self) -> None:
-        """Numbers of Python, whatever they come as."""
         for name in ("value", "low", "high"):
             object.__setattr__(self, name, float(getattr(self, name)))
 
@@ -338,7 +337,6 @@ class Identification(Result):
         return f"shapegcode identify {' '.join((*self.files, how, *self.options))} --update mine.toml"
 
     def __repr__(self) -> str:
-        """One line per mode; what else there is stays in the attributes."""
         lines = [super().__repr__(), *(f"  {mode_line(mode)}" for mode in (*self.modes, *self.refused))]
         if self.warnings:
             lines.append(f"  {len(self.warnings)} warning{'' if len(self.warnings) == 1 else 's'}: see .warnings")

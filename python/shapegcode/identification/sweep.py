@@ -40,7 +40,6 @@ class _Model:
 
     @property
     def starts(self) -> list[tuple[float, ...]]:
-        """Share, omega, zeta of each mode."""
         return [tuple(row) for row in np.exp(self.parameters[2:].reshape(-1, 3))]
 
     def evidence(self, bins: int) -> float:

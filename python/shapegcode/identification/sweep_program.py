@@ -226,8 +226,6 @@ class _Stroke:
 
 
 class _Planner:
-    """Plan the moves of an axis by frequency."""
-
     def __init__(self, machine: Machine, axis: str, travel_mm: float, share: float) -> None:
         limits = getattr(machine.axes, axis)
         self._machine, self._model, self._travel_mm = machine, MachineModel(machine), travel_mm
@@ -280,10 +278,10 @@ class _Planner:
             (below, low), (above, high) = tried[place - 1], tried[place]
             share = (math.log(goal) - math.log(low)) / (math.log(high) - math.log(low))
             tried[place] = self._tried(hertz, below.feed_mm_per_min ** (1.0 - share) * above.feed_mm_per_min**share)
-        stroke, amplitude = tried[place]
-        if amplitude > self.wanted:  # The lowest feed asks for too much: shorter strokes would be faster ones
-            return self._tried(hertz, stroke.feed_mm_per_min * (self.wanted / amplitude))
-        return stroke, amplitude
+        stroke, size = tried[place]
+        if size > self.wanted:  # The lowest feed asks for too much: shorter strokes would be faster ones
+            return self._tried(hertz, stroke.feed_mm_per_min * (self.wanted / size))
+        return stroke, size
 
     def _tried(self, hertz: float, feed: float) -> tuple[_Stroke, float]:
         """The stroke that lasts half a cycle, and its amplitude."""
@@ -351,7 +349,6 @@ def plain_name(name: str) -> str:
 
 
 def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) -> str:
-    """The program."""
     decimals = max(1, round(-math.log10(machine.controller.least_increment_mm)))
     reach = max(stroke.length_mm for band in bands for stroke in band)
     lines = [
@@ -363,20 +360,18 @@ def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) 
         "G21 G17 G91 G94 G64", f"G04 P{round(1e3 * _BEFORE_S)}",
     ]  # fmt: skip
     for count, band in enumerate(bands):
-        feed = None
+        code, feed = f"G01 {axis.upper()}", ""
         for stroke in band:
-            new = f"{stroke.feed_mm_per_min:.{machine.controller.feed_decimals_mm}f}"
+            new = f" F{stroke.feed_mm_per_min:.{machine.controller.feed_decimals_mm}f}"
             new = new if "." in new else f"{new}."
             size = f"{stroke.length_mm:.{decimals}f}".lstrip("0")
-            word = "" if new == feed else f" F{new}"
-            lines += [f"{'G01 ' if feed is None else ''}{axis.upper()}{size}{word}", f"{axis.upper()}-{size}"]
-            feed = new
+            lines += [f"{code}{size}{'' if new == feed else new}", f"{axis.upper()}-{size}"]
+            code, feed = axis.upper(), new
         lines.append(f"G04 P{round(1e3 * _PAUSE_S[count % 2])}")
     return "\n".join([*lines, "G90", "M30", "%"]) + "\n"
 
 
 def _swept(bands: list[list[_Stroke]], x_mm: FloatArray, period_s: float) -> tuple[SweptBand, ...]:
-    """Each rise with its fall, as simulated."""
     moves = moving_parts(x_mm, period_s)
     if len(moves) != len(bands):
         raise ArgumentError(
@@ -387,10 +382,6 @@ def _swept(bands: list[list[_Stroke]], x_mm: FloatArray, period_s: float) -> tup
         low, high = rising[0].hertz, rising[-1].hertz
         lasts_s = (end - first) * period_s - _PAUSE_S[0]
         size = amplitude(x_mm[first:end], period_s, (0.95 * low, 1.05 * high), lasts_s)
-        found.append(
-            SweptBand(
-                low, high, max(each.length_mm for each in rising), max(each.feed_mm_per_min for each in rising), size,
-                4 * len(rising), lasts_s + sum(_PAUSE_S),
-            )
-        )  # fmt: skip
+        _, length_mm, feed = np.max([astuple(each) for each in rising], axis=0).tolist()
+        found.append(SweptBand(low, high, length_mm, feed, size, 4 * len(rising), lasts_s + sum(_PAUSE_S)))
     return tuple(found)

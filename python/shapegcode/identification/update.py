@@ -284,7 +284,6 @@ class ModeTables:
     def _old_tables(
         self, kept: Mapping[int, IdentifiedMode], seen: Mapping[int, IdentifiedMode], why: str = "which was not found"
     ) -> tuple[list[Table], list[edit.Entry]]:
-        """Change the tables of the file."""
         stay: list[Table] = []
         left: list[edit.Entry] = []
         for number, (table, old) in enumerate(zip(self.tables, self.old, strict=True)):
@@ -307,7 +306,6 @@ class ModeTables:
         return stay, left
 
     def _check(self, text: str, rigid: bool) -> None:
-        """The new text must say what is meant, and nothing else may have changed."""
         wanted = copy.deepcopy(self.data)
         axis = wanted["axes"][self.axis]
         axis["modes"] = self.expected
@@ -324,7 +322,6 @@ class ModeTables:
             raise self._no_place()
 
     def _change(self, table: Table, old: dict[str, Any], mode: IdentifiedMode) -> None:
-        """Put a mode into a table."""
         entries = table.value.body
         values = self._values(mode)
         if mode.moves is not None and "moves" in old:
@@ -371,7 +368,6 @@ class ModeTables:
         entries[place:place] = added
 
     def _values(self, mode: IdentifiedMode) -> dict[str, tuple[Any, str]]:
-        """Value and remark of every key that the data give."""
         values: dict[str, tuple[Any, str]] = {}
         for key in ("frequency_hz", "damping_ratio", "mass_kg"):
             estimate: Estimate | None = getattr(mode, key)
@@ -390,7 +386,6 @@ class ModeTables:
         return values
 
     def _table(self, mode: IdentifiedMode, share: float, meaning: str) -> Table:
-        """A new table."""
         values = self._values(mode) | {"participation": (share, f"{meaning}, not measured")}
         self.expected.append({key: value for key, (value, _) in values.items()})
         self.notes.append(

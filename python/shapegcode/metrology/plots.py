@@ -127,7 +127,6 @@ def _drawn(measurement: Measurement, region: int | None) -> list[tuple[MeasuredP
 
 
 def _walls(region: MeasuredRegion) -> list[WallProfile]:
-    """The profiles of a region that hold a wall."""
     return [
         section.walls
         for section in region.sections

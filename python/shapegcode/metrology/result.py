@@ -25,8 +25,6 @@ Values = Callable[[MeasuredSection], Sequence[float | None]]
 
 @dataclass(frozen=True)
 class _Row:
-    """One row of a table."""
-
     name: str  # what is measured
     values: tuple[str, ...]  # as text, one per program
     nominal: str = ""  # what it should be; empty where that is nothing but zero
@@ -150,7 +148,6 @@ def _section_table(
 
 
 def _section_rows(sections: Sections, limit_um: float | None, band_um: float) -> Iterator[_Row]:
-    """The rows of one section, as it came out in each program."""
     yield _Row("length mm, time s", _each(sections, lambda s: f"{s.time_s:.3f}"), f"{sections[0].length_mm:.3f}")
     yield from _contour_rows(sections, limit_um)
     arcs = [section.arc for section in sections if section.arc is not None]

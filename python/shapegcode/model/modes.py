@@ -355,7 +355,6 @@ def plant_response(
 
 
 def _core_modes(modes: Sequence[AxisMode | _core.Mode]) -> list[_core.Mode]:
-    """The modes of one axis for the core."""
     if not isinstance(modes, Sequence) or not all(isinstance(mode, AxisMode | _core.Mode) for mode in modes):
         raise _core.ArgumentError(f"the modes of an axis are {str(modes)[:80]!r}: {_WANTED}")
     return [still_mode(mode, None) if isinstance(mode, AxisMode) else mode for mode in modes]

@@ -39,8 +39,6 @@ _FLAT = {"deviation": 1e-3, "vibration": 1e-3, "speed": 1e-3, "acceleration": 1e
 
 @dataclass
 class _Followed:
-    """Follows the cuts of a program along their paths, one after the other."""
-
     cuts: list[tuple[_core.Region, _core.Path]]  # each with the path that it shall follow, in the order of its lines
     _at: int = -1
     _follower: _core.PathFollower | None = field(default=None, repr=False)

@@ -43,7 +43,6 @@ class Chunk:
     friction_force_n: FloatArray | None = None  # feed drives only: friction of the table, against its motion, (k, 3)
 
     def __len__(self) -> int:
-        """Rows."""
         return len(self.time_s)
 
     @property

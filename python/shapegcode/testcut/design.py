@@ -95,7 +95,6 @@ class CutConditions:
         return CutTool(mill.diameter_mm, mill.flutes, mill.helix_deg, runout, law)
 
     def _check_feeds(self, feeds_mm_per_min: Sequence[float]) -> None:
-        """Refuse what the machine or the tool cannot do."""
         low, high = self.machine.controller.minimum_feed_mm_per_min, self.machine.axes.x.max_feed_mm_per_min
         for feed in feeds_mm_per_min:
             if not low <= feed <= high:
@@ -107,7 +106,6 @@ class CutConditions:
             raise ArgumentError("the tool turns counter-clockwise: test cuts are written for M03 only")
 
     def _check_depths(self, low_mm: float, high_mm: float) -> None:
-        """Refuse radial depths that the round tool cannot have on a straight pass."""
         limit = _MAX_DEPTH_RATIO * self.tool.radius_mm
         if not 0.0 < low_mm <= high_mm <= limit:
             raise ArgumentError(
@@ -266,7 +264,6 @@ def _design(
     given: CutConditions, edge: Edge, stock_mm: float, passes: Sequence[tuple[str, Sequence[_Block]]],
     about: TaperDetails | CornerDetails | IntervalDetails, *, met: Edge | None = None,
 ) -> CutDesign:  # fmt: skip
-    """The design of measuring passes over one edge."""
     kind = next(kind for kind, figures in FIGURES.items() if isinstance(about, figures))
     warnings = []
     if isinstance(about, CornerDetails) and about.deeper_than_corner is not None:
@@ -286,7 +283,6 @@ def _design(
 def _measuring_pass(
     given: CutConditions, edge: Edge, stock_mm: float, name: str, blocks: Sequence[_Block]
 ) -> MeasuringPass:
-    """One pass over an edge, from air to air."""
     inside = (edge.x_mm > 0.0) & (edge.x_mm < stock_mm)
     x = np.concatenate([[0.0], edge.x_mm[inside], [stock_mm]])
     # How far the pass goes through the air at both ends, by its largest feed.

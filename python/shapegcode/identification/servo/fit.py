@@ -172,8 +172,6 @@ def _two_lags(trace: ServoTrace, speeds: Sequence[FloatArray], top: float) -> st
 
 @dataclass(frozen=True, eq=False)
 class _ComparedModel:
-    """A model with what it leaves in every sample."""
-
     name: str
     fits: tuple[LoopFit, ...]  # to all samples, to the first half, to the second
     rest: tuple[FloatArray, ...]  # each sample by the fit to the other half
@@ -224,7 +222,6 @@ def _drive_estimates(fits: Sequence[DriveFit], unit: str) -> tuple[ServoEstimate
 
 
 def _machine_axes(record: ServoRecord, axes: str | Mapping[str, str] | None) -> dict[str, int]:
-    """Which axes of a log are X, Y and Z of the machine."""
     if axes is None:
         named = {each.name.partition("(")[2].rstrip(")") or each.name: rank for rank, each in enumerate(record.axes)}
         found = {
