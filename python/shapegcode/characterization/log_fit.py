@@ -17,9 +17,7 @@ from shapegcode.io.servo_log import ServoLog
 from shapegcode.io.units import FloatArray
 
 _Interval = tuple[float, float]  # a value and its half-width
-_FOLLOWED = 0.9
-_RUN_SETTLE_S = 0.45
-_STEPS_SETTLE_S = 0.3
+_FOLLOWED, _RUN_SETTLE_S, _STEPS_SETTLE_S = 0.9, 0.45, 0.3
 
 
 def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list[ControllerFact]:

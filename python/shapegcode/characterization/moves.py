@@ -17,9 +17,7 @@ from shapegcode.errors import ArgumentError
 from shapegcode.io.servo_log import ServoLog
 from shapegcode.io.units import FloatArray
 
-_HOLD_SHARE = 0.9
-_BEND_SHARE = 0.85
-_LONGEST_HOLD = 64
+_HOLD_SHARE, _BEND_SHARE, _LONGEST_HOLD = 0.9, 0.85, 64
 
 
 def held_samples(log: ServoLog) -> tuple[int, int]:
@@ -94,9 +92,7 @@ def ticks(log: ServoLog, bend: int) -> tuple[FloatArray, FloatArray]:
 
 
 _PAUSE_S = 0.3  # a rest of a part is shorter, the pause between two parts is 0.5 s
-_SHORTEST_BOX_S = 2e-5
-_STAMP = 0.03
-_MAX_SAMPLES = 1500
+_SHORTEST_BOX_S, _STAMP, _MAX_SAMPLES = 2e-5, 0.03, 1500
 
 
 @dataclass(frozen=True)

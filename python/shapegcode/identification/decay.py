@@ -17,8 +17,7 @@ from shapegcode.io.units import FloatArray
 
 _ENVELOPE_PERIODS = 2.0  # of the slowest mode, over which the envelope is the RMS; or a beat of the two closest modes
 _ENVELOPE_SHARE = 0.05  # While the modes are not known, it is the RMS over this share of the record, at least
-_EVENT_RISES = 1.3  # Something happens where the envelope rises by this factor
-_EVENT_SHARE = 0.3  # ... to this share of its maximum; weaker rises are beats of modes
+_EVENT_RISES, _EVENT_SHARE = 1.3, 0.3  # Something happens where the envelope rises so, to this share of its maximum
 _TAIL = 0.3  # The tail of a decay, in which no command is left, begins after this share of it
 _MIN_TAIL = 16  # Samples below which a tail tells no frequency
 _MODE_SHARE = 0.2  # Modes above this share of the tail's largest peak are vibration, what is slower is motion

@@ -22,8 +22,8 @@ _CORE = 1.35  # upper end of a window over its lower end
 _MARGIN = 1.3  # the lines of a window reach so far beyond its ends
 _BESIDE = 0.02, 3.0  # modes that count beyond the lines: share of the frequency, and damping ratios
 STABLE = 0.34  # share of the higher orders that have a pole which is fitted from the start
-_CLEARLY = 40.0  # times ln of the samples: by so much less a fit without a mode explains, before the others move
 _SEEN = 0.12  # ... which is tried
+_CLEARLY = 40.0  # times ln of the samples: by so much less a fit without a mode explains, before the others move
 _QUICK, _FULL = (8, 1e-3), (40, 1e-8)  # iterations, and the gain below which they end
 _TRIED, _WEAKEST = 3, 2
 _MORE_REAL = 2  # real modes may be half as many again as complex ones, and so many more: more cost more than they tell
@@ -34,8 +34,7 @@ _BAND_LINES = 48  # a band or window has at least so many
 _MAX_CHANGES, _ROUNDS = 60, 4  # with few lines, and behind those with all
 _FEWEST = 12  # lines below which a window is left out
 _DEGREE = 2  # of the background of a window
-CLEAR = 6.0  # by so much beyond Bayes' criterion a mode must better the fit
-_OPPOSED = 8.0  # ... and one that moves against the push of the hammer by so much more
+_CLEAR, _OPPOSED = 6.0, 8.0  # by so much beyond Bayes' criterion a mode must better the fit; one against the push more
 _TWINS = 0.02  # modes nearer than this share of their width are one
 _START_DAMPING = (0.005, 0.02, 0.06)
 _NO_VIBRATION = 0.5
@@ -363,7 +362,7 @@ def _pruned(parts: Sequence[Lines], starts: Starts) -> Starts:
             left -= float(factors @ right[index])
             loss += factors[fixed:] ** 2 / np.maximum(np.diag(inverse)[fixed:], 1e-300)
         parameters = len(parts) * (fixed + len(kept)) + 3 * len(kept)
-        evidence = samples * np.log(max(left, 1e-12 * squares)) + parameters * np.log(samples) + CLEAR * len(kept)
+        evidence = samples * np.log(max(left, 1e-12 * squares)) + parameters * np.log(samples) + _CLEAR * len(kept)
         if evidence < best:
             best, chosen = evidence, list(kept)
         if not kept:
@@ -375,7 +374,7 @@ def evidence_of(fit: ModalFit, share: float) -> float:
     """Bayes' criterion of a fit: lower is better."""
     samples = 2 * sum(len(part) for part in fit.left) * share
     opposed = np.count_nonzero(fit.residues.real < 0.0) if len(fit.residues) == 1 else 0
-    cost = (fit.parameters + len(fit.omega)) * np.log(samples) + _OPPOSED * opposed + CLEAR * len(fit.omega)
+    cost = (fit.parameters + len(fit.omega)) * np.log(samples) + _OPPOSED * opposed + _CLEAR * len(fit.omega)
     return float(samples * np.log(max(fit.squares, 1e-300)) + cost)
 
 
@@ -479,10 +478,7 @@ def _correlated(columns: ComplexArray, correlation: ComplexArray) -> ComplexArra
 # --- poles by poly-reference least squares in the frequency domain (pLSCF), band by band -----------------------------
 
 _CIRCLE = 0.85  # share of the unit circle that a band is laid on
-_LINES_PER_ORDER = 4
-_MAX_ORDER = 24
-_MIN_ORDER = 2
-_MOST_POLE_DAMPING = 0.3
+_LINES_PER_ORDER, _MAX_ORDER, _MIN_ORDER, _MOST_POLE_DAMPING = 4, 24, 2, 0.3
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ _TWINS = 0.25  # of the half width of a resonance
 _STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of the chart: the model one order lower has the pole too
 _APART = np.pi  # rad: two modes must come half a turn apart in the record
 _CHART_ORDERS = 20  # of the stabilisation chart
-_SAME_PLACE = 0.2  # of the half width of a resonance: two poles of the chart are one start
-_SAME_DAMPING = 0.2  # and in the logarithm of their damping
+# Two poles of the chart are one start: of the half width of a resonance, and in the logarithm of their damping.
+_SAME_PLACE, _SAME_DAMPING = 0.2, 0.2
 _MAX_DAMPING = 0.7  # of a pole to begin with
 _PATIENCE = 2  # Two models in a row that the data do not ask for end the search: one may only have missed its place
 

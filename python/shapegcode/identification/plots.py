@@ -20,9 +20,7 @@ from shapegcode.results.outcome import Plot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MAX_TRACES = 3
-_SEEN = 0.02
-_ROOM = 2.5
+_MAX_TRACES, _SEEN, _ROOM = 3, 0.02, 2.5
 _FILE_TIME = "time in the file in s"
 _FAINT = 0.35  # opacity of poles that are not stable
 _MIN_SHOWN = 1e-5  # of the largest value, on a logarithmic axis

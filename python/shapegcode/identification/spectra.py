@@ -16,8 +16,7 @@ from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.record import Record
 from shapegcode.io.units import FloatArray
 
-_PEAK_SHARE = 0.01  # A peak counts above this share of the largest (-40 dB)
-_PEAK_RISES = 2.0  # ... and if it stands out of its surroundings by this factor
+_PEAK_SHARE, _PEAK_RISES = 0.01, 2.0  # of the largest (-40 dB); by which a peak stands out of its surroundings
 _PEAK_NOISE = 6.0  # So many standard noise levels, of which the spectrum's median is a measure
 _MAX_PEAKS = 8
 _PADDING = 4  # The spectrum of a decay is drawn from so many times as many points as there are samples
@@ -123,8 +122,7 @@ def mode_envelopes(record: Record, frequencies_hz: Sequence[float]) -> list[Floa
 REST_S = 0.5  # of a command, between two parts
 _EXCITED = 0.2  # of the median of the command's spectrum, in amplitude: lines below are not used
 _BESIDE = 0.3  # of the lines around, in power: weaker lines show noise
-_SMOOTH_LINES = 31
-_COHERENT = 0.9
+_SMOOTH_LINES, _COHERENT = 31, 0.9
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _SHARE_OF_TOOL = 0.8  # of the tool's radius that the largest deviation takes in the drawing
-_SHARE_OF_PART = 0.03
-_MIN_DRAWN_UM = 1e-3
-_MAX_MARKED = 12
+_SHARE_OF_PART, _MIN_DRAWN_UM, _MAX_MARKED = 0.03, 1e-3, 12
 
 
 def plots_of(measurement: Measurement) -> dict[str, Plot]:

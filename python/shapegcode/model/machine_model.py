@@ -116,7 +116,7 @@ def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.Mot
     limits = _core.MotionLimits()
     controller = machine.controller
     axes = machine.axes.as_tuple()
-    limits.law = getattr(_core.AccelerationLaw, controller.law)
+    limits.law, limits.arc_feed_ratio = getattr(_core.AccelerationLaw, controller.law), arc_feed_ratio
     # A ramp of one tick stands for "no ramp": zero time has no acceleration.
     limits.time_constant_s = max(controller.time_constant_s, controller.interpolation_period_s)
     limits.jerk_time_s = controller.bell_time_s
@@ -138,7 +138,6 @@ def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.Mot
     limits.block_time_s = controller.look_ahead_block_time_s
     if controller.contour_acceleration_mm_s2 is not None:
         limits.contour_acceleration_mm_per_s2 = controller.contour_acceleration_mm_s2.as_tuple()
-    limits.arc_feed_ratio = arc_feed_ratio
     return limits
 
 
@@ -289,9 +288,8 @@ class MachineModel:
     @cached_property
     def bounds_deviations(self) -> bool:
         """Whether deviations at other overrides cost little beside a run: no filter, modes that stay, sides alike."""
-        machine = self.machine
-        plain = machine.verdict.plant == "modal" and not self.shaped.filters and moving_axis(machine) is None
-        return plain and not self.always_plans and machine.input.material_side is None
+        plain = self.machine.verdict.plant == "modal" and not self.shaped.filters and moving_axis(self.machine) is None
+        return plain and not self.always_plans and self.machine.input.material_side is None
 
     def limits(self, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
         """Look-ahead limits, a copy of one's own."""
@@ -369,10 +367,9 @@ class MachineModel:
         """Emitted blocks as the controller simulates them, measured against the programmed path."""
         options = self.verdict_options(filters=self.shaped.filters, **given)
         options.measure_contour = contour
+        options.measure_command, options.measure_response = command_contour, response_contour
         if tracker is not None:
             options.tracker = tracker
-        options.measure_command = command_contour
-        options.measure_response = response_contour
         if increment_mm is not None:
             options.feed_window_s = max(self.machine.controller.block_time_s, self.period_s)
             options.feed_slack_mm = 2.0 * increment_mm
@@ -404,8 +401,7 @@ class MachineModel:
         return float(_core.time_program(program, self.ordinary.model).total_s)
 
 
-RAMP_FREQUENCY_HZ = 10_000.0
-"""At which no block that is written is a ramp."""
+RAMP_FREQUENCY_HZ = 10_000.0  # at which no block that is written is a ramp
 _CORNER_RAD = 0.1  # a turn of the path itself, at which LinuxCNC blends or stops
 _MOST_KINK_RATIO = 0.7  # LinuxCNC takes 0.7071 for more
 _KINK_MARGIN = 1.25

@@ -32,8 +32,7 @@ from shapegcode.results.page.scene import (
 )
 
 MOST_POINTS = 60_000  # samples of a program that a page shows, at most
-_HALF_PIXEL = 0.5
-_LEAST_EXTENT_MM = 1e-3
+_HALF_PIXEL, _LEAST_EXTENT_MM = 0.5, 1e-3
 _FLAT = {"deviation": 1e-3, "vibration": 1e-3, "speed": 1e-3, "acceleration": 1e-6}  # a curve within so little is flat
 
 
@@ -137,7 +136,9 @@ def _variant(
         key, label, program.source, text, kept.sample, line, block, kept.command_mm, kept.deviation_um, channels,
         thinner.samples, tuple((cut.first_line, cut.last_line) for cut, _ in cuts),
     )  # fmt: skip
-    return variant, spectrum.lines(key, most_hz=_most_hz(machine, period_s)), kept
+    # Up to twice the highest mode and at least 200 Hz, within half the sample rate.
+    highest = max((mode.frequency_hz for modes in axis_modes(machine) for mode in modes), default=0.0)
+    return variant, spectrum.lines(key, most_hz=min(max(2.0 * highest, 200.0), 0.5 / period_s)), kept
 
 
 class _Blocks:
@@ -170,9 +171,3 @@ def _scales(program: Program) -> dict[str, float]:
     corners = [corner for region in program.regions for corner in (region.path.polyline(),) if len(corner)]
     extent = float(np.ptp(np.concatenate(corners), axis=0).max()) if corners else 0.0
     return {"path": max(extent, _LEAST_EXTENT_MM) * _HALF_PIXEL / PIXELS_WIDE} | _FLAT
-
-
-def _most_hz(machine: Machine, period_s: float) -> float:
-    """Highest frequency of a spectrum: twice the highest mode and at least 200 Hz, within half the sample rate."""
-    highest = max((mode.frequency_hz for modes in axis_modes(machine) for mode in modes), default=0.0)
-    return min(max(2.0 * highest, 200.0), 0.5 / period_s)

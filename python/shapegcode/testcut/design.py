@@ -46,8 +46,7 @@ from shapegcode.testcut.result import CutDesign
 _Sizes = tuple[float, float, float]  # of a corner: allowance, rough and finish radius
 _Block = tuple[float | None, float]  # X up to which a feed holds (None: the end of the pass), feed in mm/min
 
-_MIN_AIR_MM = 5.0
-_AIR_REVS = 20.0
+_MIN_AIR_MM, _AIR_REVS = 5.0, 20.0
 _MAX_DEPTH_RATIO = 0.95  # of the radius, up to which a radial depth is taken
 
 

@@ -414,8 +414,7 @@ def _with_intervals(
     return tuple(found)
 
 
-_MEDIAN = 0.4549
-_LARGEST_CORRELATION = 0.95
+_MEDIAN, _LARGEST_CORRELATION = 0.4549, 0.95
 
 
 def noise_of(left: FloatArray, predicted: FloatArray, revolutions: FloatArray, robust: FloatArray) -> FloatArray:

@@ -96,13 +96,12 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
         except UnevenTimeError as error:
             raise ArgumentError(f"{path}:{table.line_of(error.row)}: {error}") from error
         time = time[0] + period * np.arange(len(time))
-    position = values.get("position")
-    if position is not None and "radial_depth" not in values and np.any(np.diff(position) < 0.0):
+    torque, position, depth, feed = map(values.get, ("torque", "position", "radial_depth", "feed"))
+    if position is not None and depth is None and np.any(np.diff(position) < 0.0):
         row = int(np.argmax(np.diff(position) < 0.0)) + 1
         raise ArgumentError(f"{path}:{table.line_of(row)}: the position goes back: one pass per file, along +X")
     force = sign * np.column_stack([values["fx"], values["fy"]])
-    depth, feed = values.get("radial_depth"), values.get("feed")
-    return ForceRecord(str(path), force, values.get("torque"), time, position, depth, feed)
+    return ForceRecord(str(path), force, torque, time, position, depth, feed)
 
 
 # --- the position of each sample --------------------------------------------------------------------------------------
@@ -168,8 +167,10 @@ def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, f
     size = np.linalg.norm(turned(force, samples), axis=1)
     x = _positions(record, measuring, forecast, size, time, moved, (begin, end), notes)
     named = tuple(f"{record.file}: {note}" for note in notes)
-    found = time, x, force, torque, samples, speed, offset, drift
-    return PlacedRecord(record.file, cut, measuring, *found, record.position_mm is None, named)
+    by_time = record.position_mm is None
+    return PlacedRecord(
+        record.file, cut, measuring, time, x, force, torque, samples, speed, offset, drift, by_time, named
+    )
 
 
 def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[FloatArray, FloatArray]:
@@ -347,9 +348,10 @@ def revolutions(record: PlacedRecord) -> Revolutions:
     inside = np.flatnonzero((x >= measuring.start_mm) & (x <= measuring.end_mm))
     turns = int((inside[-1] - inside[0]) / record.samples)
     edges = inside[0] + np.arange(turns + 1) * record.samples
-    size = np.linalg.norm(record.force_n, axis=1)
-    torque_nm = [] if record.torque_nm is None else [record.torque_nm]
-    table = np.hstack([record.force_n, size[:, None], size[:, None] ** 2, x[:, None], *torque_nm])
+    size, torque = np.linalg.norm(record.force_n, axis=1), record.torque_nm
+    table = np.hstack(
+        [record.force_n, size[:, None], size[:, None] ** 2, x[:, None], *([] if torque is None else [torque])]
+    )
     means = _sums(table, edges[:-1], edges[1:]) / record.samples
     peaks = np.maximum.reduceat(size[: int(edges[-1])], edges[:-1].astype(np.intp))
     middle = means[:, 4]

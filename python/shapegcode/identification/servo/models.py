@@ -203,8 +203,7 @@ def _correlated_samples(left: FloatArray) -> float:
 
 # --- feed drive -------------------------------------------------------------------------------------------------------
 
-_RUN_UP_S = 0.4
-_MM = 1e-3
+_RUN_UP_S, _MM = 0.4, 1e-3
 _STIFFNESS_N_PER_M, _DAMPING_N_S_PER_M = 4e6, 400.0  # of 1 kg: 640 Hz, far above the speed loop
 # Dead time in ms; position gain, bandwidth in Hz, integral time, Coulomb friction as logarithms.
 _LOW = (0.0, math.log(2.0), 0.0, math.log(5.0), math.log(1e-3), math.log(1e-7))

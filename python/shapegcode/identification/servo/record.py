@@ -19,8 +19,7 @@ from shapegcode.io.servo_log import parse_units, read_log
 from shapegcode.io.units import FloatArray
 
 _GAP = 1.5  # of the usual step
-_FEWEST = 100
-_WINDOW = 2500
+_FEWEST, _WINDOW = 100, 2500
 _LARGEST_ACCELERATION = 5e5  # mm/s² or degrees/s²; a command beyond it is no motion
 
 
