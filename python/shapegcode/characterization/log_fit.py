@@ -292,9 +292,8 @@ def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
             facts.add_unknown(name, f"{why}was a look-ahead mode on?")
         return
     # Of each fit the longest time first.
-    times = [
-        sorted(zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True), reverse=True) for fit in fits[best]
-    ]
+    pairs_of = [zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True) for fit in fits[best]]
+    times = [sorted(pairs, reverse=True) for pairs in pairs_of]
     value, half = mean(*zip(*(pairs[0] for pairs in times), strict=True))
     facts.add(names[0], value, half, "controller.time_constant_s", _SHAPE_NOTES[best])
     facts.add_word("cutting acceleration shape", best, "controller.after_interpolation_shape")

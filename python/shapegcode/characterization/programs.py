@@ -101,11 +101,9 @@ def _word(address: str, value: float, decimals: int) -> str:
 def readme_text(tests: Sequence[air_tests.AirTest], machine: Machine, box: air_tests.AirBox) -> str:
     """Instructions for the operator."""
     timing = air_tests.ControllerTiming.of(machine)
-    watch = [test for test in tests if test.kind == "stopwatch"]
-    logs = [test for test in tests if test.kind == "log"]
-    rates = ", ".join(
-        f"{n} {a.rapid_mm_per_min:g}" for n, a in zip(air_tests.AXES, machine.axes.as_tuple(), strict=True)
-    )
+    watch, logs = ([test for test in tests if test.kind == kind] for kind in ("stopwatch", "log"))
+    axes = zip(air_tests.AXES, machine.axes.as_tuple(), strict=True)
+    rates = ", ".join(f"{name} {axis.rapid_mm_per_min:g}" for name, axis in axes)
     feed = max(part.feed_mm_per_min for test in tests for part in test.parts if part.pattern != "rapid")
 
     def row(test: air_tests.AirTest) -> str:

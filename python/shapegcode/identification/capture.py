@@ -94,9 +94,8 @@ def _response(
             f"{source}: the actual position of {trace.name} does not go with its command between {low:g} and "
             f"{high:.0f} Hz: too little motion, or positions too coarse; a sweep moves enough (shapegcode sweep)"
         )
-    return FrequencyResponse(
-        source, hertz[used], -1.0 / spectra.ratio()[used], "acceleration", coherence[used], axis, scaled=False
-    )
+    ratio = -1.0 / spectra.ratio()[used]
+    return FrequencyResponse(source, hertz[used], ratio, "acceleration", coherence[used], axis, scaled=False)
 
 
 def _windows(trace: ServoTrace, period_s: float) -> list[tuple[FloatArray, FloatArray]]:

@@ -185,9 +185,8 @@ def _windowed(
             f"{where}: the pulse has {width} samples above a tenth of its peak: below {MIN_PULSE} its momentum, and "
             "so the mass, is uncertain; sample faster or take a softer tip"
         )
-    strongest = refuse_short(
-        record, response[hit.first if hit.end - hit.first > MIN_PULSE else hit.end :], noise or 0.0, band_hz, warnings
-    )
+    begin = hit.first if hit.end - hit.first > MIN_PULSE else hit.end
+    strongest = refuse_short(record, response[begin:], noise or 0.0, band_hz, warnings)
     reached = excited_hz(force, record.period_s)
     wanted = band_hz or strongest
     if reached < wanted:

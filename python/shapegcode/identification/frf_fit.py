@@ -12,24 +12,10 @@ from scipy import stats
 from scipy.signal import find_peaks
 
 from shapegcode.errors import RecordError
+from shapegcode.identification import frf_search, model_search
 from shapegcode.identification.checks import EXCITED, Prepared
 from shapegcode.identification.frf_model import Lines, ModalFit
-from shapegcode.identification.frf_search import (
-    STABLE,
-    Pole,
-    StablePole,
-    Uncertainty,
-    Window,
-    candidates_of,
-    cut,
-    evidence_of,
-    fitted,
-    modes_of,
-    residues_of,
-    search,
-    starts_of,
-    uncertainty_of,
-)
+from shapegcode.identification.frf_search import Pole, StablePole, Uncertainty, Window, cut, fitted, starts_of
 from shapegcode.identification.lines import (
     Hits,
     hits_of,
@@ -39,17 +25,7 @@ from shapegcode.identification.lines import (
     steady_sines,
     weighted,
 )
-from shapegcode.identification.model_search import (
-    LOGARITHMS,
-    OPPOSED,
-    SCATTER_PROBABILITY,
-    TURNED,
-    Sought,
-    chart_of,
-    interval_refusal,
-    lasting_refusal,
-    mode_estimates,
-)
+from shapegcode.identification.model_search import OPPOSED, Sought, chart_of, interval_refusal, mode_estimates
 from shapegcode.identification.problem import MIN_SWINGS, Starts
 from shapegcode.identification.result import ChartPole, Identification, IdentifiedMode, by_support
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
@@ -120,7 +96,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
     found = _in_responses(merged, sought)
     # Whether the significant modes move against the force, counting all that are supported.
     with_it, against = (sum(_height(m) for m in found.modes if m.refusal == each) for each in ("", OPPOSED))
-    turned = [f"{responses[0].source}: {TURNED}"] if against > with_it else []
+    turned = [f"{responses[0].source}: {model_search.TURNED}"] if against > with_it else []
     if turned:
         merged, used = ([replace(each, response=-each.response) for each in part] for part in (merged, used))
         found = _in_responses(merged, sought)
@@ -132,7 +108,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
     return Identification(
         files=files,
         **by_support(modes),
-        order=len(modes_of(found.windows)),
+        order=len(frf_search.modes_of(found.windows)),
         fit_percent=found.fit_percent if found.modes else 0.0,
         noise_rms=float(np.sqrt(np.mean(np.abs(left) ** 2))),
         doubt=doubt_of(found),
@@ -228,8 +204,8 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
     at_first = [steady_sines(each.record.response, period) for each in ready.usable]
     quiet = [each.record.response - sines for each, (sines, _) in zip(ready.usable, at_first, strict=True)]
     measured, hits = _of_hits(ready, quiet, sought)
-    pool, poles = candidates_of(measured.parts)
-    windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
+    pool, poles = frf_search.candidates_of(measured.parts)
+    windows = frf_search.search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
     # What oscillates throughout is looked for once more in what a first model leaves.
     left = hits.in_time(_left(measured, hits, _model(measured.parts, windows)[0]))
     steady = [steady_sines(rest, period) for rest in left]
@@ -237,7 +213,8 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
         for response, start, (sines, _) in zip(quiet, hits.starts, steady, strict=True):
             response[start : start + hits.count] -= sines
         measured, hits = _of_hits(ready, quiet, sought)
-    windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, modes_of(windows))
+    first = frf_search.modes_of(windows)
+    windows = frf_search.search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, first)
     found = _tested(measured, windows, pool, poles, sought)
     found = replace(found, steady=any(hertz for _, hertz in (*at_first, *steady)))
     rest = _left(measured, hits, found.model[0])
@@ -263,11 +240,11 @@ def _in_responses(responses: Sequence[FrequencyResponse], sought: Sought) -> Frf
     parts = tuple(measured_lines(each, sought.exponential_window_s) for each in responses)
     low, high = min(float(each.omega[0]) for each in parts), max(float(each.omega[-1]) for each in parts)
     measured = _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
-    pool, poles = candidates_of(measured.parts)
-    windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
+    pool, poles = frf_search.candidates_of(measured.parts)
+    windows = frf_search.search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
     models = _model(measured.parts, windows)
     parts = tuple(_weighed(lines, model) for lines, model in zip(measured.parts, models, strict=True))
-    windows = search(parts, measured.low, measured.high, _IN_WINDOW, pool, modes_of(windows))
+    windows = frf_search.search(parts, measured.low, measured.high, _IN_WINDOW, pool, frf_search.modes_of(windows))
     for rank, window in enumerate(windows):
         correlation = neighbours_correlation(window.fit.left)
         correlated = tuple(replace(lines, correlation=correlation) for lines in window.parts)
@@ -386,7 +363,7 @@ def doubt_of(found: FrfModes) -> str:
 def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], sought: Sought) -> list[IdentifiedMode]:
     if not window.inside():
         return []
-    fit, known = window.fit, uncertainty_of(window)
+    fit, known = window.fit, frf_search.uncertainty_of(window)
     others = _other_fits(window)
     found = []
     for index in window.inside():
@@ -422,16 +399,16 @@ def _logarithms(
 ) -> tuple[FloatArray, FloatArray]:
     """ln of frequency (Hz), damping ratio, mass, viscous damping, stiffness, and half of their 95 % intervals."""
     fit = window.fit
-    residue = abs(residues_of(fit)[0, index])
+    residue = abs(frf_search.residues_of(fit)[0, index])
     omega, zeta = starts_of(fit)[index]
     base = np.array([np.log(omega), np.log(zeta), np.log(max(residue, 1e-300))])
     scale = np.array([1.0, 1.0, 1.0 / max(residue, 1e-300)])
     covariance = _misfit(fit, window.parts, index) * known.each[0, index] * np.outer(scale, scale)
-    change = LOGARITHMS
+    change = model_search.LOGARITHMS
     values = change @ base + np.array([-np.log(2.0 * np.pi), 0.0, 0.0, np.log(2.0), 0.0])
     half = float(stats.t.ppf(0.975, known.freedom)) * np.sqrt(np.maximum(np.diag(change @ covariance @ change.T), 0.0))
     for other in others:
-        size = abs(residues_of(other)[0, index])
+        size = abs(frf_search.residues_of(other)[0, index])
         moved = np.array([np.log(other.omega[index]), np.log(other.zeta[index]), np.log(max(size, 1e-300))]) - base
         half = np.hypot(half, np.abs(change @ moved))
     if measured.hits is not None:
@@ -454,7 +431,12 @@ def _misfit(fit: ModalFit, parts: Sequence[Lines], index: int) -> float:
 
 
 def _scatter(
-    window: Window, known: Uncertainty, index: int, measured: _Measured, change: FloatArray, scale: FloatArray
+    window: Window,
+    known: Uncertainty,
+    index: int,
+    measured: _Measured,
+    change: FloatArray,
+    scale: FloatArray,
 ) -> FloatArray:
     """Half widths of the intervals from the scatter of a mode between single impacts; 0 if noise explains it."""
     hits, fit, lines = measured.hits, window.fit, window.parts[0]
@@ -475,7 +457,7 @@ def _scatter(
     moved = (change * scale) @ (rows @ stacked.T)
     spread = np.sqrt(count / (count - 1.0) * np.sum((moved - moved.mean(axis=1, keepdims=True)) ** 2, axis=1))
     expected = np.sqrt(np.maximum(np.diag(change @ (known.each[0, index] * np.outer(scale, scale)) @ change.T), 1e-300))
-    limit = np.sqrt(stats.chi2.ppf(1.0 - SCATTER_PROBABILITY, count - 1) / (count - 1))
+    limit = np.sqrt(stats.chi2.ppf(1.0 - model_search.SCATTER_PROBABILITY, count - 1) / (count - 1))
     return np.asarray(np.where(spread > limit * expected, stats.t.ppf(0.975, count - 1) * spread, 0.0))
 
 
@@ -487,7 +469,7 @@ def _refusal(
     hertz, width = omega / (2.0 * np.pi), 2.0 * zeta * omega
     return (
         _record_refusal(hertz, zeta, measured)
-        or (_response_refusal(residues_of(window.fit)[:, index]) if sought.phase_known else "")
+        or (_response_refusal(frf_search.residues_of(window.fit)[:, index]) if sought.phase_known else "")
         or _evidence_refusal(window, index, hertz, pool)
         or _local_refusal(window, omega, width)
         or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent or _ACCEPTED_PERCENT)
@@ -503,7 +485,7 @@ def _record_refusal(hertz: float, zeta: float, measured: _Measured) -> str:
             f"its half-power width of {width:.3g} Hz is less than the {measured.resolution_hz:.3g} Hz between two "
             "lines: window and length of the record make such a peak; needed is a finer resolution, or the time record"
         )
-    refusal, lasting = lasting_refusal(hertz, zeta, measured.record_s)
+    refusal, lasting = model_search.lasting_refusal(hertz, zeta, measured.record_s)
     if refusal:
         return refusal
     mains = min((k * base for base in _MAINS_HZ for k in range(1, _HARMONICS)), key=lambda each: abs(each - hertz))
@@ -548,8 +530,9 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
     # Where another mode lies within its width, that one must not take its part.
     effort = (0, 1.0) if np.count_nonzero(~apart) == 1 else (10, 1e-4)
     without = fitted(window.parts, starts, effort)
-    gain = np.inf if without is None else evidence_of(without, share) - evidence_of(fit, share)
-    stable = any(abs(each.omega - omega) < max(each.zeta, zeta) * omega and each.share >= STABLE for each in pool)
+    gain = np.inf if without is None else frf_search.evidence_of(without, share) - frf_search.evidence_of(fit, share)
+    known = [each for each in pool if each.share >= frf_search.STABLE]
+    stable = any(abs(each.omega - omega) < max(each.zeta, zeta) * omega for each in known)
     lines, left = window.parts[0], fit.left[0]
     modelled_lines = (lines.response - left / lines.weight) * lines.s ** (1 - lines.power)
     near = np.flatnonzero(lines.near(omega, _PEAK * 2.0 * zeta * omega, steps=1.0))

@@ -292,9 +292,8 @@ class _Selection:
     def _grows(self, spare: Starts) -> bool:
         """One mode more for which the data speak: of the pool, or where most is left."""
         parts = self.parts
-        left: Sequence[ComplexArray] = (
-            [lines.weight * lines.response for lines in parts] if self.best is None else self.best.left
-        )
+        whole = [lines.weight * lines.response for lines in parts]
+        left: Sequence[ComplexArray] = whole if self.best is None else self.best.left
         highest = float(parts[0].omega[int(np.argmax(np.convolve(np.abs(left[0]), np.ones(3), "same")))])
         tried = [*spare, *((highest, zeta) for zeta in _START_DAMPING)]
         gains = []

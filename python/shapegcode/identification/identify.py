@@ -313,9 +313,8 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sou
 
 def _few(ready: Prepared, problem: FitProblem, many: FrfModes, narrow: bool) -> int | None:
     """Number of modes that explain the whole record to its noise, if a fit over time is best for so few."""
-    starts = [
-        (2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in many.modes if not mode.refusal
-    ]
+    supported = [mode for mode in many.modes if not mode.refusal]
+    starts = [(2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in supported]
     power = np.mean([np.mean(record.response**2) for record in ready.records])
     noise = np.mean([(each.response_noise or 0.0) ** 2 for each in ready.usable]) / power
     limit = max(_EXPLAINED**2, _NOISE_SHARE**2 * noise)
@@ -334,7 +333,7 @@ def _few(ready: Prepared, problem: FitProblem, many: FrfModes, narrow: bool) -> 
         if not peaks:
             return len(starts) if quick is None else None
         starts = [*(model_search.starts_of(quick) if quick is not None else []), (peaks[0], _START_DAMPING)]
-    return None if any(mode.refusal == "" for mode in many.modes) else _FEW_MODES
+    return None if supported else _FEW_MODES
 
 
 def _many(ready: Prepared, files: tuple[str, ...], many: FrfModes, fitted: Sequence[FloatArray]) -> Identification:

@@ -216,9 +216,8 @@ class _Clock:
         values = resample_poly(self.values, 1, thinner)
         step = period * thinner
         smooth, times = _low_passed(command, min(_COARSE_HZ, 0.4 / step))
-        energy = np.array(
-            [np.sum(np.abs(smooth[(times >= begin) & (times < end)]) ** 2) for begin, end in self.windows]
-        )
+        inside = [(times >= begin) & (times < end) for begin, end in self.windows]
+        energy = np.array([np.sum(np.abs(smooth[part]) ** 2) for part in inside])
         used = np.flatnonzero(energy > _LOUD * energy.max())
         size = 1 << int(np.ceil(np.log2(len(values) + len(smooth) * (times[1] - times[0]) / step + 1)))
         # A mode that rings for long would be most of the record: every frequency counts alike.
@@ -435,9 +434,8 @@ class _Clock:
         power = power[used]
         lowest = np.cumsum(power) <= _LOWEST_SHARE * np.sum(power)
         ratio = ratio * best * (np.sign(np.sum((unit * best * power)[lowest].real)) or 1.0)
-        return FrequencyResponse(
-            self.record.source, hertz, -ratio, "acceleration", coherence, self.command.axis, scaled=False
-        )
+        source, axis = self.record.source, self.command.axis
+        return FrequencyResponse(source, hertz, -ratio, "acceleration", coherence, axis, scaled=False)
 
 
 def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:

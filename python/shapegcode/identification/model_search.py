@@ -122,9 +122,8 @@ def _pool(problem: FitProblem) -> Starts:
     kept: Starts = []
     for w, z in reversed([mode for modes in chart_modes(problem) for mode in modes]):
         inside = z < _MAX_DAMPING and low <= w / (2.0 * np.pi) <= high
-        if inside and not any(
-            abs(w - v) < _SAME_PLACE * min(z, y) * w and abs(np.log(z / y)) < _SAME_DAMPING for v, y in kept
-        ):
+        near = [y for v, y in kept if abs(w - v) < _SAME_PLACE * min(z, y) * w]
+        if inside and not any(abs(np.log(z / y)) < _SAME_DAMPING for y in near):
             kept.append((w, z))
     return kept
 

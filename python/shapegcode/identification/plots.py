@@ -242,9 +242,8 @@ def plot_spectrum(found: Identification, ax: Axes | None = None) -> Axes:
     panel.set(xlabel="frequency in Hz", ylabel=_quantity(found.taps[0]), ylim=(lowest, 3.0 * top))
     for peak in spectrum.peaks:
         if peak.frequency_hz <= spectrum.frequency_hz[seen][-1]:
-            panel.annotate(
-                peak.label, (peak.frequency_hz, peak.amplitude), (0, 6), textcoords="offset points", ha="center"
-            )
+            top_of = peak.frequency_hz, peak.amplitude
+            panel.annotate(peak.label, top_of, (0, 6), textcoords="offset points", ha="center")
     return panel
 
 

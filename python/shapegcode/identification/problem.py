@@ -55,9 +55,8 @@ class FitProblem:
     def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
         """Indices of the candidates that explain most in addition to those already chosen."""
         omega, zeta = np.array(candidates).T
-        ranking = _core.rank_modes(
-            self.responses, self.period_s, omega, zeta, kept + 1, self.forces, self.quantity, kept
-        )
+        records = self.responses, self.period_s
+        ranking = _core.rank_modes(*records, omega, zeta, kept + 1, self.forces, self.quantity, kept)
         return [int(index) for index in ranking.chosen]
 
     @property

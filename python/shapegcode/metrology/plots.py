@@ -47,9 +47,8 @@ def plot_part(measurement: Measurement, ax: Axes | None = None, *, region: int |
     everything = np.concatenate([wall.point_mm for wall in _walls(drawn[0][1])])
     extent = float(np.ptp(everything, axis=0).max())
     largest_mm = max(_largest_um(each) for _, each in drawn) * 1e-3
-    magnified = plot.round_below(
-        max(_SHARE_OF_TOOL * radius, _SHARE_OF_PART * extent) / max(largest_mm, _MIN_DRAWN_UM * 1e-3)
-    )
+    wanted_mm = max(_SHARE_OF_TOOL * radius, _SHARE_OF_PART * extent)
+    magnified = plot.round_below(wanted_mm / max(largest_mm, _MIN_DRAWN_UM * 1e-3))
     title = (
         f"Walls cut by a tool of {measurement.tool_diameter_mm:g} mm, deviations magnified {magnified:g} times "
         f"(1 mm drawn is {1e3 / magnified:g} µm)"

@@ -18,15 +18,8 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.machine.controller import GrblPlanner, KlipperPlanner, LinuxcncPlanner
 from shapegcode.machine.dialects import dialect_of
-from shapegcode.model.modes import (
-    NO_OFFSET,
-    Offset,
-    drive_parameters,
-    moving_axis,
-    moving_modes,
-    region_offset,
-    slowest_mode,
-)
+from shapegcode.model import modes
+from shapegcode.model.modes import NO_OFFSET, Offset
 
 
 def fanuc_model(
@@ -241,7 +234,7 @@ class MachineModel:
         self.always_plans = machine.controller.kind != "fanuc"
         # Rules of block timing under which emitted blocks are simulated; a planner has one of its own.
         self.block_rules = (self.own_rule,) if self.always_plans else BLOCK_ENDS
-        slowest = [slowest_mode(mode) for axis in machine.axes.as_tuple() for mode in axis.modes]
+        slowest = [modes.slowest_mode(mode) for axis in machine.axes.as_tuple() for mode in axis.modes]
         rates = [damping * 2.0 * math.pi * frequency for frequency, damping in slowest]
         self.slowest_decay_per_s = min(rates, default=math.inf)  # of the mode that rings longest
 
@@ -288,7 +281,8 @@ class MachineModel:
     @cached_property
     def bounds_deviations(self) -> bool:
         """Whether deviations at other overrides cost little beside a run: no filter, modes that stay, sides alike."""
-        plain = self.machine.verdict.plant == "modal" and not self.shaped.filters and moving_axis(self.machine) is None
+        moves = modes.moving_axis(self.machine) is not None
+        plain = self.machine.verdict.plant == "modal" and not self.shaped.filters and not moves
         return plain and not self.always_plans and self.machine.input.material_side is None
 
     def limits(self, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
@@ -297,7 +291,7 @@ class MachineModel:
 
     def offset(self, region: _core.Region) -> Offset:
         """From the program's positions in a region to the machine's; see `region_offset`."""
-        return region_offset(region, self.machine)
+        return modes.region_offset(region, self.machine)
 
     def options(
         self, *, plant: str = "modal", filters: Sequence[_core.Fir] = (), shift: float = 0.0, only: str | None = None,
@@ -308,9 +302,9 @@ class MachineModel:
             raise _core.ArgumentError(f"plant = {plant!r}: must be one of {', '.join(PLANTS)}")
         options = _core.SimulationOptions()
         options.period_s = self.period_s
-        pairs = moving_modes(self.machine, shift, offset, only)
+        pairs = modes.moving_modes(self.machine, shift, offset, only)
         if plant != "modal":
-            options.drives = drive_parameters(self.machine, shift, only)
+            options.drives = modes.drive_parameters(self.machine, shift, only)
             pairs = [[pair for pair in of if any(pair[0].excited_by)] for of in pairs]
         options.modes = [[mode for mode, _ in of] for of in pairs]
         options.mode_tables = [[table for _, table in of] for of in pairs]

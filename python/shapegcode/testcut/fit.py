@@ -13,6 +13,7 @@ from scipy.special import lambertw
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.units import FloatArray
+from shapegcode.testcut import result
 from shapegcode.testcut.cut import CuttingLaw, IntervalDetails, MeasuringPass, TestCut, read_test_cut
 from shapegcode.testcut.forces import (
     CoefficientFit,
@@ -36,19 +37,7 @@ from shapegcode.testcut.record import (
     revolutions,
     turned,
 )
-from shapegcode.testcut.result import (
-    EXPONENT_LIMIT,
-    FACTOR_LIMIT,
-    ChipRange,
-    CornerPass,
-    CornerResult,
-    FollowedPass,
-    ForceRatio,
-    IntervalResult,
-    LeftOut,
-    TaperPass,
-    TaperResult,
-)
+from shapegcode.testcut.result import CornerResult, IntervalResult, TaperResult
 
 _Record = str | Path | ForceRecord
 
@@ -117,7 +106,7 @@ def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: 
         cutting=fit.law,
         coefficients=fit.coefficients,
         at_chip=fit.at_chip,
-        chip_mm=ChipRange(float(fit.chip_mm.min()), float(fit.chip_mm.max()), fit.middle_chip_mm),
+        chip_mm=result.ChipRange(float(fit.chip_mm.min()), float(fit.chip_mm.max()), fit.middle_chip_mm),
         mean_forces=len(fit.chip_mm),
         outliers=int(fit.outlier.sum()),
         rms_n=(float(fit.rms_n[0]), float(fit.rms_n[1])),
@@ -138,11 +127,11 @@ def _poor(fit: CoefficientFit) -> Iterator[str]:
     for each in fit.coefficients[:4]:
         half = 0.5 * (each.high - each.low)
         if each.name.endswith("exponent"):
-            if half > EXPONENT_LIMIT:
-                yield f"{each.name} is known to +-{half:.3f} only (wanted: +-{EXPONENT_LIMIT:g})"
-        elif half > FACTOR_LIMIT * each.value:
+            if half > result.EXPONENT_LIMIT:
+                yield f"{each.name} is known to +-{half:.3f} only (wanted: +-{result.EXPONENT_LIMIT:g})"
+        elif half > result.FACTOR_LIMIT * each.value:
             share = 100.0 * half / each.value
-            yield f"{each.name} is known to +-{share:.0f} % only (wanted: +-{100 * FACTOR_LIMIT:g} %)"
+            yield f"{each.name} is known to +-{share:.0f} % only (wanted: +-{100 * result.FACTOR_LIMIT:g} %)"
 
 
 def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
@@ -159,11 +148,11 @@ def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
 
 def _reduced(
     cut: TestCut, measured: Mapping[int, ForceRecord], law: CuttingLaw
-) -> tuple[list[MeanForces], list[TaperPass], list[LeftOut], list[str]]:
+) -> tuple[list[MeanForces], list[result.TaperPass], list[result.LeftOut], list[str]]:
     """Reduce the records to mean forces, as recorded or of revolutions in full engagement without chatter."""
     rows: list[MeanForces] = []
-    passes: list[TaperPass] = []
-    left_out: list[LeftOut] = []
+    passes: list[result.TaperPass] = []
+    left_out: list[result.LeftOut] = []
     warnings: list[str] = []
     for number, record in measured.items():
         measuring = cut.passes[number - 1]
@@ -173,13 +162,13 @@ def _reduced(
         found = revolutions(place_samples(record, cut, measuring, expected(cut, measuring, law)))
         shown = found.record
         offset, drift = ((float(along), float(left)) for along, left in (shown.offset_n, shown.drift_n))
-        passes.append(TaperPass(shown.file, found.feed_mm_per_min, shown.spindle_rev_per_min, offset, drift))
+        passes.append(result.TaperPass(shown.file, found.feed_mm_per_min, shown.spindle_rev_per_min, offset, drift))
         warnings += shown.notes
         rows.append(_of_revolutions(cut, measuring, found))
         marks = np.flatnonzero(np.diff(np.concatenate([[0], found.chatter.astype(int), [0]])))
         for first, behind in zip(marks[::2], marks[1::2], strict=True):
             low, high = float(found.x_mm[first]), float(found.x_mm[behind - 1])
-            left_out.append(LeftOut(number, low, high))
+            left_out.append(result.LeftOut(number, low, high))
             warnings.append(
                 f"{shown.file}: X {low:.1f} to {high:.1f} mm left out: the force oscillates far more there than in the "
                 "rest of the pass (chatter?)"
@@ -262,7 +251,7 @@ def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResu
         far = _inside(cut, number, forecast.x_mm)
         recorded = float(found.resultant_n[seen].max()), float(found.peak_n[seen].max())
         wanted = float(forecast.mean_resultant_n[far].max()), float(forecast.peak_resultant_n[far].max())
-        passes[number] = CornerPass(number, *recorded, *wanted, found, forecast)
+        passes[number] = result.CornerPass(number, *recorded, *wanted, found, forecast)
     first = passes[min(passes)]
     seen = _inside(cut, first.number, first.record.x_mm) & ~first.record.chatter
     there = np.interp(first.record.x_mm[seen], first.forecast.x_mm, first.forecast.mean_resultant_n)
@@ -270,7 +259,7 @@ def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResu
     if {1, 2} <= set(passes):
         before, after = passes[1], passes[2]
         of_mean = after.measured_mean_n / before.measured_mean_n
-        ratio = ForceRatio(of_mean, after.expected_mean_n / before.expected_mean_n)
+        ratio = result.ForceRatio(of_mean, after.expected_mean_n / before.expected_mean_n)
     return CornerResult(
         program=cut.program,
         machine=cut.machine,
@@ -311,7 +300,7 @@ def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> Interval
     )
 
 
-def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
+def _followed(cut: TestCut, number: int, record: PlacedRecord) -> result.FollowedPass:
     assert isinstance(cut.about, IntervalDetails)
     measuring, interval = cut.passes[number - 1], cut.about.intervals_mm[number - 1]
     first, last = measuring.feeds[0][0], measuring.feeds[-2][0]
@@ -345,7 +334,7 @@ def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
     worst = int(np.argmax(off))
     ok = bool(off[worst] <= _DEVIATION_LIMIT + _NOISE_SHARE * noise)
     told = number, interval, float(off[worst]), float(ends[worst]), noise, lag, ok
-    return FollowedPass(*told, time, size, immediate, course(lag))
+    return result.FollowedPass(*told, time, size, immediate, course(lag))
 
 
 def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> tuple[FloatArray, FloatArray]:

@@ -287,9 +287,8 @@ def fit_coefficients(
     free = int((weights > 0.0).sum()) - count
     factors, at_chip = (_with_intervals(model, parameters, covariance, free, each) for each in (1.0, model.reference))
     rms_n, percent = np.sqrt(np.mean(kept**2, axis=0)), 100.0 * float(np.sqrt(np.sum(kept**2) / np.sum(size**2)))
-    return CoefficientFit(
-        factors, thickness, model.reference, at_chip[:4:2], chip, predicted, outlier, rms_n, percent, correlation
-    )
+    left_by_fit = outlier, rms_n, percent, correlation
+    return CoefficientFit(factors, thickness, model.reference, at_chip[:4:2], chip, predicted, *left_by_fit)
 
 
 def _outliers(measured: FloatArray, left: FloatArray, noise: FloatArray) -> npt.NDArray[np.bool_]:

@@ -167,10 +167,8 @@ def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, f
     size = np.linalg.norm(turned(force, samples), axis=1)
     x = _positions(record, measuring, forecast, size, time, moved, (begin, end), notes)
     named = tuple(f"{record.file}: {note}" for note in notes)
-    by_time = record.position_mm is None
-    return PlacedRecord(
-        record.file, cut, measuring, time, x, force, torque, samples, speed, offset, drift, by_time, named
-    )
+    file, by_time = record.file, record.position_mm is None
+    return PlacedRecord(file, cut, measuring, time, x, force, torque, samples, speed, offset, drift, by_time, named)
 
 
 def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[FloatArray, FloatArray]:
@@ -349,9 +347,8 @@ def revolutions(record: PlacedRecord) -> Revolutions:
     turns = int((inside[-1] - inside[0]) / record.samples)
     edges = inside[0] + np.arange(turns + 1) * record.samples
     size, torque = np.linalg.norm(record.force_n, axis=1), record.torque_nm
-    table = np.hstack(
-        [record.force_n, size[:, None], size[:, None] ** 2, x[:, None], *([] if torque is None else [torque])]
-    )
+    recorded = [] if torque is None else [torque]
+    table = np.hstack([record.force_n, size[:, None], size[:, None] ** 2, x[:, None], *recorded])
     means = _sums(table, edges[:-1], edges[1:]) / record.samples
     peaks = np.maximum.reduceat(size[: int(edges[-1])], edges[:-1].astype(np.intp))
     middle = means[:, 4]

@@ -169,9 +169,8 @@ def lag_estimates(
 
     gain, rest = fit.gain_per_s, fit.rest
     lag = half("lag_s", 1.0, -rest / gain**2, 1.0 / gain, 0.0)
-    dead, gains, forward = (
-        half(name, *row) for name, row in zip(("dead_s", "gain_per_s", "rest"), np.eye(4), strict=False)
-    )
+    names = "dead_s", "gain_per_s", "rest"
+    dead, gains, forward = (half(name, *row) for name, row in zip(names, np.eye(4), strict=False))
     ends = max(0.0, 1.0 - rest - forward), min(1.0, 1.0 - rest + forward)
     why = "the feed-forward leaves no lag that determines it"
     loop = (
@@ -233,9 +232,8 @@ def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, te
         friction = max(0.02 * acceleration * _MM, 1e-6)
         logarithms = [math.log(each) for each in (bandwidth, integral, friction)]
         begin = (max(1e3 * start.lag_s - 1.0, 0.1), math.log(gain), rest, *logarithms)
-        tried.append(
-            least_squares(residual, begin, bounds=(_LOW, _HIGH), x_scale=_SCALE, diff_step=[1e-3] * 6, max_nfev=20)
-        )
+        steps, ends = [1e-3] * 6, (_LOW, _HIGH)
+        tried.append(least_squares(residual, begin, bounds=ends, x_scale=_SCALE, diff_step=steps, max_nfev=20))
         tell()
     best = np.asarray(min(tried, key=lambda each: float(each.cost)).x)
     ways, left = simulated(best)
