@@ -115,10 +115,9 @@ class PartLog:
         middles = []
         for i, j in zip(known[turns], known[turns + 1], strict=True):
             times, shares = self.times_s[i : j + 1], u[i : j + 1]
+            slope, offset = (shares[1] - shares[0]) / (times[1] - times[0]), shares[0]
             if j - i > 1:
                 slope, offset = np.polyfit(times - times[0], shares, 1)
-            else:
-                slope, offset = (shares[1] - shares[0]) / (times[1] - times[0]), shares[0]
             middles.append(times[0] - offset / slope)
         return np.array(middles)
 
@@ -161,13 +160,13 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
         travel = (positions[low:high, axis] - rest.mean()) * math.copysign(1.0, part.length_mm)
         spread = float(noise[used.index(axis)])
         out.append(PartLog(part, times[low:high], travel, spread))
-        expected = abs(part.length_mm) * part.stride
+        moved, expected = travel.max() - travel.min(), abs(part.length_mm) * part.stride
         # A turn without a stop is cut short by the smoothing.
         least = 0.98 if part.pattern in ("dwell", "exact", "rapid") else 0.5
-        if not least * expected < travel.max() - travel.min() < 1.02 * expected + 10.0 * spread:
+        if not least * expected < moved < 1.02 * expected + 10.0 * spread:
             raise ArgumentError(
-                f"{log.file}: {part.axis} moves over {travel.max() - travel.min():.3f} mm in part {len(out)}, test "
-                f"{test.name} has {expected:.3f} mm there: wrong log, units or scale"
+                f"{log.file}: {part.axis} moves over {moved:.3f} mm in part {len(out)}, test {test.name} has "
+                f"{expected:.3f} mm there: wrong log, units or scale"
             )
     return out
 

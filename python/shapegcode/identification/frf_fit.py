@@ -18,9 +18,9 @@ from shapegcode.identification.frf_model import Lines, ModalFit
 from shapegcode.identification.frf_search import Pole, StablePole, Uncertainty, Window, cut, fitted, starts_of
 from shapegcode.identification.lines import (
     Hits,
+    correlation_of,
     hits_of,
     measured_lines,
-    neighbours_correlation,
     smoothed,
     steady_sines,
     weighted,
@@ -246,7 +246,7 @@ def _in_responses(responses: Sequence[FrequencyResponse], sought: Sought) -> Frf
     parts = tuple(_weighed(lines, model) for lines, model in zip(measured.parts, models, strict=True))
     windows = frf_search.search(parts, measured.low, measured.high, _IN_WINDOW, pool, frf_search.modes_of(windows))
     for rank, window in enumerate(windows):
-        correlation = neighbours_correlation(window.fit.left)
+        correlation = correlation_of(window.fit.left)
         correlated = tuple(replace(lines, correlation=correlation) for lines in window.parts)
         windows[rank] = replace(window, parts=correlated)
     return _tested(replace(measured, parts=parts), windows, pool, poles, sought)

@@ -155,7 +155,7 @@ def smoothed(power: FloatArray) -> FloatArray:
     return np.asarray(uniform_filter1d(level, width, mode="nearest"), dtype=np.float64)
 
 
-def neighbours_correlation(left: Sequence[ComplexArray]) -> ComplexArray:
+def correlation_of(left: Sequence[ComplexArray]) -> ComplexArray:
     """Correlation of the residual between lines 0, 1, 2, ... apart, if it is significant."""
     power = sum(float(np.sum(np.abs(part) ** 2)) for part in left)
     count = sum(len(part) for part in left)

@@ -34,23 +34,17 @@ _MEASURED, _FITTED = plot.GREY, plot.COLOURS[0]
 def plots_of(found: Identification) -> dict[str, Plot]:
     """Its pictures by name."""
     if found.sweep is not None:
-        return {"identify-sweep": partial(plot_sweep, found)}
-    if found.responses:
-        return {
-            "identify-response": partial(plot_response, found),
-            "identify-stabilisation": partial(plot_stabilisation, found),
-        }
-    pictures: dict[str, Plot] = {
-        "identify-traces": partial(plot_traces, found),
-        "identify-stabilisation": partial(plot_stabilisation, found),
-    }
-    if found.modes:
-        pictures["identify-decay"] = partial(plot_decay, found)
-    if found.decay:
-        pictures["identify-spectrum"] = partial(plot_spectrum, found)
+        names = ["sweep"]
+    elif found.responses:
+        names = ["response", "stabilisation"]
     else:
-        pictures["identify-response"] = partial(plot_response, found)
-    return pictures
+        decays = ["decay"] if found.modes else []
+        names = ["traces", "stabilisation", *decays, "spectrum" if found.decay else "response"]
+    drawn_by = {
+        "traces": plot_traces, "response": plot_response, "stabilisation": plot_stabilisation, "decay": plot_decay,
+        "spectrum": plot_spectrum, "sweep": plot_sweep,
+    }  # fmt: skip
+    return {f"identify-{name}": partial(drawn_by[name], found) for name in names}
 
 
 def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:

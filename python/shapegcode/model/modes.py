@@ -155,11 +155,8 @@ def region_offset(region: _core.Region, machine: Machine) -> Offset:
 def machine_warnings(machine: Machine) -> list[str]:
     """Warnings about the tables of modes before any program is read: a mass that is missing, unused or outside."""
     mass = machine.shaping.part_mass_kg
-    over_mass = [
-        (name, mode, mode.frequency_over.mass_kg)
-        for name, _, mode in numbered_modes(machine)
-        if mode.frequency_over is not None and mode.frequency_over.mass_kg is not None
-    ]
+    tables = [(name, mode, mode.frequency_over) for name, _, mode in numbered_modes(machine)]
+    over_mass = [(name, mode, over.mass_kg) for name, mode, over in tables if over is not None and over.mass_kg]
     if mass is None:
         return [
             f"{name} has a table over mass_kg, but shaping.part_mass_kg is not given: its nominal "
@@ -185,17 +182,14 @@ def region_range_warnings(regions: Sequence[_core.Region], machine: Machine) -> 
             continue
         axis = _AXES.index(over.axis)
         reached: list[float] = []
-        unknown = None
-        for region in regions:
-            offset = region_offset(region, machine)[axis]
-            if offset is None:
-                unknown = unknown or region
-                continue
-            positions = np.asarray(region.path.polyline())[:, axis] + offset
-            reached += [float(positions.min()), float(positions.max())]
-        if unknown is not None:
+        offsets = [(region, region_offset(region, machine)[axis]) for region in regions]
+        for region, offset in offsets:
+            if offset is not None:
+                positions = np.asarray(region.path.polyline())[:, axis] + offset
+                reached += [float(positions.min()), float(positions.max())]
+        if unknown := [region for region, offset in offsets if offset is None]:
             warnings.append(
-                f"line {unknown.first_line}: the position of {over.axis.upper()} is not known, over which {name} "
+                f"line {unknown[0].first_line}: the position of {over.axis.upper()} is not known, over which {name} "
                 f"varies: its nominal {mode.frequency_hz:g} Hz holds"
             )
         low, high = over.abscissa[0], over.abscissa[-1]

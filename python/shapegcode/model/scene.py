@@ -19,17 +19,8 @@ from shapegcode.model.modes import axis_modes
 from shapegcode.model.stream import Chunk, cuts_of_lines, stream
 from shapegcode.program import Program
 from shapegcode.program.compensation import paired_regions
-from shapegcode.results.page.scene import (
-    PIXELS_HIGH,
-    PIXELS_WIDE,
-    AccelerationSpectrum,
-    Kept,
-    ModeLine,
-    Scene,
-    SceneSpectrum,
-    Thinner,
-    Variant,
-)
+from shapegcode.results.page import scene as page
+from shapegcode.results.page.scene import Kept, Scene, SceneSpectrum, Variant
 
 MOST_POINTS = 60_000  # samples of a program that a page shows, at most
 _HALF_PIXEL, _LEAST_EXTENT_MM = 0.5, 1e-3
@@ -80,7 +71,7 @@ def scene_of(
         spectra += lines
         notes.append(
             f"{label}: {len(variant.sample)} of {variant.samples} samples, path within {kept.path_pixels:.1f} pixel of "
-            f"{PIXELS_WIDE}, curves within {kept.pixels / PIXELS_HIGH * 100.0:.1f} % of their range"
+            f"{page.PIXELS_WIDE}, curves within {kept.pixels / page.PIXELS_HIGH * 100.0:.1f} % of their range"
         )
     of_mode = "mode of {}, {:g} Hz".format
     return Scene(
@@ -89,7 +80,7 @@ def scene_of(
         thinned=f"Thinned for display, extremes kept ({'; '.join(notes)}). The figures are not thinned.",
         spectra=tuple(spectra),
         modes=tuple(
-            ModeLine(axis, mode.frequency_hz, of_mode(axis.upper(), mode.frequency_hz))
+            page.ModeLine(axis, mode.frequency_hz, of_mode(axis.upper(), mode.frequency_hz))
             for axis, modes in zip("xyz", axis_modes(machine), strict=True)
             for mode in modes
         ),
@@ -108,7 +99,7 @@ def _variant(
     whole_s = _core.time_program(program.core, fanuc_model(machine)).total_s or period_s
     cuts = [(mine, other.path) for mine, other in paired_regions(program, nominal)]
     followed = _Followed(sorted(cuts, key=lambda cut: cut[0].first_line))
-    thinner, spectrum = Thinner(_scales(nominal), MOST_POINTS), AccelerationSpectrum(period_s)
+    thinner, spectrum = page.Thinner(_scales(nominal), MOST_POINTS), page.AccelerationSpectrum(period_s)
     blocks = _Blocks()
     velocity: FloatArray | None = None
     for chunk in stream(program, machine, plant=plant):
@@ -170,4 +161,4 @@ def _scales(program: Program) -> dict[str, float]:
     """What half a pixel is, of the path in mm; of a curve the range below which it is flat."""
     corners = [corner for region in program.regions for corner in (region.path.polyline(),) if len(corner)]
     extent = float(np.ptp(np.concatenate(corners), axis=0).max()) if corners else 0.0
-    return {"path": max(extent, _LEAST_EXTENT_MM) * _HALF_PIXEL / PIXELS_WIDE} | _FLAT
+    return {"path": max(extent, _LEAST_EXTENT_MM) * _HALF_PIXEL / page.PIXELS_WIDE} | _FLAT

@@ -23,23 +23,8 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program.stamp import OVERRIDE
 from shapegcode.results.json import to_text
-from shapegcode.testcut.cut import (
-    FIGURES,
-    CornerDetails,
-    CuttingLaw,
-    CutTool,
-    DeeperStretch,
-    Deepest,
-    Edge,
-    IntervalDetails,
-    MeasuringPass,
-    TaperDetails,
-    TestCut,
-    offset_line,
-    on_increments,
-    reduced,
-    unrolled_edge,
-)
+from shapegcode.testcut import cut as cuts
+from shapegcode.testcut.cut import CornerDetails, CutTool, Edge, IntervalDetails, MeasuringPass, TaperDetails
 from shapegcode.testcut.forces import ForceLaw, engagement, straight_engagement
 from shapegcode.testcut.result import CutDesign
 
@@ -89,7 +74,7 @@ class CutConditions:
 
     def _cut_tool(self) -> CutTool:
         """The tool as the side file holds it."""
-        mill, law = self.tool.tool, CuttingLaw.of(self.tool.coefficients())
+        mill, law = self.tool.tool, cuts.CuttingLaw.of(self.tool.coefficients())
         runout = tuple(0.001 * value for value in mill.runout_um or ())
         return CutTool(mill.diameter_mm, mill.flutes, mill.helix_deg, runout, law)
 
@@ -196,12 +181,12 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     straight = max(10.0, 3.0 * radius)
     s, depth = _corner_depth(given, sizes)
     stock = math.ceil(2.0 * straight + float(s[-1]) + radius)
-    wanted_edge = unrolled_edge(s, depth, radius, stock, straight)
+    wanted_edge = cuts.unrolled_edge(s, depth, radius, stock, straight)
     # What the round tool leaves is the edge that the passes meet: where the wanted one is hollow more sharply than
     # the tool is round, it stays higher.
     far = 3.0 * radius
-    path = offset_line(wanted_edge, radius, -far, stock + far)
-    edge = reduced(offset_line(path, radius, -radius, stock + radius, inwards=True), 1e-4)
+    path = cuts.offset_line(wanted_edge, radius, -far, stock + far)
+    edge = cuts.reduced(cuts.offset_line(path, radius, -radius, stock + radius, inwards=True), 1e-4)
     x = np.arange(0.0, stock - radius, _STATION_MM)
     probe = _measuring_pass(given, edge, stock, "probe", [constant])
     met = engagement(given._cut_tool(), probe, x, up=given.up).radial_depth_mm
@@ -211,8 +196,8 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     given._check_feeds([feed for _, feed in blocks])
     excess = met - np.interp(x, s + straight, depth)
     more = np.flatnonzero(excess > _FEW_UM)
-    deeper = DeeperStretch(float(x[more[0]]), float(x[more[-1]]), float(excess.max())) if more.size else None
-    deepest = Deepest(float(met.max()), float(x[int(np.argmax(met))]))
+    deeper = cuts.DeeperStretch(float(x[more[0]]), float(x[more[-1]]), float(excess.max())) if more.size else None
+    deepest = cuts.Deepest(float(met.max()), float(x[int(np.argmax(met))]))
     about = CornerDetails(*sizes, interval, straight, deepest, deeper)
     modified = [(begin, given.feed_mm_per_min), *blocks, constant]
     passes = [("CONSTANT FEED", [constant]), ("MODIFIED FEED", modified)]
@@ -263,7 +248,7 @@ def _design(
     given: CutConditions, edge: Edge, stock_mm: float, passes: Sequence[tuple[str, Sequence[_Block]]],
     about: TaperDetails | CornerDetails | IntervalDetails, *, met: Edge | None = None,
 ) -> CutDesign:  # fmt: skip
-    kind = next(kind for kind, figures in FIGURES.items() if isinstance(about, figures))
+    kind = next(kind for kind, figures in cuts.FIGURES.items() if isinstance(about, figures))
     warnings = []
     if isinstance(about, CornerDetails) and about.deeper_than_corner is not None:
         deeper = about.deeper_than_corner
@@ -271,7 +256,7 @@ def _design(
             f"X {deeper.from_mm:.2f} to {deeper.to_mm:.2f} mm: the passes meet up to {deeper.most_mm:.3f} mm more than "
             "the corner: there its edge is hollow more sharply than the tool is round; the side file has what is met"
         )
-    cut = TestCut(
+    cut = cuts.TestCut(
         kind, "", given.machine.name, given._cut_tool(), given.spindle, given.axial_depth_mm,
         "up" if given.up else "down",
         tuple(_measuring_pass(given, met or edge, stock_mm, name, blocks) for name, blocks in passes), about,
@@ -414,8 +399,8 @@ class _Writer:
     def passes(self, k: int) -> Iterator[str]:
         """The edge of a pass, a stop, and the pass."""
         each, wall = self.cut.passes[k], self.walls[k]
-        path = offset_line(self.design.edge, self.radius, each.start_mm, each.end_mm)
-        path = on_increments(path, self.controller.least_increment_mm)
+        path = cuts.offset_line(self.design.edge, self.radius, each.start_mm, each.end_mm)
+        path = cuts.on_increments(path, self.controller.least_increment_mm)
         yield f"(PASS {k + 1}: MILL THE EDGE)"
         for offset in self._offsets(self.walls[k - 1] if k else -_RAW_MM, wall):
             yield from self._edge(path, wall, offset, min(feed for _, feed in each.feeds))

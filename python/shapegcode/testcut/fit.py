@@ -13,20 +13,9 @@ from scipy.special import lambertw
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.units import FloatArray
-from shapegcode.testcut import result
+from shapegcode.testcut import forces, result
 from shapegcode.testcut.cut import CuttingLaw, IntervalDetails, MeasuringPass, TestCut, read_test_cut
-from shapegcode.testcut.forces import (
-    CoefficientFit,
-    Engagement,
-    ForceLaw,
-    MeanForces,
-    Thickness,
-    engagement,
-    expected,
-    fit_coefficients,
-    fully_engaged,
-    straight_engagement,
-)
+from shapegcode.testcut.forces import Engagement, ForceLaw, MeanForces, Thickness, engagement, expected, fully_engaged
 from shapegcode.testcut.record import (
     MIN_SAMPLES,
     ForceRecord,
@@ -96,7 +85,7 @@ def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: 
         # Where entry and exit lie in the record depends a little on the law.
         rows, passes, left_out, warnings = _reduced(cut, measured, law)
         data = _joined(rows)
-        fit = fit_coefficients(data, cut.tool, cut.axial_depth_mm, thickness=thickness, edge=edge)
+        fit = forces.fit_coefficients(data, cut.tool, cut.axial_depth_mm, thickness=thickness, edge=edge)
         law = fit.law
     if fit.outlier.any():
         warnings.append(f"{fit.outlier.sum()} of {len(fit.outlier)} mean forces do not fit the others: left out")
@@ -122,7 +111,7 @@ def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: 
     )
 
 
-def _poor(fit: CoefficientFit) -> Iterator[str]:
+def _poor(fit: forces.CoefficientFit) -> Iterator[str]:
     """Coefficients of the power laws that are not known well, in words."""
     for each in fit.coefficients[:4]:
         half = 0.5 * (each.high - each.low)
@@ -187,7 +176,7 @@ def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> Me
                 f"{cut.tool.diameter_mm:g} mm"
             )
         row = np.ones(len(depth), dtype=bool)
-        met = straight_engagement(cut.tool, depth, up=cut.up)
+        met = forces.straight_engagement(cut.tool, depth, up=cut.up)
     else:
         if record.position_mm is None:
             raise ArgumentError(
@@ -343,7 +332,7 @@ def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> t
     low, high = np.linspace(0.2, 0.98, _FEEDS) * min(commanded), np.linspace(0.5, 1.1, _FEEDS) * max(commanded)
     feeds = np.sort(np.concatenate([low, high]))
     law = ForceLaw(cut.tool, cut.tool.cutting, cut.spindle_rev_per_min, cut.axial_depth_mm)
-    met = straight_engagement(cut.tool, np.full(len(feeds), radial_depth_mm), up=cut.up)
+    met = forces.straight_engagement(cut.tool, np.full(len(feeds), radial_depth_mm), up=cut.up)
     return feeds, np.linalg.norm(law.forces(met, feeds).mean_n, axis=1)
 
 

@@ -9,19 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from shapegcode.errors import ArgumentError
-from shapegcode.identification.servo.models import (
-    SETTLE_S,
-    DriveFit,
-    LoopFit,
-    Masks,
-    counted,
-    fit_drive,
-    fit_lag,
-    lag_estimates,
-    range_of_three,
-    rms,
-    torque_friction,
-)
+from shapegcode.identification.servo import models
+from shapegcode.identification.servo.models import DriveFit, LoopFit, Masks, counted, rms
 from shapegcode.identification.servo.record import ServoRecord, ServoTrace, read_servo_record
 from shapegcode.identification.servo.result import ServoAxis, ServoCurves, ServoEstimate, ServoFit, ServoModel
 from shapegcode.io.units import FloatArray
@@ -120,23 +109,23 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
     changes = [np.abs(np.diff(each, prepend=each[:1])) for each in speeds]
     done = np.cumsum(np.concatenate(changes))
     early = tuple(np.split(done < done[-1] / 2.0, np.cumsum([len(each) for each in speeds])[:-1]))
-    settle = round(SETTLE_S / period_s)  # what the axis did before a stretch is not known
+    settle = round(models.SETTLE_S / period_s)  # what the axis did before a stretch is not known
     use = tuple(np.arange(len(each)) >= settle for each in speeds)
     uses = (use, *(tuple(c & (e == which) for e, c in zip(early, use, strict=True)) for which in (True, False)))
     compared = _compare_models(trace, early, uses, period_s, with_drive, tell)
     own = rms(counted(trace.deviation, use)) if trace.deviation is not None else None
-    models = []
+    judged = []
     for each in compared:
         rest, fitted = (rms(counted(left, use)) for left in (each.rest, each.rest_fitted))
-        models.append(ServoModel(each.name, rest, fitted, 100.0 * (1.0 - (rest / own) ** 2) if own else None))
+        judged.append(ServoModel(each.name, rest, fitted, 100.0 * (1.0 - (rest / own) ** 2) if own else None))
     whole, *halves = compared[1].fits
-    parameters = lag_estimates(whole, halves, trace, use, period_s)
-    parameters += torque_friction(trace, whole.lag_s, uses, period_s)
+    parameters = models.lag_estimates(whole, halves, trace, use, period_s)
+    parameters += models.torque_friction(trace, whole.lag_s, uses, period_s)
     for each in compared[2:]:
         parameters += _drive_estimates([fit for fit in each.fits if isinstance(fit, DriveFit)], trace.unit)
-    best = compared[int(np.argmin([model.rest for model in models]))]
+    best = compared[int(np.argmin([model.rest for model in judged]))]
     curves = ServoCurves(trace.time_s, speeds, trace.lag, trace.deviation, best.rest)
-    return replace(base, models=tuple(models), parameters=parameters, curves=curves)
+    return replace(base, models=tuple(judged), parameters=parameters, curves=curves)
 
 
 def _unlike(trace: ServoTrace) -> str:
@@ -193,15 +182,15 @@ def _compare_models(
         fitted = tuple(lag - model for lag, model in zip(trace.lag, whole.error, strict=True))
         return _ComparedModel(name, tuple(fits), rest, fitted)
 
-    found = [judge("servo lag", [fit_lag(trace, use, period_s, dead_time=False) for use in uses])]
+    found = [judge("servo lag", [models.fit_lag(trace, use, period_s, dead_time=False) for use in uses])]
     tell(0.1)
-    lags = [fit_lag(trace, use, period_s, dead_time=True) for use in uses]
+    lags = [models.fit_lag(trace, use, period_s, dead_time=True) for use in uses]
     found.append(judge("dead time and servo lag", lags))
     tell(0.2)
     if with_drive:
         steps = iter(np.linspace(0.2, 1.0, 7)[1:].tolist())
         pairs = zip(uses, lags, strict=True)
-        drives = [fit_drive(trace, use, period_s, lag, lambda: tell(next(steps))) for use, lag in pairs]
+        drives = [models.fit_drive(trace, use, period_s, lag, lambda: tell(next(steps))) for use, lag in pairs]
         found.append(judge("drive", drives))
     return found
 
@@ -215,7 +204,7 @@ def _drive_estimates(fits: Sequence[DriveFit], unit: str) -> tuple[ServoEstimate
         ("integral time", [fit.integral_time_s for fit in fits], "s"),
         ("friction over mass", [fit.coulomb for fit in fits], f"{unit}/s²"),
     )
-    return tuple(range_of_three(f"drive: {name}", values, of) for name, values, of in rows)
+    return tuple(models.range_of_three(f"drive: {name}", values, of) for name, values, of in rows)
 
 
 # --- the machine file -------------------------------------------------------------------------------------------------

@@ -70,15 +70,14 @@ class ServoTrace:
         for rank, way in enumerate(self.command):
             changes = np.abs(np.diff(way, 2, prepend=way[:1], append=way[-1:]))
             windows += [(float(changes[at : at + _WINDOW].sum()), rank, at) for at in range(0, len(way), _WINDOW)]
-        kept: list[tuple[int, int, int]] = []  # stretch, start, end
+        kept: list[tuple[int, slice]] = []  # stretch, and samples of it
         for _, rank, at in sorted(sorted(windows, reverse=True)[: max(1, most // _WINDOW)], key=lambda each: each[1:]):
             end = min(at + _WINDOW, len(self.command[rank]))
-            if kept and kept[-1][0] == rank and kept[-1][2] == at:
-                kept[-1] = (rank, kept[-1][1], end)
+            if kept and kept[-1][0] == rank and kept[-1][1].stop == at:
+                kept[-1] = (rank, slice(kept[-1][1].start, end))
             elif end - at >= _FEWEST:
-                kept.append((rank, at, end))
-
-        return self._parts([(rank, slice(start, end)) for rank, start, end in kept])
+                kept.append((rank, slice(at, end)))
+        return self._parts(kept)
 
     def _parts(self, kept: Sequence[tuple[int, slice]]) -> ServoTrace:
         """Parts of sections, as separate sections."""
