@@ -56,8 +56,7 @@ def characterize(
             f"{sheet.file}: nothing was measured: no times_s, no log (a log beside the file is found by the name of "
             "its test, such as log_cutting.csv)"
         )
-    factors = parse_units(units) if units is not None else None
-    logs = {}
+    factors, logs = parse_units(units) if units is not None else None, {}
     for done, (name, path) in enumerate(sheet.logs.items(), start=1):
         logs[name] = read_log(path, factors)
         if on_progress is not None:

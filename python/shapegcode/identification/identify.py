@@ -485,10 +485,9 @@ def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
 
 def _alone(problem: FitProblem, fit: Fit) -> list[Fit]:
     """The same modes fitted to each record by itself; none if there is but one, or a record does not hold them."""
-    if len(problem.responses) < 2:
-        return []
+    count = len(problem.responses)
     try:
-        return [problem.record(index).fit(model_search.starts_of(fit)) for index in range(len(problem.responses))]
+        return [problem.record(index).fit(model_search.starts_of(fit)) for index in range(count if count > 1 else 0)]
     except _core.ArgumentError:
         return []
 

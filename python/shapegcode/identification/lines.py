@@ -135,8 +135,7 @@ def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
         noise = np.maximum(noise, power * smoothed((1.0 - coherence) / coherence))
     applied = 0.0 if applied_s is None else 1.0 / applied_s
     plane = np.asarray(applied + 1j * omega, dtype=np.complex128)
-    nothing = np.zeros((len(omega), 0), dtype=np.complex128)
-    alone = np.ones(1, dtype=np.complex128)
+    nothing, alone = np.zeros((len(omega), 0), dtype=np.complex128), np.ones(1, dtype=np.complex128)
     return weighted(Lines(plane, each.response, np.ones(len(omega)), quantity, nothing, alone), noise)
 
 

@@ -400,9 +400,7 @@ def _with_intervals(
     distance = math.log(chip_mm / model.reference)
     found = []
     for k, (name, unit) in enumerate(zip(COEFFICIENTS[: len(parameters)], _UNITS, strict=False)):
-        factor = k in (0, 2)
-        direction = np.zeros(len(parameters))
-        direction[k] = 1.0
+        factor, direction = k in (0, 2), np.eye(len(parameters))[k]
         if factor:
             direction[k + 1] = distance
         value = float(direction @ parameters)
