@@ -89,26 +89,13 @@ def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: 
         law = fit.law
     if fit.outlier.any():
         warnings.append(f"{fit.outlier.sum()} of {len(fit.outlier)} mean forces do not fit the others: left out")
+    low, high = float(fit.chip_mm.min()), float(fit.chip_mm.max())
     return TaperResult(
-        program=cut.program,
-        machine=cut.machine,
-        cutting=fit.law,
-        coefficients=fit.coefficients,
-        at_chip=fit.at_chip,
-        chip_mm=result.ChipRange(float(fit.chip_mm.min()), float(fit.chip_mm.max()), fit.middle_chip_mm),
-        mean_forces=len(fit.chip_mm),
-        outliers=int(fit.outlier.sum()),
-        rms_n=(float(fit.rms_n[0]), float(fit.rms_n[1])),
-        rms_percent=fit.rms_percent,
-        neighbour_correlation=fit.correlation,
-        passes=tuple(passes),
-        left_out=tuple(left_out),
-        poor=tuple(_poor(fit)),
-        warnings=tuple(warnings),
-        cut=cut,
-        fit=fit,
-        data=data,
-    )
+        cut.program, cut.machine, fit.law, fit.coefficients, fit.at_chip,
+        result.ChipRange(low, high, fit.middle_chip_mm), len(fit.chip_mm), int(fit.outlier.sum()),
+        (float(fit.rms_n[0]), float(fit.rms_n[1])), fit.rms_percent, fit.correlation, passes=tuple(passes),
+        left_out=tuple(left_out), poor=tuple(_poor(fit)), warnings=tuple(warnings), cut=cut, fit=fit, data=data,
+    )  # fmt: skip
 
 
 def _poor(fit: forces.CoefficientFit) -> Iterator[str]:

@@ -72,16 +72,9 @@ def fit_servo(
         warnings.append(f"of {samples} samples those {_MAX_SAMPLES} were taken where an axis changes its speed most")
     fitted, written, unknown = (None, {}, []) if machine is None else _machine_with(machine, found, places)
     warnings += unknown
-    duration = sum(each[-1] - each[0] for each in record.axes[0].time_s)
-    return ServoFit(
-        source=record.source,
-        duration_s=float(duration),
-        axes=tuple(found),
-        machine="" if machine is None else machine.name,
-        written=written,
-        warnings=tuple(warnings),
-        fitted=fitted,
-    )
+    duration = float(sum(each[-1] - each[0] for each in record.axes[0].time_s))
+    name = "" if machine is None else machine.name
+    return ServoFit(record.source, duration, tuple(found), name, written, tuple(warnings), fitted)
 
 
 # --- one axis ---------------------------------------------------------------------------------------------------------
