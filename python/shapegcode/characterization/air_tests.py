@@ -40,9 +40,8 @@ class AirBox:
         values = [float(word) for word in found.groups()]
         for axis, low, high in zip(AXES, values[::2], values[1::2], strict=True):
             if not low <= 0.0 <= high or low == high:
-                raise ArgumentError(
-                    f"--box {text}: {axis} from {low:g} to {high:g} mm does not hold the start point, which is 0"
-                )
+                span = f"{axis} from {low:g} to {high:g} mm"
+                raise ArgumentError(f"--box {text}: {span} does not hold the start point, which is 0")
             if max(-low, high) > _LARGEST_BOX_MM:
                 raise ArgumentError(f"--box {text}: {axis} reaches {max(-low, high):g} mm, the limit is 10000")
         return cls(tuple(values[::2]), tuple(values[1::2]))  # type: ignore[arg-type]
@@ -54,7 +53,6 @@ class AirBox:
         return high if high >= -low else low
 
     def __str__(self) -> str:
-        """As :meth:`parse` reads it."""
         return ",".join(f"{low:g}:{high:g}" for low, high in zip(self.low, self.high, strict=True))
 
 
@@ -134,14 +132,10 @@ def check(test: AirTest, box: AirBox) -> None:
         raise ArgumentError(f"test {test.name} would not end where it began: {at}")
 
 
-#: Feeds to choose from, mm/min: in each, 1 µm is a small and exact part of a period.
-_FEEDS = (3000.0, 1200.0, 600.0, 300.0, 120.0, 60.0)
+_FEEDS = (3000.0, 1200.0, 600.0, 300.0, 120.0, 60.0)  # mm/min: in each, 1 µm is a small and exact part of a period
 _FIRST_NUMBER = 7001  # 8000 and 9000 are often locked
-_STOP_S = 0.032  # a whole multiple of every usual interpolation period
-_LOG_STOP_S = 0.160
-_STOP_DWELL_S = 0.008
-_LOG_DWELL_S = 0.096
-_LOG_PAUSE_S = 0.5
+_STOP_S, _STOP_DWELL_S = 0.032, 0.008  # a whole multiple of every usual interpolation period
+_LOG_STOP_S, _LOG_DWELL_S, _LOG_PAUSE_S = 0.160, 0.096, 0.5
 _STEPS_WAY_S = 0.8  # at full feed: longer than the ramps at both ends
 _LOG_RATIOS = (1.0, 0.5, 0.25, 0.1, 0.05)
 _MORE_RATIOS = (0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.45, 0.4, 0.35)
@@ -152,8 +146,6 @@ _PER_MINUTE = 60.0
 
 
 class _Maker:
-    """Designs the parts of tests for one machine and one box."""
-
     def __init__(self, machine: Machine, box: AirBox) -> None:
         self._box = box
         self._step = machine.controller.least_increment_mm
@@ -165,16 +157,13 @@ class _Maker:
         self.feed = usable[0]
         self.rapid = {name: axis.rapid_mm_per_min for name, axis in zip(AXES, axes, strict=True)}
 
-    def _room(self, axis: str) -> float:
-        return abs(self._box.travel_mm(axis)) + 1e-9
-
     def _signed(self, axis: str, increments: int) -> float:
         """A length towards the farther side of the box."""
-        length = round(increments * self._step, 9)
-        if not 0.0 < length <= self._room(axis):
-            needed, room = max(length, self._step), abs(self._box.travel_mm(axis))
-            raise ArgumentError(f"--box {self._box}: {axis} has {room:g} mm, a test needs {needed:.3f} mm")
-        return math.copysign(length, self._box.travel_mm(axis))
+        length, travel = round(increments * self._step, 9), self._box.travel_mm(axis)
+        if not 0.0 < length <= abs(travel) + 1e-9:
+            needed = max(length, self._step)
+            raise ArgumentError(f"--box {self._box}: {axis} has {abs(travel):g} mm, a test needs {needed:.3f} mm")
+        return math.copysign(length, travel)
 
     def _length(self, axis: str, duration_s: float, feed: float, side: int) -> float:
         """Signed length for a duration; *side* -1 and +1: just below and just above it, whatever the increment."""
@@ -185,9 +174,7 @@ class _Maker:
             increments += side
         return self._signed(axis, max(increments, 1))
 
-    def stops(
-        self, pattern: Pattern, axis: str, count: int, side: int, *, log: bool = False, slower: float = 1.0
-    ) -> Part:
+    def stops(self, pattern: Pattern, axis: str, count: int, side: int, slower: float = 1.0, log: bool = False) -> Part:
         """Moves of nearly the same duration, each ending in a stop."""
         base, dwell = (_LOG_STOP_S, _LOG_DWELL_S) if log else (_STOP_S, _STOP_DWELL_S)
         length = self._length(axis, base, self.feed / slower, side)
@@ -196,12 +183,11 @@ class _Maker:
     def run(self, axis: str, count: int, duration_s: float, side: int = 0) -> Part:
         """Continuous moves, there and back over as much of the box as they fill evenly."""
         length = self._length(axis, duration_s, self.feed, side)
-        stride = min(int(self._room(axis) / abs(length)), count // 2)
+        stride = min(int((abs(self._box.travel_mm(axis)) + 1e-9) / abs(length)), count // 2)
         turns = max(1, round(count / (2 * stride)))
         return Part("continuous", axis, 2 * stride * turns, length, self.feed, stride)
 
     def rapids(self, axis: str, ratio: float, count: int) -> Part:
-        """Rapids over a part of the box."""
         increments = math.floor(ratio * abs(self._box.travel_mm(axis)) / self._step + 1e-9)
         return Part("rapid", axis, count, self._signed(axis, increments), self.rapid[axis])
 
@@ -210,14 +196,14 @@ class _Maker:
         return abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / _PER_MINUTE
 
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:
-        """Pieces of one length, alternately fast and slow, and back."""
-        room = int(self._room(axis) / length_mm)
+        """Pieces of one length, alternately fast and slow, and back; none where they have no room."""
+        room = int((abs(self._box.travel_mm(axis)) + 1e-9) / length_mm)
         wanted = max(8, 2 * math.ceil(_STEPS_WAY_S * self.feed / _PER_MINUTE / (2.0 * length_mm)))
         stride = min(wanted, room - room % 2)
         if stride < 4:
             return []
         length = self._signed(axis, round(length_mm / self._step))
-        return [Part("feed_steps", axis, 2 * stride, length, self.feed, stride), Part("pause", dwell_s=_LOG_PAUSE_S)]
+        return [Part("feed_steps", axis, 2 * stride, length, self.feed, stride)]
 
 
 def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
@@ -225,16 +211,16 @@ def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
     make = _Maker(machine, box)
     tests: list[AirTest] = []
 
-    def add(
-        kind: Kind, name: str, purpose: str, parts: Iterable[Part], override: int = 100, same: bool = False
-    ) -> None:
+    def add(kind: Kind, name: str, purpose: str, parts: Iterable[Part], override: int = 100) -> None:
+        # One program is run at several overrides.
+        same = name.startswith("override") and tests[-1].name.startswith("override")
         number = tests[-1].number if same else _FIRST_NUMBER + len({test.number for test in tests})
         test = AirTest(name, number, kind, purpose, tuple(parts), override)
         check(test, box)
         tests.append(test)
 
-    def stopwatch(name: str, purpose: str, part: Part, override: int = 100, same: bool = False) -> None:
-        add("stopwatch", name, purpose, [part], override, same)
+    def stopwatch(name: str, purpose: str, part: Part, override: int = 100) -> None:
+        add("stopwatch", name, purpose, [part], override)
 
     stopwatch("overhead", "TIME OF START AND END OF A PROGRAM", Part("pause", dwell_s=10.0))
     stopwatch("stop_below", "TIME CONSTANT", make.stops("dwell", "X", 200, -1))
@@ -253,40 +239,27 @@ def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
             stopwatch(name, f"RAPID OF {axis}, {ratio * 100:.0f} PERCENT OF THE BOX", make.rapids(axis, ratio, count))
     override_run = make.run("X", 20, min(1.0, abs(box.travel_mm("X")) / make.feed * _PER_MINUTE))
     for percent in (50, 100, 120):
-        stopwatch(f"override_{percent}", "FEED OVERRIDE", override_run, percent, same=percent != 50)
+        stopwatch(f"override_{percent}", "FEED OVERRIDE", override_run, percent)
 
-    for name, purpose, parts in _log_tests(make):
-        add("log", name, purpose, parts)
+    def log(name: str, purpose: str, parts: Iterable[Part]) -> None:
+        pause = Part("pause", dwell_s=_LOG_PAUSE_S)
+        add("log", name, purpose, [each for part in parts for each in (part, pause)])
+
+    log("log_cutting", "TIME CONSTANT, PERIOD", [make.stops("dwell", "X", 10, side, log=True) for side in (-1, +1)])
+    log("log_exact", "IN-POSITION TIMES", [make.stops("exact", axis, 10, -1, log=True) for axis in AXES])
+    log("log_run", "CEIL OR CARRY", [make.run("X", 160, _STOP_S, +1)])
+    log("log_blocks", "BLOCK TIME", [make.run("X", 1200, 0.0002)])
+    for axis in AXES:
+        ratios, count = (_LOG_RATIOS, 6) if make.rate_is_reached(axis) else ((*_LOG_RATIOS, *_MORE_RATIOS), 4)
+        rapids = [make.rapids(axis, ratio, count) for ratio in ratios]
+        log(f"log_rapid_{axis.lower()}", f"RAPID OF {axis}", rapids)
+    lengths = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
+    if parts := [part for length in lengths for part in make.feed_steps("X", length * make.feed / 3000.0)]:
+        log("log_feed_steps", "FEED-CONTROL INTERVAL", parts)
     return tests
 
 
-def _log_tests(make: _Maker) -> Iterator[tuple[str, str, list[Part]]]:
-    """Name, purpose and parts of the tests for a servo log; a pause stands behind each part."""
-    pause = Part("pause", dwell_s=_LOG_PAUSE_S)
-
-    def paused(parts: Iterable[Part]) -> list[Part]:
-        return [each for part in parts for each in (part, pause)]
-
-    stops = [make.stops("dwell", "X", 10, side, log=True) for side in (-1, +1)]
-    yield "log_cutting", "TIME CONSTANT, PERIOD", paused(stops)
-    yield "log_exact", "IN-POSITION TIMES", paused(make.stops("exact", axis, 10, -1, log=True) for axis in AXES)
-    yield "log_run", "CEIL OR CARRY", paused([make.run("X", 160, _STOP_S, +1)])
-    yield "log_blocks", "BLOCK TIME", paused([make.run("X", 1200, 0.0002)])
-    for axis in AXES:
-        ratios, count = (_LOG_RATIOS, 6) if make.rate_is_reached(axis) else ((*_LOG_RATIOS, *_MORE_RATIOS), 4)
-        rapids = paused(make.rapids(axis, ratio, count) for ratio in ratios)
-        yield f"log_rapid_{axis.lower()}", f"RAPID OF {axis}", rapids
-    lengths = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
-    parts = [part for length in lengths for part in make.feed_steps("X", length * make.feed / 3000.0)]
-    if parts:
-        yield "log_feed_steps", "FEED-CONTROL INTERVAL", parts
-
-
-# --- how long they last -----------------------------------------------------------------------------------------------
-#
-# On a controller that smooths after interpolation. Source: C.-Y. Lee, S.-K. Ro, C. K. Song, J. S. Oh: Cycle Time
-# Estimation of Block Overlap Based CNC, J. Korean Soc. Precis. Eng. 39(7), 2022 (paper 004), equations 2 to 16; the
-# in-position wait follows a rapid and an exact stop.
+# --- how long they last: paper 004 in docs/evidence/references.md, equations 2 to 16 ----------------------------------
 
 NO_PERIOD_S = 1e-6  # so short that nothing is rounded
 _ROUND_OFF = 1e-6  # periods
@@ -325,33 +298,25 @@ def whole_periods(duration_s: float, period_s: float) -> float:
     return math.ceil(duration_s / period_s - _ROUND_OFF) * period_s
 
 
-def _rapid_s(part: Part, timing: ControllerTiming) -> float:
-    ramp = timing.rapid_s[part.axis]
-    nominal = part.duration_s
-    if nominal >= ramp:
-        moving = whole_periods(nominal, timing.period_s) + ramp
-    else:
-        # acceleration = rate / time constant; half of the travel up, half down
-        moving = 2.0 * whole_periods(math.sqrt(nominal * ramp), timing.period_s)
-    return moving + timing.rapid_bell_s[part.axis] + timing.in_position_s[part.axis]
-
-
 def part_time_s(part: Part, timing: ControllerTiming, override: float = 1.0) -> float:
     """Duration of one part in s."""
     if part.pattern == "pause":
         return part.dwell_s
     if part.pattern == "rapid":
-        return part.count * _rapid_s(part, timing)
+        ramp = timing.rapid_s[part.axis]
+        if part.duration_s >= ramp:
+            moving = whole_periods(part.duration_s, timing.period_s) + ramp
+        else:  # acceleration = rate / time constant; half of the travel up, half down
+            moving = 2.0 * whole_periods(math.sqrt(part.duration_s * ramp), timing.period_s)
+        return part.count * (moving + timing.rapid_bell_s[part.axis] + timing.in_position_s[part.axis])
     feeds = (1.0, 0.5) if part.pattern == "feed_steps" else (1.0,)
+    stops = part.pattern in ("dwell", "exact")
     mean = 0.0
     for feed in feeds:
-        nominal = part.duration_s / (feed * override)
-        if part.pattern in ("dwell", "exact"):
-            block = whole_periods(nominal, timing.period_s)
-        else:
-            block = whole_periods(nominal, timing.period_s) if timing.block_end == "ceil" else nominal
-            block = max(block, timing.block_time_s)
-        mean += block / len(feeds)
+        block = part.duration_s / (feed * override)
+        if stops or timing.block_end == "ceil":
+            block = whole_periods(block, timing.period_s)
+        mean += (block if stops else max(block, timing.block_time_s)) / len(feeds)
     if part.pattern == "dwell":
         return part.count * (mean + timing.cutting_s + part.dwell_s)
     if part.pattern == "exact":

@@ -56,8 +56,7 @@ def characterize(
             f"{sheet.file}: nothing was measured: no times_s, no log (a log beside the file is found by the name of "
             "its test, such as log_cutting.csv)"
         )
-    factors = parse_units(units) if units is not None else None
-    logs = {}
+    factors, logs = parse_units(units) if units is not None else None, {}
     for done, (name, path) in enumerate(sheet.logs.items(), start=1):
         logs[name] = read_log(path, factors)
         if on_progress is not None:
@@ -122,13 +121,12 @@ def _fitted(machine: Machine, facts: Sequence[ControllerFact]) -> tuple[Machine,
         if of_axis and _assumed(machine, head) is not None:
             for_all[head].append(fact)
             continue
-        values[fact.key] = (
-            round(fact.value, 7) if isinstance(fact.value, float) else _SHAPES.get(fact.value, fact.value)
-        )
-        if fact.quantity == CUTTING_SUM and isinstance(fact.value, float):
+        value = fact.value
+        values[fact.key] = round(value, 7) if isinstance(value, float) else _SHAPES.get(value, value)
+        if fact.quantity == CUTTING_SUM and isinstance(value, float):
             # The sum of both times leaves the file its bell time where that fits.
-            bell = machine.controller.bell_time_s if machine.controller.bell_time_s < fact.value else 0.0
-            values |= {"controller.bell_time_s": bell, fact.key: round(fact.value - bell, 7)}
+            bell = machine.controller.bell_time_s if machine.controller.bell_time_s < value else 0.0
+            values |= {"controller.bell_time_s": bell, fact.key: round(value - bell, 7)}
         key, text = (head, f"{last} ") if of_axis else (fact.key, "")
         text += f"{fact.low:.6g} ... {fact.high:.6g}" if fact.low is not None else "fitted"
         remarks[key] = f"{remarks[key]}, {text}" if key in remarks else f"measured ({fact.source}): {text}"

@@ -17,9 +17,7 @@ from shapegcode.io.servo_log import ServoLog
 from shapegcode.io.units import FloatArray
 
 _Interval = tuple[float, float]  # a value and its half-width
-_FOLLOWED = 0.9
-_RUN_SETTLE_S = 0.45
-_STEPS_SETTLE_S = 0.3
+_FOLLOWED, _RUN_SETTLE_S, _STEPS_SETTLE_S = 0.9, 0.45, 0.3
 
 
 def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list[ControllerFact]:
@@ -36,7 +34,15 @@ def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list
         stop_pitch = _dwells(facts, stops[0])
     else:
         facts.add_unknown("cutting time constant", "needs log_cutting")
-    _runs(facts, run, parts.get("log_blocks", []))
+    blocks = parts.get("log_blocks", [])
+    settle = (facts.cutting or 0.1) * (4.5 if facts.exponential else 1.1)
+    end = _block_end(facts, run[0], settle) if run else None
+    if not run:
+        facts.add_unknown("block end", "needs log_run", "")
+    if blocks:
+        _block_time(facts, blocks[0], settle, end)
+    else:
+        facts.add_unknown("block time", "needs log_blocks")
     rapids = {
         axis: fit_rapids(facts, axis, parts[f"log_rapid_{axis.lower()}"])
         for axis in AXES
@@ -75,8 +81,7 @@ def _period(
 
 
 def _period_of_stops(stops: list[moves.PartLog]) -> tuple[float, float, str] | None:
-    """The usual interpolation period that explains the difference of two rounded durations; its half-width and a
-    note."""
+    """The usual period that explains the difference of two rounded durations; its half-width and a note."""
     if len(stops) < 2:
         return None
     (below, half_b), (above, half_a) = stops[0].pitch_s(), stops[1].pitch_s()
@@ -116,19 +121,14 @@ def _dwells(facts: LogFacts, part: moves.PartLog) -> float:
 
 
 def _in_position(facts: LogFacts, parts: list[moves.PartLog], stop_pitch: float | None) -> dict[str, _Interval]:
-    """In-position time of each axis from exact stops."""
     out = {}
     for part in parts:
         pitch, half = part.pitch_s()
         if facts.stop_s is not None:
             moving = whole_periods(part.part.duration_s, facts.tick) + facts.stop_s
-            half = half + facts.cutting_half + (0.0 if facts.period else 0.002)
+            out[part.part.axis] = (pitch - moving, half + facts.cutting_half + (0.0 if facts.period else 0.002))
         elif stop_pitch is not None:
-            moving = stop_pitch
-            half *= 2.0
-        else:
-            continue
-        out[part.part.axis] = (pitch - moving, half)
+            out[part.part.axis] = (pitch - stop_pitch, 2.0 * half)
     return out
 
 
@@ -156,34 +156,23 @@ def _waits(facts: LogFacts, stops: dict[str, _Interval], rapids: dict[str, list[
             facts.add(name, max(value, 0.0), half, key, note)
 
 
-def _runs(facts: LogFacts, run: list[moves.PartLog], blocks: list[moves.PartLog]) -> None:
-    """Ceil or carry from the mean time of long blocks; the block time from short ones."""
-    settle = (facts.cutting or 0.1) * (4.5 if facts.exponential else 1.1)
-    end = _block_end(facts, run[0], settle) if run else None
-    if not run:
-        facts.add_unknown("block end", "needs log_run", "")
-    if blocks:
-        _block_time(facts, blocks[0], settle, end)
-    else:
-        facts.add_unknown("block time", "needs log_blocks")
-
-
 def _block_end(facts: LogFacts, run: moves.PartLog, settle: float) -> str | None:
-    part = run.part
-    nominal = part.duration_s
+    """Ceil or carry from the mean time of long blocks."""
+    part, nominal = run.part, run.part.duration_s
     speed, half = moves.line_slope(run, settle) or (abs(part.length_mm) / nominal, math.inf)
     lasts = abs(part.length_mm) / speed
     note = f"blocks of {nominal * 1e3:.2f} ms last {lasts * 1e3:.2f} ms"
     full = whole_periods(nominal, facts.period) - nominal if facts.period else None
     slack = lasts * half / speed + 1e-5
+    end = None
     if lasts - nominal > 3.0 * slack and (full is None or abs(lasts - nominal - full) < 0.3 * full + slack):
         end = "ceil"
     elif full is not None and abs(lasts - nominal) < 0.3 * full and slack < 0.3 * full:
         end = "carry"
-    else:
+    if end is None:
         facts.add_unknown("block end", note + ": neither fits, or the period is not known", "")
-        return None
-    facts.add_word("block end", end, "controller.block_end", note)
+    else:
+        facts.add_word("block end", end, "controller.block_end", note)
     return end
 
 
@@ -303,9 +292,8 @@ def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
             facts.add_unknown(name, f"{why}was a look-ahead mode on?")
         return
     # Of each fit the longest time first.
-    times = [
-        sorted(zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True), reverse=True) for fit in fits[best]
-    ]
+    pairs_of = [zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True) for fit in fits[best]]
+    times = [sorted(pairs, reverse=True) for pairs in pairs_of]
     value, half = mean(*zip(*(pairs[0] for pairs in times), strict=True))
     facts.add(names[0], value, half, "controller.time_constant_s", _SHAPE_NOTES[best])
     facts.add_word("cutting acceleration shape", best, "controller.after_interpolation_shape")
@@ -345,9 +333,9 @@ class _Rapid:
     """Fit of one part of rapids; values with their half-widths, s."""
 
     long: bool  # whether the rate is reached
-    ramp: tuple[float, float]
-    bell: tuple[float, float] | None
-    wait: tuple[float, float]
+    ramp: _Interval
+    bell: _Interval | None
+    wait: _Interval
     nominal: float
     rms_mm: float
 
@@ -363,13 +351,13 @@ def _rapid(part: moves.PartLog, facts: LogFacts) -> _Rapid:
         ends = [0.1 * begin, *low], [20.0 * begin, *high]
         fit = moves.fit_shape(part, lambda t, p: moves.smoothed_share(t, [p[0], p[0], *p[1:]]), [begin, *tail], *ends)
         found.append((fit, False, bell is not None))
-        ends = [1e-4, *low], [1.05 * rectangle, *high]
-        fit = moves.fit_shape(
-            part, lambda t, p: moves.smoothed_share(t, [rectangle, *p]), [0.7 * rectangle, *tail], *ends
-        )
+        ends, start = ([1e-4, *low], [1.05 * rectangle, *high]), [0.7 * rectangle, *tail]
+        fit = moves.fit_shape(part, lambda t, p: moves.smoothed_share(t, [rectangle, *p]), start, *ends)
         found.append((fit, True, bell is not None))
-    plain = min((each for each in found if not each[2]), key=lambda each: each[0].rms_mm)
-    curved = min((each for each in found if each[2]), key=lambda each: each[0].rms_mm)
+    plain, curved = (
+        min((each for each in found if each[2] == with_bell), key=lambda each: each[0].rms_mm)
+        for with_bell in (False, True)
+    )
     better = curved[0].rms_mm ** 2 < _BELL_GAIN * plain[0].rms_mm ** 2
     fit, long, bell_found = curved if better and curved[0].values[1] > facts.fine_s else plain
     values = list(zip(fit.values.tolist(), fit.half.tolist(), strict=True))
@@ -382,7 +370,7 @@ def _rapid(part: moves.PartLog, facts: LogFacts) -> _Rapid:
     return _Rapid(long, ramp, bell_value, (pitch - moving, half + slack), nominal, fit.rms_mm)
 
 
-def fit_rapids(facts: LogFacts, axis: str, parts: list[moves.PartLog]) -> list[tuple[float, float]]:
+def fit_rapids(facts: LogFacts, axis: str, parts: list[moves.PartLog]) -> list[_Interval]:
     """Time constants of an axis' rapids; returns the in-position times that they show, with their half-widths."""
     name, bell_name = f"rapid time constant {axis}", f"rapid bell time {axis}"
     every = [_rapid(part, facts) for part in parts]
@@ -394,18 +382,16 @@ def fit_rapids(facts: LogFacts, axis: str, parts: list[moves.PartLog]) -> list[t
         return []
     key = f"controller.rapid_time_constant_s.{axis.lower()}"
     long = [fit.ramp for fit in fits if fit.long]
+    low, high = (0.0, 0.0) if long else _short_ramp(facts, fits)
     if long:
         value, half = mean(*zip(*long, strict=True))
         facts.add(name, value, half, key, "ramp of rapids that reach the rate")
+    elif low <= high:
+        note = "no rapid reaches the rate: from their acceleration, in whole periods"
+        facts.add_interval(name, (low + high) / 2.0, low, high, key, note)
     else:
-        low, high = _short_ramp(facts, fits)
-        if low <= high:
-            note = "no rapid reaches the rate: from their acceleration, in whole periods"
-            facts.add_interval(name, (low + high) / 2.0, low, high, key, note)
-        else:
-            facts.add_unknown(
-                name, "rapids of different length have different accelerations; is the rate in the machine file right?"
-            )
+        why = "rapids of different length have different accelerations; is the rate in the machine file right?"
+        facts.add_unknown(name, why)
     bells = [fit.bell for fit in fits if fit.bell is not None]
     bell_key = f"controller.rapid_bell_time_s.{axis.lower()}"
     if len(bells) * 2 > len(fits):
@@ -433,12 +419,12 @@ _SERVO_SLACK = 0.02
 
 def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
     """Position gain K and feed-forward f: e = −K ∫e dt + (1 − f) x + c, fitted to following error e and command x."""
-    done = False
-    for index, axis in enumerate(AXES):
-        records = [each for log in logs.values() if (each := _servo_rows(log, index)) is not None]
-        if not records:
+    by_axis = {axis: [_servo_rows(log, index) for log in logs.values()] for index, axis in enumerate(AXES)}
+    if not any(record for records in by_axis.values() for record in records):
+        facts.add_unknown("position gain", "no actual positions in the logs", "1/s")
+    for axis, found in by_axis.items():
+        if not (records := [record for record in found if record is not None]):
             continue
-        done = True
         name = f"position gain {axis}"
         gain, rest = _lag_of(records)
         if rest < 0.02 or not 2.0 * GAINS[0] < gain < 0.5 * GAINS[1]:
@@ -452,8 +438,6 @@ def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
         half = float(spread[1]) + _SERVO_SLACK + apart
         key = f"controller.feed_forward_ratio.{axis.lower()}"
         facts.add(f"feed-forward {axis}", max(0.0, 1.0 - rest), half, key, unit="1")
-    if not done:
-        facts.add_unknown("position gain", "no actual positions in the logs", "1/s")
 
 
 def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, float] | None:

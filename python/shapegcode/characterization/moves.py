@@ -17,9 +17,7 @@ from shapegcode.errors import ArgumentError
 from shapegcode.io.servo_log import ServoLog
 from shapegcode.io.units import FloatArray
 
-_HOLD_SHARE = 0.9
-_BEND_SHARE = 0.85
-_LONGEST_HOLD = 64
+_HOLD_SHARE, _BEND_SHARE, _LONGEST_HOLD = 0.9, 0.85, 64
 
 
 def held_samples(log: ServoLog) -> tuple[int, int]:
@@ -29,14 +27,12 @@ def held_samples(log: ServoLog) -> tuple[int, int]:
     noise = np.maximum(command[: max(3, round(0.1 / log.sampling_s))].std(axis=0), 5e-4)
     increments = np.where(np.abs(increments) > 8.0 * noise, increments, 0.0)
     energy = (increments**2).sum(axis=1)
-    total = float(energy.sum())
-    best = (1, 0)
-    if total > 0.0:
-        for count in range(2, _LONGEST_HOLD + 1):
-            sums = np.array([energy[first::count].sum() for first in range(count)])
-            first = int(sums.argmax())
-            if sums[first] > _HOLD_SHARE * total:
-                best = (count, (first + 1) % count)
+    total, best = float(energy.sum()), (1, 0)
+    for count in range(2, _LONGEST_HOLD + 1) if total > 0.0 else ():
+        sums = np.array([energy[first::count].sum() for first in range(count)])
+        first = int(sums.argmax())
+        if sums[first] > _HOLD_SHARE * total:
+            best = (count, (first + 1) % count)
     return best
 
 
@@ -51,11 +47,8 @@ class _Bends:
 
 
 def _bends(log: ServoLog, count: int) -> _Bends:
-    command = np.nan_to_num(log.command_mm)
-    bend = np.diff(command, 2, axis=0)
-    energy = (bend**2).sum(axis=1)
-    rest = max(3, round(0.1 / log.sampling_s))
-    energy = energy - energy[:rest].mean()
+    energy = (np.diff(np.nan_to_num(log.command_mm), 2, axis=0) ** 2).sum(axis=1)
+    energy = energy - energy[: max(3, round(0.1 / log.sampling_s))].mean()
     sums = np.array([energy[k::count].sum() for k in range(count)])
     pairs = sums + np.roll(sums, -1)
     k = int(pairs.argmax())
@@ -99,9 +92,7 @@ def ticks(log: ServoLog, bend: int) -> tuple[FloatArray, FloatArray]:
 
 
 _PAUSE_S = 0.3  # a rest of a part is shorter, the pause between two parts is 0.5 s
-_SHORTEST_BOX_S = 2e-5
-_STAMP = 0.03
-_MAX_SAMPLES = 1500
+_SHORTEST_BOX_S, _STAMP, _MAX_SAMPLES = 2e-5, 0.03, 1500
 
 
 @dataclass(frozen=True)
@@ -124,10 +115,9 @@ class PartLog:
         middles = []
         for i, j in zip(known[turns], known[turns + 1], strict=True):
             times, shares = self.times_s[i : j + 1], u[i : j + 1]
+            slope, offset = (shares[1] - shares[0]) / (times[1] - times[0]), shares[0]
             if j - i > 1:
                 slope, offset = np.polyfit(times - times[0], shares, 1)
-            else:
-                slope, offset = (shares[1] - shares[0]) / (times[1] - times[0]), shares[0]
             middles.append(times[0] - offset / slope)
         return np.array(middles)
 
@@ -170,13 +160,13 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
         travel = (positions[low:high, axis] - rest.mean()) * math.copysign(1.0, part.length_mm)
         spread = float(noise[used.index(axis)])
         out.append(PartLog(part, times[low:high], travel, spread))
-        expected = abs(part.length_mm) * part.stride
+        moved, expected = travel.max() - travel.min(), abs(part.length_mm) * part.stride
         # A turn without a stop is cut short by the smoothing.
         least = 0.98 if part.pattern in ("dwell", "exact", "rapid") else 0.5
-        if not least * expected < travel.max() - travel.min() < 1.02 * expected + 10.0 * spread:
+        if not least * expected < moved < 1.02 * expected + 10.0 * spread:
             raise ArgumentError(
-                f"{log.file}: {part.axis} moves over {travel.max() - travel.min():.3f} mm in part {len(out)}, test "
-                f"{test.name} has {expected:.3f} mm there: wrong log, units or scale"
+                f"{log.file}: {part.axis} moves over {moved:.3f} mm in part {len(out)}, test {test.name} has "
+                f"{expected:.3f} mm there: wrong log, units or scale"
             )
     return out
 
@@ -184,12 +174,11 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
 def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> FloatArray:
     """Share of the travel at the times after the start, for a rectangle and moving averages of these lengths in s."""
     used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
-    power = len(used)
+    power, out = len(used), np.zeros_like(times)
     if not power:
         return np.asarray(np.where(times > 0.0, 1.0, 0.0))
-    out = np.zeros_like(times)
     for chosen in itertools.product((0, 1), repeat=power):
-        lag = sum(box for box, taken in zip(used, chosen, strict=True) if taken)
+        lag = sum(itertools.compress(used, chosen))
         out += (-1.0) ** sum(chosen) * np.maximum(times - lag, 0.0) ** power
     return np.asarray(out / (math.factorial(power) * math.prod(used)))
 

@@ -101,11 +101,9 @@ def _word(address: str, value: float, decimals: int) -> str:
 def readme_text(tests: Sequence[air_tests.AirTest], machine: Machine, box: air_tests.AirBox) -> str:
     """Instructions for the operator."""
     timing = air_tests.ControllerTiming.of(machine)
-    watch = [test for test in tests if test.kind == "stopwatch"]
-    logs = [test for test in tests if test.kind == "log"]
-    rates = ", ".join(
-        f"{n} {a.rapid_mm_per_min:g}" for n, a in zip(air_tests.AXES, machine.axes.as_tuple(), strict=True)
-    )
+    watch, logs = ([test for test in tests if test.kind == kind] for kind in ("stopwatch", "log"))
+    axes = zip(air_tests.AXES, machine.axes.as_tuple(), strict=True)
+    rates = ", ".join(f"{name} {axis.rapid_mm_per_min:g}" for name, axis in axes)
     feed = max(part.feed_mm_per_min for test in tests for part in test.parts if part.pattern != "rapid")
 
     def row(test: air_tests.AirTest) -> str:
@@ -151,8 +149,6 @@ class _PartTable(InlineTable):
 
 
 class _TestTable(TomlTable):
-    """One test."""
-
     program: Annotated[Text, Field(pattern=_PROGRAM)] = key("name of its file, such as O7001.nc")
     override_percent: Annotated[Count, Field(ge=1, le=254)] = key("feed override", default=100)
     times_s: tuple[_Time, ...] = key("stopwatch times", default=())
@@ -161,8 +157,6 @@ class _TestTable(TomlTable):
 
 
 class _SheetTable(TomlTable):
-    """The file."""
-
     resolution_s: Annotated[Float, Field(ge=1e-6, le=10)] = key("step of the stopwatch", default=0.1)
     reaction_s: Annotated[Float, Field(ge=0, le=10)] = key("scatter of start and stop", default=0.1)
     tests: Annotated[dict[str, _TestTable], Field(min_length=1)] = key(

@@ -158,14 +158,10 @@ class CharacterisationTests(Result):
 
     def tables(self) -> list[Table]:
         """One row for each test."""
-
-        def run_for(test: WrittenTest) -> str:
-            return test.kind if test.override_percent == 100 else f"{test.kind} {test.override_percent} %"
-
         columns = (
             Column("program", text=True),
             Column("test", value="name", text=True),
-            Column("for", value=run_for, text=True),
+            Column("for", value=lambda row: f"{row.kind} {row.override_percent} %".removesuffix(" 100 %"), text=True),
             Column("expected", "s", "expected_s", digits=1),
             Column("purpose", value=lambda test: test.purpose.lower(), text=True),
         )

@@ -12,15 +12,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shapegcode.characterization.air_tests import (
-    AXES,
-    NO_PERIOD_S,
-    AirTest,
-    BlockEnd,
-    ControllerTiming,
-    part_time_s,
-    program_time_s,
-)
+from shapegcode.characterization import air_tests
+from shapegcode.characterization.air_tests import AXES, ControllerTiming, program_time_s
 from shapegcode.characterization.programs import FilledSheet
 from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, Facts
 from shapegcode.io.units import FloatArray
@@ -55,7 +48,7 @@ class WatchFacts(Facts):
 @dataclass(frozen=True)
 class _Fit:
     period: float
-    end: BlockEnd
+    end: air_tests.BlockEnd
     values: FloatArray
     covariance: FloatArray
     chi2: float
@@ -64,10 +57,6 @@ class _Fit:
         """A parameter and its 95 % half-width."""
         k = _NAMES.index(name)
         return float(self.values[k]), 1.96 * math.sqrt(float(self.covariance[k, k]))
-
-    @property
-    def timing(self) -> ControllerTiming:
-        return _timing(self.values, self.period, self.end)
 
 
 def fit_stopwatch(results: FilledSheet) -> WatchFacts:
@@ -79,12 +68,13 @@ def fit_stopwatch(results: FilledSheet) -> WatchFacts:
     if not used:
         facts.add_unknown("all but rapids", "no times of the cutting tests", "")
         return facts
-    fits = [_least_squares(used, period, end) for period in (NO_PERIOD_S, *PERIODS_S) for end in ("ceil", "carry")]
+    periods = (air_tests.NO_PERIOD_S, *PERIODS_S)
+    fits = [_least_squares(used, period, end) for period in periods for end in ("ceil", "carry")]
     best, period = _discrete(fits, facts)
     _cutting(best, exponential > 0.0, facts)
     _block_time(best, rows.get("blocks_tiny"), facts)
     for row in used:
-        expected = program_time_s(row.test, best.timing)
+        expected = program_time_s(row.test, _timing(best.values, best.period, best.end))
         if abs(expected - row.time_s) > _CONTRADICTS * row.sigma_s + 0.001 * row.time_s:
             facts.contradictions.append(
                 f"{results.file}:{results.lines[row.test.name]}: {row.test.name}: {row.time_s:.2f} s; what fits all "
@@ -125,13 +115,13 @@ def _used(rows: dict[str, TimedTest], exponential: float) -> list[TimedTest]:
     return used
 
 
-def _timing(values: FloatArray, period: float, end: BlockEnd) -> ControllerTiming:
+def _timing(values: FloatArray, period: float, end: air_tests.BlockEnd) -> ControllerTiming:
     overhead, cutting, x, y, z, block = values.tolist()
     waits = dict(zip(AXES, (x, y, z), strict=True))
     return ControllerTiming(period, end, block, cutting, in_position_s=waits, overhead_s=overhead)
 
 
-def _least_squares(rows: Sequence[TimedTest], period: float, end: BlockEnd) -> _Fit:
+def _least_squares(rows: Sequence[TimedTest], period: float, end: air_tests.BlockEnd) -> _Fit:
     """All unknowns but the rapids', for one period and rule."""
     from scipy.optimize import least_squares
 
@@ -163,7 +153,7 @@ def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
         part = row.test.parts[0]
         per_move = row.time_s / part.count - part.duration_s
         points.append((math.log(part.feed_mm_per_min), per_move, row.sigma_s / part.count))
-    x, y, sigma = (np.array(column) for column in zip(*points, strict=True))
+    x, y, sigma = np.array(points).T
     weight = 1.0 / (sigma**2 + (0.0005**2))
     centre = (weight @ x) / weight.sum()
     spread = float(weight @ (x - centre) ** 2)
@@ -189,13 +179,12 @@ def _discrete(fits: Sequence[_Fit], facts: WatchFacts) -> tuple[_Fit, float | No
     periods = sorted({fit.period for fit in close})
     ends = {fit.end for fit in close}
     name = "interpolation period"
-    period: float | None = None
-    if len(periods) == 1 and periods[0] > NO_PERIOD_S:
-        period = periods[0]
+    period = periods[0] if len(periods) == 1 and periods[0] > air_tests.NO_PERIOD_S else None
+    if period is not None:
         note = "of the usual periods, the only one that fits"
         facts.add_interval(name, period, period, period, "controller.interpolation_period_s", note)
     else:
-        shown = ", ".join("none" if t <= NO_PERIOD_S else f"{t * 1e3:g} ms" for t in periods)
+        shown = ", ".join("none" if t <= air_tests.NO_PERIOD_S else f"{t * 1e3:g} ms" for t in periods)
         facts.add_unknown(name, f"these fit equally well: {shown}", high=max(periods))
     if len(ends) == 1:
         facts.add_word("block end", best.end, "controller.block_end")
@@ -223,7 +212,7 @@ def _block_time(best: _Fit, tiny: TimedTest | None, facts: WatchFacts) -> None:
         facts.add_unknown("block time", "needs blocks_tiny")
         return
     part = tiny.test.parts[0]
-    floor = part_time_s(replace(part, count=1), ControllerTiming(best.period, best.end, 0.0, 0.0))
+    floor = air_tests.part_time_s(replace(part, count=1), ControllerTiming(best.period, best.end, 0.0, 0.0))
     if value <= 1.02 * floor + half or half > _WIDE * value:
         lasts = max(value, floor) * 1e3
         why = f"blocks of {part.duration_s * 1e3:.2f} ms last {lasts:.2f} ms: it hides behind the period"
@@ -253,7 +242,7 @@ _WAIT_UNKNOWN_S = 0.1
 class TimedTest:
     """A test that was timed."""
 
-    test: AirTest  # what it does
+    test: air_tests.AirTest  # what it does
     time_s: float  # mean of the readings
     sigma_s: float  # its standard deviation
 
@@ -276,10 +265,10 @@ def _fit_rapids(facts: WatchFacts, axis: str, timed: list[TimedTest], period: fl
     # After a rapid comes at least the in-position wait, if that is known.
     least = max(0.0, wait[0] - wait[1]) if wait[1] < _WAIT_UNKNOWN_S else 0.0
     chi2, after = np.empty(len(_RAMPS_S)), np.empty(len(_RAMPS_S))
-    zero = {axis: 0.0}
+    singles, zero = [replace(part, count=1) for part in parts], {axis: 0.0}
     for k, ramp in enumerate(_RAMPS_S):
-        timing = ControllerTiming(period or NO_PERIOD_S, "ceil", 0.0, 0.0, {axis: float(ramp)}, zero, zero)
-        moving = np.array([part_time_s(replace(part, count=1), timing) for part in parts])
+        timing = ControllerTiming(period or air_tests.NO_PERIOD_S, "ceil", 0.0, 0.0, {axis: float(ramp)}, zero, zero)
+        moving = np.array([air_tests.part_time_s(part, timing) for part in singles])
         after[k] = max(least, float(weight @ (seen - moving)) / float(weight.sum()))
         chi2[k] = float((((seen - moving - after[k]) / sigma) ** 2).sum())
     floor = float(chi2.min())

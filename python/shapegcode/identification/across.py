@@ -5,16 +5,15 @@ With the poles known the rest is linear; the ratio of the amplitudes along two a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy import stats
 
 from shapegcode.errors import RecordError
-from shapegcode.identification.checks import Prepared, is_clipped, prepare
+from shapegcode.identification.checks import Prepared, Usable, is_clipped, prepare
 from shapegcode.identification.decay import part_of
 from shapegcode.identification.frf_model import mode_columns
 from shapegcode.identification.frf_search import cut
@@ -38,11 +37,15 @@ _OUT_OF_PHASE = 1.0  # tan of the phase beyond which two directions do not move 
 
 @dataclass(frozen=True, eq=False)
 class _Poles:
-    """The modes that are known."""
-
     omega: FloatArray  # (m,) rad/s
     zeta: FloatArray  # (m,)
     applied: float  # 1/s, by which a window makes responses decay faster
+
+    @classmethod
+    def of(cls, modes: Sequence[IdentifiedMode], window_s: float | None = None) -> _Poles:
+        omega = 2.0 * np.pi * np.array([mode.frequency_hz.value for mode in modes])
+        zeta = np.array([mode.damping_ratio.value for mode in modes])
+        return cls(omega, zeta, 0.0 if window_s is None else 1.0 / window_s)
 
     @property
     def in_plane(self) -> ComplexArray:
@@ -60,24 +63,15 @@ class _Amplitudes:
 
     def turned(self, is_turned: bool) -> _Amplitudes:
         """With the sign that the sensor gave: those of the other axes have it."""
-        return _Amplitudes(-self.value, self.variance) if is_turned else self
-
-
-def measured_across(
-    sources: Sequence[Any], across: bool | str | Path | Measured | Sequence[str | Path | Measured], options: ReadOptions
-) -> list[Measured]:
-    """What the files (those of the taps themselves, or others) hold, of all axes."""
-    single = isinstance(across, str | Path | Record | FrequencyResponse)
-    given: Sequence[Any] = sources if isinstance(across, bool) else [across] if single else across  # type: ignore[assignment]
-    return measured(given, replace(options, axis=None, response_columns=()))
+        return replace(self, value=-self.value) if is_turned else self
 
 
 def measured(sources: Sequence[Any], options: ReadOptions) -> list[Measured]:
     """Records and frequency responses, those of files read."""
-    read = (
-        [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options) for each in sources
-    )
-    return [one for several in read for one in several]
+    found: list[Measured] = []
+    for each in sources:
+        found += [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options)
+    return found
 
 
 def with_moves(found: Identification, others: Sequence[Measured], window_s: float | None = None) -> Identification:
@@ -95,17 +89,14 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
     if not found.modes:
         return found
     refused = [mode for mode in found.refused if 0.0 < mode.damping_ratio.value < _NO_VIBRATION]
-    omega = 2.0 * np.pi * np.array([mode.frequency_hz.value for mode in (*found.modes, *refused)])
-    zeta = np.array([mode.damping_ratio.value for mode in (*found.modes, *refused)])
-    applied = 0.0 if window_s is None else 1.0 / window_s
-    own, along = _amplitudes(found, by_axis, _Poles(omega, zeta, applied))
+    own, along = _amplitudes(found, by_axis, _Poles.of((*found.modes, *refused), window_s))
     notes, modes = list(found.notes), []
     for index, mode in enumerate(found.modes):
         moves: dict[str, Estimate | None] = dict.fromkeys(_AXES) | {found.axis: Estimate(1.0, 1.0, 1.0)}
         for letter, parts in along.items():
-            ratio, moves[letter] = _ratio(own, parts, index)
+            ratio, moves[letter] = in_phase = _ratio(own, parts, index)
             out_of_phase = abs(ratio.imag) > max(_OUT_OF_PHASE * abs(ratio.real), LEAST_MOVE)
-            if out_of_phase and _is_told(moves[letter], abs(ratio)):
+            if out_of_phase and _is_told(in_phase[1], abs(ratio)):
                 notes.append(
                     f"{mode.frequency_hz.value:.4g} Hz: {letter.upper()} moves {abs(ratio):.3g} times as far, "
                     f"{abs(np.degrees(np.angle(ratio))):.0f}° behind or ahead: only the part in phase is taken"
@@ -116,10 +107,8 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
 
 def left_by(modes: Sequence[IdentifiedMode], record: Record) -> float:
     """Share of a free decay's energy that known modes leave, whatever their amplitudes."""
-    omega = 2.0 * np.pi * np.array([mode.frequency_hz.value for mode in modes])
-    poles = _Poles(omega, np.array([mode.damping_ratio.value for mode in modes]), 0.0)
     values = record.response - np.mean(record.response)
-    left = _decays(poles, record.period_s, values)[2]
+    left = _decays(_Poles.of(modes), record.period_s, values)[2]
     return float(left @ left) / max(float(values @ values), 1e-300)
 
 
@@ -131,8 +120,8 @@ def told_moves(mode: IdentifiedMode) -> dict[str, Estimate]:
     return {letter: each for letter, each in named if each is not None and _is_told(each, abs(each.value))}
 
 
-def _is_told(estimate: Estimate | None, size: float) -> bool:
-    return estimate is not None and size > 0.5 * (estimate.high - estimate.low)
+def _is_told(estimate: Estimate, size: float) -> bool:
+    return size > 0.5 * (estimate.high - estimate.low)
 
 
 def _amplitudes(
@@ -149,17 +138,15 @@ def _amplitudes(
             )
     if ready is None:
         own = [_in_lines(each, poles).turned(found.turned) for each in found.responses]
-        along = {
-            letter: [_in_lines(each, poles) for each in parts if isinstance(each, FrequencyResponse)]
-            for letter, parts in by_axis.items()
-        }
     else:
-        parts_of_own = zip(_free_parts(ready, ready.records), ready.usable, strict=True)
-        own = [_in_time(part, poles).turned(use.turned) for part, use in parts_of_own]
-        along = {}
-        for letter, parts in by_axis.items():
-            records = [each for each in parts if isinstance(each, Record)]
-            along[letter] = [_in_time(part, poles) for part in _parts_of(ready, records, found.files)]
+        own = [_in_time(use, use.record, poles).turned(use.turned) for use in ready.usable]
+    along: dict[str, list[_Amplitudes]] = {}
+    for letter, parts in by_axis.items():
+        if ready is None:
+            along[letter] = [_in_lines(each, poles) for each in parts if isinstance(each, FrequencyResponse)]
+        else:
+            beside = _records_beside(ready, [each for each in parts if isinstance(each, Record)], found.files)
+            along[letter] = [_in_time(use, record, poles) for use, record in beside]
     for letter, amplitudes in along.items():
         if by_axis[letter] and not amplitudes:
             raise RecordError(
@@ -169,18 +156,12 @@ def _amplitudes(
     return own, {letter: parts for letter, parts in along.items() if parts}
 
 
-@dataclass(frozen=True, eq=False)
-class _FreePart:
-    """A record after its impact or stop, and the divisor of its amplitudes: the hammer's force at each pole."""
-
-    values: FloatArray  # (n,)
-    period_s: float
-    force: FloatArray | None  # (k,) N, up to the first sample of the part
-
-
-def _parts_of(ready: Prepared, records: Sequence[Record], files: Sequence[str]) -> Iterator[_FreePart]:
+def _records_beside(
+    ready: Prepared, records: Sequence[Record], files: Sequence[str]
+) -> Sequence[tuple[Usable, Record]]:
+    """Each impact or stop with the record of another axis."""
     if not records:
-        return
+        return []
     together = all(any(_same_file(use, each, files) for use in ready.records) for each in records)
     if not together and ready.records[0].force_n is None:
         raise RecordError(
@@ -194,7 +175,7 @@ def _parts_of(ready: Prepared, records: Sequence[Record], files: Sequence[str]) 
             "are comparable over their forces only; needed is the hammer's signal in both"
         )
     hits = ready if together else prepare(records)
-    yield from _free_parts(hits, [_beside(use, records, files) for use in hits.records])
+    return [(use, _beside(use.record, records, files)) for use in hits.usable]
 
 
 def _beside(use: Record, records: Sequence[Record], files: Sequence[str]) -> Record:
@@ -233,26 +214,19 @@ def _same_file(use: Record, other: Record, files: Sequence[str]) -> bool:
     return any(all(f"{each.source} ".startswith(f"{name} ") for each in (use, other)) for name in files)
 
 
-def _free_parts(ready: Prepared, records: Sequence[Record]) -> Iterator[_FreePart]:
-    for use, record in zip(ready.usable, records, strict=True):
-        first = 0
-        if use.hit is not None:
-            first = min(use.hit.end + (use.hit.end - use.hit.first) + _LOCAL_LINES, len(record.response) - 1)
-        force = None if use.record.force_n is None else use.record.force_n[:first]
-        yield _FreePart(record.response[first:], record.period_s, force)
-
-
-def _in_time(part: _FreePart, poles: _Poles) -> _Amplitudes:
-    """Amplitudes at the first sample; over the hammer's force at the poles, where there was one."""
-    value, variance, left = _decays(poles, part.period_s, part.values)
-    spectrum = np.abs(np.fft.rfft(left)) ** 2
-    hertz = np.fft.rfftfreq(len(left), part.period_s)
-    local = _local(np.asarray(2.0 * np.pi * hertz, dtype=np.float64), np.asarray(spectrum, dtype=np.float64), poles)
-    variance = np.asarray(variance * local, dtype=np.float64)
-    if part.force is None:
+def _in_time(use: Usable, record: Record, poles: _Poles) -> _Amplitudes:
+    """Amplitudes at the first sample after the impact or stop; over the hammer's force at the poles, if any."""
+    first, period_s = 0, record.period_s
+    if use.hit is not None:
+        first = min(use.hit.end + (use.hit.end - use.hit.first) + _LOCAL_LINES, len(record.response) - 1)
+    value, variance, left = _decays(poles, period_s, record.response[first:])
+    omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(left), period_s), dtype=np.float64)
+    variance = np.asarray(variance * _local(omega, np.abs(np.fft.rfft(left)) ** 2, poles))
+    if use.record.force_n is None:
         return _Amplitudes(value, variance)
-    ago_s = part.period_s * (len(part.force) - np.arange(len(part.force)))
-    gain = np.exp(ago_s[:, None] * poles.in_plane).T @ part.force * part.period_s
+    force = use.record.force_n[:first]
+    ago_s = period_s * (len(force) - np.arange(len(force)))
+    gain = np.exp(ago_s[:, None] * poles.in_plane).T @ force * period_s
     return _Amplitudes(value / gain, variance / np.abs(gain) ** 2)
 
 
@@ -316,14 +290,13 @@ def _local(at: FloatArray, power: FloatArray, poles: _Poles) -> FloatArray:
 
 def _ratio(own: Sequence[_Amplitudes], other: Sequence[_Amplitudes], index: int) -> tuple[complex, Estimate]:
     """A mode's amplitude along another axis over that along its own, and its real part with the 95 % interval."""
-    if len(own) == len(other):  # hit by hit: what changes from hit to hit changes along both
-        one, one_variance, two, two_variance = (*_of_mode(own, index), *_of_mode(other, index))
-    else:
-        sides = (_of_mode(parts, index) for parts in (own, other))
-        means = [
-            (value.mean(keepdims=True), variance.sum(keepdims=True) / len(value) ** 2) for value, variance in sides
-        ]
-        (one, one_variance), (two, two_variance) = means
+    sides = [
+        (np.array([part.value[index] for part in parts]), np.array([part.variance[index] for part in parts]))
+        for parts in (own, other)
+    ]
+    if len(own) != len(other):  # else hit by hit: what changes from hit to hit changes along both
+        sides = [(value.mean(keepdims=True), spread.sum(keepdims=True) / len(value) ** 2) for value, spread in sides]
+    (one, one_variance), (two, two_variance) = sides
     weight = np.abs(one) ** 2
     ratio = complex(np.sum(np.conj(one) * two) / np.sum(weight))
     variance = float(np.sum(weight * (two_variance + abs(ratio) ** 2 * one_variance)) / np.sum(weight) ** 2)
@@ -332,7 +305,3 @@ def _ratio(own: Sequence[_Amplitudes], other: Sequence[_Amplitudes], index: int)
         scatter = np.sum((weight / np.sum(weight) * np.abs(two / one - ratio)) ** 2) * len(one) / (len(one) - 1)
         half = max(half, float(stats.t.ppf(0.975, len(one) - 1) * np.sqrt(0.5 * scatter)))
     return ratio, Estimate(ratio.real, ratio.real - half, ratio.real + half)
-
-
-def _of_mode(parts: Sequence[_Amplitudes], index: int) -> tuple[ComplexArray, FloatArray]:
-    return np.array([part.value[index] for part in parts]), np.array([part.variance[index] for part in parts])

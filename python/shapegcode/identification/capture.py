@@ -15,9 +15,9 @@ import numpy as np
 from shapegcode.errors import RecordError
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
-from shapegcode.identification.parts import Spectra, moving_parts, transforms
 from shapegcode.identification.result import Identification, as_sweep
 from shapegcode.identification.servo.record import ServoTrace, read_servo_record
+from shapegcode.identification.spectra import Spectra, moving_parts, transforms
 from shapegcode.io.data_file import open_file
 from shapegcode.io.edge_json import is_edge_json
 from shapegcode.io.frequency_response import FEWEST_LINES, FrequencyResponse
@@ -55,19 +55,14 @@ def find_modes_of_captures(paths: Sequence[Path], options: ReadOptions, sought: 
 def _axis_of(source: str, traces: Sequence[ServoTrace], axis: str | None) -> ServoTrace:
     """The trace of an axis: X, X1, 1 (X1)."""
     linear = [each for each in traces if each.unit == "mm"]
-    named = [each for each in linear if axis is not None and axis in _letters(each.name)]
-    if len(named) == 1 or (axis is not None and len(linear) == 1 and not _letters(linear[0].name)):
+    named = [each for each in linear if axis is not None and axis in each.name.lower()]
+    if len(named) == 1 or (axis is not None and len(linear) == 1 and not set("xyz") & set(linear[0].name.lower())):
         return (named or linear)[0]
     names = ", ".join(f"{each.name}{'' if each in linear else ' (turns)'}" for each in traces)
     wanted = "say --axis x, y or z"
     if axis is not None:
         wanted = f"{'several are' if named else 'no linear one is'} called {axis.upper()}"
     raise RecordError(f"{source}: holds command and actual position of {names}: {wanted}")
-
-
-def _letters(name: str) -> set[str]:
-    """Axes that a name may mean."""
-    return {letter for letter in "xyz" if letter in name.lower()}
 
 
 def _response(
@@ -99,9 +94,8 @@ def _response(
             f"{source}: the actual position of {trace.name} does not go with its command between {low:g} and "
             f"{high:.0f} Hz: too little motion, or positions too coarse; a sweep moves enough (shapegcode sweep)"
         )
-    return FrequencyResponse(
-        source, hertz[used], -1.0 / spectra.ratio()[used], "acceleration", coherence[used], axis, scaled=False
-    )
+    ratio = -1.0 / spectra.ratio()[used]
+    return FrequencyResponse(source, hertz[used], ratio, "acceleration", coherence[used], axis, scaled=False)
 
 
 def _windows(trace: ServoTrace, period_s: float) -> list[tuple[FloatArray, FloatArray]]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
+from scipy.ndimage import label
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.decay import find_decay, part_of
@@ -69,23 +70,18 @@ class Prepared:
         return replace(self, usable=usable, refused=(*self.refused, *refused))
 
 
-#: A second pulse above this share of the first is refused: the momentum, and so the mass, would be off by as much.
-#: Below, it may be the ringing of an anti-aliasing filter, which reaches 9 %.
-DOUBLE_HIT = 0.1
+# A second pulse above this share of the first is refused: the momentum, and so the mass, would be off by as much.
+DOUBLE_HIT = 0.1  # Below, it may be the ringing of an anti-aliasing filter, which reaches 9 %
 MIN_FORCE = 10.0  # The force must stand out of its noise by this factor: the mass would be off by about the inverse
 MIN_PULSE = 3  # A pulse of fewer samples does not tell its momentum: with three, a half sine is known to about 10 %
 MIN_LEAD = 8  # Samples before the hit from which noise and offset are measured: a standard deviation to 25 %
-#: A record that begins inside the pulse at more than this share of its peak has lost too much of the momentum.
-_CUT_PULSE = 0.2
+_CUT_PULSE = 0.2  # A record that begins inside the pulse at more than this share of its peak lacks too much momentum
 _AT_REST = 0.1  # The machine was at rest before the hit if it shook less than this share of what it did afterwards
-#: The force counts for half a pulse on either side of it, and for so many samples at least: the feet of the pulse hold
-#: some tenths of a percent of its momentum.
-_MIN_MARGIN = 3
+_MIN_MARGIN = 3  # The force counts for half a pulse on either side of it, and for so many samples at least
 _OFFSET_ERRORS = 2.0  # An offset is taken away where it exceeds so many standard errors of its mean
 _OFFSET_TOLD = 0.05  # An offset of the force above this share of the peak is told
 _OPPOSED = -0.7  # Correlation of force and response below which the two point against one another
-#: Sampling periods may differ by this share: a file of six digits is off by less than a sample in a whole record.
-_SAME_PERIOD = 1e-5
+_SAME_PERIOD = 1e-5  # Sampling periods may differ by this share, as in files of six digits
 
 
 def _mean_to_remove(values: FloatArray) -> float:
@@ -95,29 +91,19 @@ def _mean_to_remove(values: FloatArray) -> float:
     return mean if abs(mean) > _OFFSET_ERRORS * error else 0.0
 
 
-def _orient(record: Record, hit: Hit, response: FloatArray, force: FloatArray, warnings: list[str]) -> FloatArray:
-    """The response with the sign that the push of the hammer gives it at the point of the tap."""
+def _is_opposed(record: Record, hit: Hit, response: FloatArray, force: FloatArray) -> bool:
+    """Whether the response goes against the push of the hammer."""
     if hit.end - hit.first < MIN_PULSE:
-        return response
+        return False
     stretch = slice(hit.first, min(hit.end + (hit.end - hit.first), len(force)))
-    push = force[stretch]
-    if record.quantity != "acceleration":
+    push, moved = force[stretch], response[stretch]
+    for _ in range(("acceleration", "velocity", "displacement").index(record.quantity)):
         push = np.cumsum(push)
-    if record.quantity == "displacement":
-        push = np.cumsum(push)
-    moved = response[stretch]
     norm = float(np.linalg.norm(push) * np.linalg.norm(moved))
-    if norm > 0.0 and float(push @ moved) / norm < _OPPOSED:
-        warnings.append(
-            f"{record.source}: the response goes against the push of the hammer: its sign is turned, as for a sensor "
-            "at the same point that points the other way"
-        )
-        return -response
-    return response
+    return norm > 0.0 and float(push @ moved) / norm < _OPPOSED
 
 
 def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> Usable:
-    """Check a record with force."""
     force = record.force_n
     assert force is not None
     if not np.ptp(force) > 0.0:
@@ -199,9 +185,8 @@ def _windowed(
             f"{where}: the pulse has {width} samples above a tenth of its peak: below {MIN_PULSE} its momentum, and "
             "so the mass, is uncertain; sample faster or take a softer tip"
         )
-    strongest = refuse_short(
-        record, response[hit.first if hit.end - hit.first > MIN_PULSE else hit.end :], noise or 0.0, band_hz, warnings
-    )
+    begin = hit.first if hit.end - hit.first > MIN_PULSE else hit.end
+    strongest = refuse_short(record, response[begin:], noise or 0.0, band_hz, warnings)
     reached = excited_hz(force, record.period_s)
     wanted = band_hz or strongest
     if reached < wanted:
@@ -210,13 +195,17 @@ def _windowed(
             f"{'the' if band_hz else 'the strongest vibration at'} {wanted:.4g} Hz"
             f"{' asked for' if band_hz else ''}: take a harder tip"
         )
-    oriented = _orient(record, hit, response, force, warnings)
-    turned = oriented is not response
-    return Usable(replace(record, response=oriented, force_n=force), sigma, noise, reached, hit, turned)
+    turned = _is_opposed(record, hit, response, force)
+    if turned:
+        response = -response
+        warnings.append(
+            f"{where}: the response goes against the push of the hammer: its sign is turned, as for a sensor at the "
+            "same point that points the other way"
+        )
+    return Usable(replace(record, response=response, force_n=force), sigma, noise, reached, hit, turned)
 
 
 def _decay(record: Record, band_hz: float | None, start_s: float | None, warnings: list[str]) -> Usable:
-    """Check a record without force."""
     free = find_decay(record, start_s)
     if is_clipped(free.response):
         raise RecordError(
@@ -242,11 +231,9 @@ def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s:
     usable: list[Usable] = []
     refused: list[RecordUse] = []
     for record in (part for each in records for part in split_hits(each)):
+        is_decay = record.force_n is None
         try:
-            if record.force_n is not None:
-                usable.append(_tap(record, band_hz, warnings))
-            else:
-                usable.append(_decay(record, band_hz, start_s, warnings))
+            usable.append(_decay(record, band_hz, start_s, warnings) if is_decay else _tap(record, band_hz, warnings))
         except RecordError as error:
             refused.append(RecordUse(record.source, False, str(error).removeprefix(f"{record.source}: ")))
     if not usable:
@@ -255,7 +242,6 @@ def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s:
 
 
 def _refuse_mixture(records: Sequence[Record]) -> None:
-    """Refuse records that do not belong together."""
     first = records[0]
     for other in records[1:]:
         pairs = [
@@ -277,24 +263,17 @@ def _refuse_mixture(records: Sequence[Record]) -> None:
 
 
 _CLIPPED_RUN = 3  # So many equal extreme samples on end may be an overload; two can lie on either side of a smooth peak
-#: Values closer than this share of the range are equal: converters with filters do not clip to one value.
-_CLIPPED_STEP = 1e-4
-#: At a smooth peak the curve has fallen by four resolutions where it is twice as far from the top as the run's ends.
-_SMOOTH_FALL = 6.0
-#: A lobe is flat if more than this share of what lies above half of it lies above 95 %, in so many samples at least.
-_NEARLY_TOP = 0.95
-_FLAT_SHARE = 0.5
-_FLAT_RUN = 5
+_CLIPPED_STEP = 1e-4  # Values closer than this share of the range are equal: filters do not clip to one value
+_SMOOTH_FALL = 6.0  # A smooth peak has fallen by four resolutions twice as far from the top as the run's ends
+# A lobe is flat if more than half of what lies above half of it lies above 95 %, in so many samples at least.
+_NEARLY_TOP, _FLAT_SHARE, _FLAT_RUN = 0.95, 0.5, 5
 EXCITED = 0.1  # Where the force's spectrum has fallen to this share (-20 dB), noise counts tenfold
-#: A half sine falls to that share at this many over its duration: cos(pi x) / (1 - 4 x²) = 0.1 in size.
-EXCITED_HALF_SINE = 1.3033
-#: Periods that tell a damping ratio though the response has not decayed; fewer do not tell decay from beat.
-MIN_PERIODS = 8.0
+EXCITED_HALF_SINE = 1.3033  # A half sine falls to it at this many over its duration: cos(pi x) / (1 - 4 x²) = 0.1
+MIN_PERIODS = 8.0  # Periods that tell damping though the response has not decayed; fewer do not tell decay from beat
 _STRONG_PEAK = 0.3  # ... of the lowest vibration whose peak in the spectrum has this share of the largest
 DECAYED = 0.1  # Decayed: the last tenth of the record is below this share of the beginning
 _MIN_SAMPLES = 32  # Samples after the hit below which no model has data enough
-#: The strongest frequency must lie below this share of half the sampling rate: above, filters cut and modes fold.
-FOLDING = 0.8
+FOLDING = 0.8  # share of half the sampling rate for the strongest frequency: above, filters cut and modes fold
 
 
 def is_clipped(values: FloatArray) -> bool:
@@ -326,19 +305,10 @@ def is_clipped(values: FloatArray) -> bool:
 
 def _is_flat_topped(signal: FloatArray) -> bool:
     """Whether the highest lobe is cut off though noise hides it: .5 of its upper half above 95 %, .3 of a smooth one"""
-    top = float(np.max(signal))
-    crest = int(np.argmax(signal))
-    high, half = (_run_around(signal > share * top, crest) for share in (_NEARLY_TOP, 0.5))
-    return high >= _FLAT_RUN and high > _FLAT_SHARE * half
-
-
-def _run_around(inside: npt.NDArray[np.bool_], at: int) -> int:
-    """Length of the sequence of True around an index."""
-    outside = np.flatnonzero(~inside)
-    place = int(np.searchsorted(outside, at))
-    before = int(outside[place - 1]) if place > 0 else -1
-    after = int(outside[place]) if place < len(outside) else len(inside)
-    return after - before - 1
+    top, crest = float(np.max(signal)), int(np.argmax(signal))
+    lobes = (label(signal > share * top)[0] for share in (_NEARLY_TOP, 0.5))
+    high, half = (np.count_nonzero(lobe == lobe[crest]) for lobe in lobes)
+    return bool(high >= _FLAT_RUN and high > _FLAT_SHARE * half)
 
 
 def excited_hz(force_n: FloatArray, period_s: float) -> float:
@@ -393,30 +363,26 @@ def refuse_short(
     first, last = (float(np.sqrt(max(each, 0.0))) for each in power)
     lowest = min(peak.frequency_hz for peak in peaks if peak.amplitude > _STRONG_PEAK * peaks[0].amplitude)
     periods = lowest * duration
-    if last > DECAYED * first:
-        if periods < MIN_PERIODS:
-            raise RecordError(
-                f"{duration:.4g} s hold {periods:.1f} periods of {lowest:.4g} Hz, and the response is still "
-                f"at {100 * last / first:.0f} %: too short; needed are {MIN_PERIODS / lowest:.4g} s "
-                f"({MIN_PERIODS:g} periods) or more"
-            )
-        if record.force_n is not None:
-            warnings.append(
-                f"{record.source}: the response is still at {100 * last / first:.0f} % at the end of the record: its "
-                " FRF is smeared, the fit in time is not"
-            )
+    if last > DECAYED * first and periods < MIN_PERIODS:
+        raise RecordError(
+            f"{duration:.4g} s hold {periods:.1f} periods of {lowest:.4g} Hz, and the response is still "
+            f"at {100 * last / first:.0f} %: too short; needed are {MIN_PERIODS / lowest:.4g} s "
+            f"({MIN_PERIODS:g} periods) or more"
+        )
+    if last > DECAYED * first and record.force_n is not None:
+        warnings.append(
+            f"{record.source}: the response is still at {100 * last / first:.0f} % at the end of the record: its "
+            " FRF is smeared, the fit in time is not"
+        )
     return frequency
 
 
-#: A pulse ends where it falls below this share of its peak; a half sine has then lost 0.01 % of its momentum.
-_PULSE_ENDS = 0.01
+_PULSE_ENDS = 0.01  # A pulse ends below this share of its peak; a half sine has then lost 0.01 % of its momentum
 _NOISE_ENDS = 3.0  # ... or into the noise, so many standard deviations
 _SMALLEST_PULSE = 0.03  # Pulses are looked for above this share of the largest force
 _SMALLEST_HIT = 0.1  # A pulse is a hit above this share of the largest force; below, somebody has touched the hammer
 _PULSE_NOISE = 7.0  # ... and above so many standard deviations of noise, which a million samples of noise do not reach
-#: A pulse that comes again within so many samples belongs to the one before: anti-aliasing filters ring for a few
-#: samples, in force and response alike.
-_RINGING_SAMPLES = 8
+_RINGING_SAMPLES = 8  # A pulse within so many samples belongs to the one before: anti-aliasing filters ring
 _BOUNCE_S = 0.1  # Nobody hits twice on purpose within this time: a hammer that comes down again sooner has bounced
 _RESTED = 0.1  # Between two hits on purpose the response has fallen to this share of its peak
 _LEAD_SHARE = 0.1  # A record cut out of a recording begins before its hit by this share of the time between the hits
@@ -448,8 +414,7 @@ def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
     found = []
     for part in parts:
         first, last = int(part[0]), int(part[-1])
-        before = np.searchsorted(low, first)
-        after = np.searchsorted(low, last)
+        before, after = np.searchsorted(low, (first, last))
         start = int(low[before - 1]) if before else 0
         end = int(low[after]) + 1 if after < low.size else len(force)
         top = first + int(np.argmax(force[first : last + 1]))
@@ -496,9 +461,6 @@ def split_hits(record: Record) -> list[Record]:
     hits = find_hits(record)
     if len(hits) < 2:
         return [record]
-    gaps = np.diff([hit.first for hit in hits])
-    lead = int(_LEAD_SHARE * float(np.min(gaps)))
-    starts = [max(0, hit.first - lead) for hit in hits]
-    ends = [*starts[1:], len(record.response)]
-    ranges = enumerate(zip(starts, ends, strict=True), start=1)
-    return [part_of(record, start, end, f" hit {number}") for number, (start, end) in ranges]
+    lead = int(_LEAD_SHARE * float(np.min(np.diff([hit.first for hit in hits]))))
+    edges = [*(max(0, hit.first - lead) for hit in hits), len(record.response)]
+    return [part_of(record, *ends, f" hit {number}") for number, ends in enumerate(pairwise(edges), start=1)]

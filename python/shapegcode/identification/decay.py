@@ -15,25 +15,19 @@ from shapegcode.identification.spectra import decay_spectrum
 from shapegcode.io.record import Record
 from shapegcode.io.units import FloatArray
 
-#: The envelope is the RMS over so many periods of the slowest mode, and over a beat of the two closest modes.
-_ENVELOPE_PERIODS = 2.0
+_ENVELOPE_PERIODS = 2.0  # of the slowest mode, over which the envelope is the RMS; or a beat of the two closest modes
 _ENVELOPE_SHARE = 0.05  # While the modes are not known, it is the RMS over this share of the record, at least
-_EVENT_RISES = 1.3  # Something happens where the envelope rises by this factor
-_EVENT_SHARE = 0.3  # ... to this share of its maximum; weaker rises are beats of modes
+_EVENT_RISES, _EVENT_SHARE = 1.3, 0.3  # Something happens where the envelope rises so, to this share of its maximum
 _TAIL = 0.3  # The tail of a decay, in which no command is left, begins after this share of it
 _MIN_TAIL = 16  # Samples below which a tail tells no frequency
-#: Modes above this share of the tail's largest peak are vibration, whatever is slower is the axis's own motion.
-_MODE_SHARE = 0.2
-#: A window of one period that holds this share of the largest RMS begins half a period early at most: so the decay
-#: begins this share of a period later.
+_MODE_SHARE = 0.2  # Modes above this share of the tail's largest peak are vibration, what is slower is motion
+# A window of one period that holds this share of the largest RMS begins half a period early at most: so the decay
+# begins this share of a period later.
 _ONSET = 0.7
 _SLOWER = 0.8  # What is slower than this share of the slowest mode is motion of the axis
-#: The axis moves where its mean over a period of the lowest mode is above this share of the envelope.
-_MOTION_SHARE = 0.4
-#: The search for the strongest frequency leaves out what has fewer than so many periods in the record.
-_FEWEST_PERIODS = 3.0
-#: A stop within a run is followed by so many periods of the lowest frequency; the envelope falls to this share.
-_STOP_PERIODS, _STOP_FALLS = 3.0, 0.3
+_MOTION_SHARE = 0.4  # The axis moves where its mean over a period of the lowest mode is above this of the envelope
+_FEWEST_PERIODS = 3.0  # in the record, of the strongest frequency
+_STOP_PERIODS, _STOP_FALLS = 3.0, 0.3  # of the lowest frequency behind a stop; to which the envelope falls
 _LOWEST_HZ = 10.0  # of modes in an ordinary run; what is slower is motion
 _MOST_STOPS = 20
 
@@ -54,8 +48,8 @@ def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
 def _forward_rms(values: FloatArray, window: int) -> FloatArray:
     """RMS over each sample and those after it."""
     power = np.concatenate(([0.0], np.cumsum(values**2)))
-    ends = np.minimum(np.arange(len(values)) + window, len(values))
     begins = np.arange(len(values))
+    ends = np.minimum(begins + window, len(values))
     mean = np.maximum(power[ends] - power[begins], 0.0) / np.maximum(ends - begins, window // 2)
     return np.asarray(np.sqrt(mean), dtype=np.float64)
 
@@ -104,8 +98,7 @@ class _Scales:
 
 
 def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_samples: float) -> _Scales:
-    """Estimates of the modes of a decay: the slowest from its tail, after the command has ended, the strongest from all
-    of it."""
+    """The modes of a decay: the slowest from its tail, after the command has ended, the strongest from all of it."""
     rate = 1.0 / record.period_s
     tail = quiet[start + int(_TAIL * (end - start)) : end]
     peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= _MIN_TAIL else ()
@@ -119,8 +112,7 @@ def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_sample
 
 
 def _onset(quiet: FloatArray, scales: _Scales, start: int, end: int) -> int:
-    """Sample at which the vibration has certainly started: a period of the strongest one from there holds half of its
-    power."""
+    """Sample from which a period of the strongest vibration holds half of its power: it has certainly started."""
     last = min(end, start + max(2, round(scales.window)))
     one = max(2, round(scales.strongest))
     short = _forward_rms(quiet[start : min(end, last + one)], one)
@@ -137,11 +129,12 @@ def _rest_after_motion(quiet: FloatArray, period_samples: float, level: float, s
     return start + int(rest[0]) if rest.size else start
 
 
-def _refuse_still(record: Record) -> None:
+def _without_median(record: Record) -> FloatArray:
     if not np.ptp(record.response) > 0.0:
         raise RecordError(
             f"{record.source}: every sample is {record.response[0]:zg}: no vibration; is the sensor connected?"
         )
+    return np.asarray(record.response - np.median(record.response), dtype=np.float64)
 
 
 def part_of(record: Record, begin: int, end: int, name: str = "") -> Record:
@@ -153,8 +146,7 @@ def part_of(record: Record, begin: int, end: int, name: str = "") -> Record:
 
 def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
     """One record for each stop of a run behind which the machine rests, those with least motion first, 20 at most."""
-    _refuse_still(record)
-    quiet = np.asarray(record.response - np.median(record.response), dtype=np.float64)
+    quiet = _without_median(record)
     period = 1.0 / ((lowest_hz or _LOWEST_HZ) * record.period_s)
     envelope = _envelope(quiet, period, _ENVELOPE_PERIODS * period)
     parts = []
@@ -170,20 +162,8 @@ def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
         return float(np.sum(slow[inside] ** 2) / np.sum(quiet[inside] ** 2))
 
     parts = sorted(sorted(parts, key=lambda part: -envelope[part[0]])[:_MOST_STOPS], key=moved)
-    times = (record.start_s + begin * record.period_s for begin, _ in parts)
-    return [part_of(record, *part, f" stop at {at_s:.2f} s") for part, at_s in zip(parts, times, strict=True)]
-
-
-def _overview(record: Record) -> tuple[FloatArray, float, float]:
-    """A record without its median; in samples the period of its strongest frequency, and of a first envelope."""
-    response = record.response
-    _refuse_still(record)
-    frequency = _fast_frequency_hz(response, record.period_s)
-    if frequency == 0.0:
-        raise RecordError(f"{record.source}: {len(response)} samples and no vibration with three periods or more")
-    quiet = np.asarray(response - np.median(response), dtype=np.float64)
-    period = 1.0 / (frequency * record.period_s)
-    return quiet, period, max(_ENVELOPE_PERIODS * period, _ENVELOPE_SHARE * len(quiet))
+    names = [f" stop at {record.start_s + begin * record.period_s:.2f} s" for begin, _ in parts]
+    return [part_of(record, *part, name) for part, name in zip(parts, names, strict=True)]
 
 
 def find_decay(record: Record, start_s: float | None = None) -> Record:
@@ -194,18 +174,24 @@ def find_decay(record: Record, start_s: float | None = None) -> Record:
         raise RecordError(
             f"{record.source}: start at {start_s:g} s: must be within the record, {record.start_s:g} to {last_s:g} s"
         )
-    quiet, period, window = _overview(record)
-    if start_s is not None:
-        start = int(np.ceil((start_s - record.start_s) / record.period_s - 1e-9))
-        end = _end_of(_envelope(quiet, period, window), start, window)
-        scales = _scales(record, quiet, start, end, period)
-        end = _end_of(_envelope(quiet, scales.slowest, scales.window), start, scales.window)
-    else:
-        start, end = _longest(_envelope(quiet, period, window))
-        scales = _scales(record, quiet, start, end, period)
-        # Envelope and motion are told apart by the slowest mode, which is known only now.
-        envelope = _envelope(quiet, scales.slowest, scales.window)
+    quiet = _without_median(record)
+    frequency = _fast_frequency_hz(response, record.period_s)
+    if frequency == 0.0:
+        raise RecordError(f"{record.source}: {len(response)} samples and no vibration with three periods or more")
+    period = 1.0 / (frequency * record.period_s)
+    window = max(_ENVELOPE_PERIODS * period, _ENVELOPE_SHARE * len(quiet))
+    envelope = _envelope(quiet, period, window)
+    if start_s is None:
         start, end = _longest(envelope)
-        start = _onset(quiet, scales, start, end)
-        start = _rest_after_motion(quiet, scales.slowest, float(np.max(envelope[start:end])), start, end)
+    else:
+        start = int(np.ceil((start_s - record.start_s) / record.period_s - 1e-9))
+        end = _end_of(envelope, start, window)
+    scales = _scales(record, quiet, start, end, period)
+    # Envelope and motion are told apart by the slowest mode, which is known only now.
+    envelope = _envelope(quiet, scales.slowest, scales.window)
+    if start_s is not None:
+        return part_of(record, start, _end_of(envelope, start, scales.window))
+    start, end = _longest(envelope)
+    start = _onset(quiet, scales, start, end)
+    start = _rest_after_motion(quiet, scales.slowest, float(np.max(envelope[start:end])), start, end)
     return part_of(record, start, end)

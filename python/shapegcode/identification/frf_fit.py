@@ -12,46 +12,20 @@ from scipy import stats
 from scipy.signal import find_peaks
 
 from shapegcode.errors import RecordError
+from shapegcode.identification import frf_search, model_search
 from shapegcode.identification.checks import EXCITED, Prepared
 from shapegcode.identification.frf_model import Lines, ModalFit
-from shapegcode.identification.frf_search import (
-    STABLE,
-    Pole,
-    StablePole,
-    Uncertainty,
-    Window,
-    candidates_of,
-    cut,
-    evidence_of,
-    fitted,
-    modes_of,
-    residues_of,
-    search,
-    starts_of,
-    uncertainty_of,
-)
+from shapegcode.identification.frf_search import Pole, StablePole, Uncertainty, Window, cut, fitted, starts_of
 from shapegcode.identification.lines import (
     Hits,
+    correlation_of,
     hits_of,
     measured_lines,
-    neighbours_correlation,
     smoothed,
     steady_sines,
     weighted,
 )
-from shapegcode.identification.model_search import (
-    LASTING,
-    LOGARITHMS,
-    OPPOSED,
-    SCATTER_PROBABILITY,
-    TURNED,
-    Sought,
-    chart_of,
-    interval_refusal,
-    lasting_refusal,
-    lasting_share,
-    mode_estimates,
-)
+from shapegcode.identification.model_search import OPPOSED, Sought, chart_of, interval_refusal, mode_estimates
 from shapegcode.identification.problem import MIN_SWINGS, Starts
 from shapegcode.identification.result import ChartPole, Identification, IdentifiedMode, by_support
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
@@ -83,8 +57,6 @@ POOR = 0.3  # share of the response in the band that a model which is used may l
 
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """What is fitted and what is known of it."""
-
     parts: tuple[Lines, ...]
     low: float  # rad/s
     high: float
@@ -114,24 +86,20 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
     merged = _merged(used) if one_point else used
     notes = list(dict.fromkeys(note for each in responses for note in each.notes))
     if len(used) > 1:
-        said = "agree and are averaged: one point" if one_point else (
-            f"are of several points: the modes are those of all, masses those at {used[0].source}"
-        )  # fmt: skip
-        notes.append(f"{len(used)} frequency responses {said}")
+        said = f"are of several points: the modes are those of all, masses those at {used[0].source}"
+        notes.append(f"{len(used)} frequency responses {'agree and are averaged: one point' if one_point else said}")
     if sought.exponential_window_s is None and sought.phase_known:
         notes.append(
             "a frequency response no longer tells overload, double hits or windows: an exponential window adds its "
             "damping, unless --exponential-window states it"
         )
-    measured = _of_responses(merged, sought.exponential_window_s)
-    found = _in_responses(measured, sought)
-    turned: list[str] = []
-    if _all_opposed(found):
-        turned.append(f"{responses[0].source}: {TURNED}")
-        merged = [replace(each, response=-each.response) for each in merged]
-        used = [replace(each, response=-each.response) for each in used]
-        measured = _of_responses(merged, sought.exponential_window_s)
-        found = _in_responses(measured, sought)
+    found = _in_responses(merged, sought)
+    # Whether the significant modes move against the force, counting all that are supported.
+    with_it, against = (sum(_height(m) for m in found.modes if m.refusal == each) for each in ("", OPPOSED))
+    turned = [f"{responses[0].source}: {model_search.TURNED}"] if against > with_it else []
+    if turned:
+        merged, used = ([replace(each, response=-each.response) for each in part] for part in (merged, used))
+        found = _in_responses(merged, sought)
     modes = found.modes
     if not responses[0].scaled:
         modes = tuple(replace(m, mass_kg=None, damping_n_s_per_m=None, stiffness_n_per_m=None) for m in modes)
@@ -140,7 +108,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
     return Identification(
         files=files,
         **by_support(modes),
-        order=len(modes_of(found.windows)),
+        order=len(frf_search.modes_of(found.windows)),
         fit_percent=found.fit_percent if found.modes else 0.0,
         noise_rms=float(np.sqrt(np.mean(np.abs(left) ** 2))),
         doubt=doubt_of(found),
@@ -151,13 +119,6 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
         chart=found.chart,
         fitted_lines=tuple(lines),
     )
-
-
-def _all_opposed(found: FrfModes) -> bool:
-    """Whether the significant modes move against the force, counting all that are supported."""
-    with_it = [_height(mode) for mode in found.modes if not mode.refusal]
-    against = [_height(mode) for mode in found.modes if mode.refusal == OPPOSED]
-    return sum(against) > sum(with_it)
 
 
 def _height(mode: IdentifiedMode) -> float:
@@ -187,7 +148,7 @@ def _chosen(
                 f"{highest:g} Hz"
             )
         used = [_within(each, (1.0 - _BESIDE) * band_hz[0], (1.0 + _BESIDE) * band_hz[1]) for each in used]
-    first_hz, last_hz = (np.array([each.frequency_hz[end] for each in used]) for end in (0, -1))
+    first_hz, last_hz = np.array([each.frequency_hz[[0, -1]] for each in used]).T
     common, whole = last_hz.min() - first_hz.max(), last_hz.max() - first_hz.min()
     if common < _COMMON * whole:
         raise RecordError(
@@ -195,12 +156,11 @@ def _chosen(
             "identify responses of different bands apart"
         )
     used = [_within(each, first_hz.max(), last_hz.min()) for each in used]
-    alike = all(np.array_equal(each.frequency_hz, used[0].frequency_hz) for each in used[1:])
-    mean = np.mean([each.response for each in used], axis=0) if alike else None
-    one_point = len(used) > 1 and mean is not None and all(
-        float(np.linalg.norm(each.response - mean)) < _SAME_POINT * float(np.linalg.norm(mean)) for each in used
-    )  # fmt: skip
-    return used, one_point
+    if len(used) < 2 or not all(np.array_equal(each.frequency_hz, used[0].frequency_hz) for each in used[1:]):
+        return used, False
+    mean = np.mean([each.response for each in used], axis=0)
+    most = _SAME_POINT * float(np.linalg.norm(mean))
+    return used, all(float(np.linalg.norm(each.response - mean)) < most for each in used)
 
 
 def _within(each: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyResponse:
@@ -215,19 +175,12 @@ def _of_lines(each: FrequencyResponse, inside: npt.NDArray[np.bool_]) -> Frequen
 
 
 def _merged(used: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
-    """One response, the mean of several of one point, with what they differ by as coherence."""
+    """The mean of several responses of one point, with what they differ by as coherence."""
     stacked = np.array([each.response for each in used])
     mean = np.mean(stacked, axis=0)
     scatter = np.sum(np.abs(stacked - mean) ** 2, axis=0) / (len(used) - 1) / len(used)
     power = np.abs(mean) ** 2
     return [replace(used[0], response=mean, coherence=np.clip(power / (power + scatter + 1e-300), 0.0, 1.0))]
-
-
-def _of_responses(responses: Sequence[FrequencyResponse], applied_s: float | None) -> _Measured:
-    parts = tuple(measured_lines(each, applied_s) for each in responses)
-    low = min(float(lines.omega[0]) for lines in parts)
-    high = max(float(lines.omega[-1]) for lines in parts)
-    return _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
 
 
 def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -> tuple[_Measured, Hits]:
@@ -251,8 +204,8 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
     at_first = [steady_sines(each.record.response, period) for each in ready.usable]
     quiet = [each.record.response - sines for each, (sines, _) in zip(ready.usable, at_first, strict=True)]
     measured, hits = _of_hits(ready, quiet, sought)
-    pool, poles = candidates_of(measured.parts)
-    windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
+    pool, poles = frf_search.candidates_of(measured.parts)
+    windows = frf_search.search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
     # What oscillates throughout is looked for once more in what a first model leaves.
     left = hits.in_time(_left(measured, hits, _model(measured.parts, windows)[0]))
     steady = [steady_sines(rest, period) for rest in left]
@@ -260,7 +213,8 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
         for response, start, (sines, _) in zip(quiet, hits.starts, steady, strict=True):
             response[start : start + hits.count] -= sines
         measured, hits = _of_hits(ready, quiet, sought)
-    windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, modes_of(windows))
+    first = frf_search.modes_of(windows)
+    windows = frf_search.search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, first)
     found = _tested(measured, windows, pool, poles, sought)
     found = replace(found, steady=any(hertz for _, hertz in (*at_first, *steady)))
     rest = _left(measured, hits, found.model[0])
@@ -281,15 +235,18 @@ def _left(measured: _Measured, hits: Hits, model: ComplexArray) -> ComplexArray:
     return np.where(_inside(measured.parts[0], measured), hits.response - model * hits.force, 0.0)
 
 
-def _in_responses(measured: _Measured, sought: Sought) -> FrfModes:
+def _in_responses(responses: Sequence[FrequencyResponse], sought: Sought) -> FrfModes:
     """Search twice, with the lines weighed by what is left in between, and test every mode."""
-    pool, poles = candidates_of(measured.parts)
-    windows = search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
+    parts = tuple(measured_lines(each, sought.exponential_window_s) for each in responses)
+    low, high = min(float(each.omega[0]) for each in parts), max(float(each.omega[-1]) for each in parts)
+    measured = _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
+    pool, poles = frf_search.candidates_of(measured.parts)
+    windows = frf_search.search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
     models = _model(measured.parts, windows)
     parts = tuple(_weighed(lines, model) for lines, model in zip(measured.parts, models, strict=True))
-    windows = search(parts, measured.low, measured.high, _IN_WINDOW, pool, modes_of(windows))
+    windows = frf_search.search(parts, measured.low, measured.high, _IN_WINDOW, pool, frf_search.modes_of(windows))
     for rank, window in enumerate(windows):
-        correlation = neighbours_correlation(window.fit.left)
+        correlation = correlation_of(window.fit.left)
         correlated = tuple(replace(lines, correlation=correlation) for lines in window.parts)
         windows[rank] = replace(window, parts=correlated)
     return _tested(replace(measured, parts=parts), windows, pool, poles, sought)
@@ -301,12 +258,17 @@ def _tested(
     """Every mode of the windows with its refusal, if any, and what the model explains."""
     modes = [mode for window in windows for mode in _modes(window, measured, pool, sought)]
     low_hz, high_hz = sought.band_hz or (0.0, np.inf)
-    modes = [each for each in modes if low_hz <= each.frequency_hz.value <= high_hz]
-    modes = _strongest(modes, sought)
+    modes = _strongest([each for each in modes if low_hz <= each.frequency_hz.value <= high_hz], sought)
     model = _model(measured.parts, windows)
+    parts = measured.parts
+    left = [lines.weight * (lines.response - each) for lines, each in zip(parts, model, strict=True)]
+    unexplained = _share_left(parts, left, [_inside(lines, measured) for lines in parts])
+    by_order: dict[int, Starts] = {}
+    for pole in poles:
+        by_order.setdefault(pole.order, []).append((pole.omega, pole.zeta))
     return FrfModes(
-        tuple(sorted(modes, key=lambda mode: mode.frequency_hz.value)), tuple(windows), _chart(poles), tuple(model),
-        _explained(measured, model), _missing_peak(measured, modes),
+        tuple(sorted(modes, key=lambda mode: mode.frequency_hz.value)), tuple(windows),
+        chart_of(sorted(by_order.items())), tuple(model), 100.0 * (1.0 - unexplained), _missing_peak(measured, modes),
     )  # fmt: skip
 
 
@@ -357,14 +319,12 @@ def _inside(lines: Lines, measured: _Measured) -> npt.NDArray[np.bool_]:
     return (lines.omega >= measured.low) & (lines.omega < measured.high)
 
 
-def _explained(measured: _Measured, model: Sequence[ComplexArray]) -> float:
-    """Percent of the lines between the ends that the model explains."""
-    left = total = 0.0
-    for lines, fitted_lines in zip(measured.parts, model, strict=True):
-        inside = _inside(lines, measured)
-        left += float(np.sum(np.abs((lines.weight * (lines.response - fitted_lines))[inside]) ** 2))
-        total += float(np.sum(np.abs((lines.weight * lines.response)[inside]) ** 2))
-    return 100.0 * (1.0 - float(np.sqrt(left / max(total, 1e-300))))
+def _share_left(parts: Sequence[Lines], left: Sequence[ComplexArray], inside: Sequence[npt.NDArray[np.bool_]]) -> float:
+    """Root of the power of weighted residuals over that of the response, in some lines of each."""
+    rest = sum(float(np.sum(np.abs(each[near]) ** 2)) for each, near in zip(left, inside, strict=True))
+    pairs = zip(parts, inside, strict=True)
+    total = sum(float(np.sum(np.abs((lines.weight * lines.response)[near]) ** 2)) for lines, near in pairs)
+    return float(np.sqrt(rest / max(total, 1e-300)))
 
 
 def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float | None:
@@ -382,11 +342,10 @@ def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float
     if not len(tops):
         return None
     top = float(lines.omega[inside][tops[int(np.argmax(level[tops]))]]) / (2.0 * np.pi)
-    for mode in modes:
-        width = mode.frequency_hz.value * (2.0 * mode.damping_ratio.value + 0.01)
-        if mode.refusal in ("", _BEYOND) and abs(mode.frequency_hz.value - top) < width:
-            return None
-    return top
+    supported = [mode for mode in modes if mode.refusal in ("", _BEYOND)]
+    widths = [mode.frequency_hz.value * (2.0 * mode.damping_ratio.value + 0.01) for mode in supported]
+    there = any(abs(each.frequency_hz.value - top) < width for each, width in zip(supported, widths, strict=True))
+    return None if there else top
 
 
 def doubt_of(found: FrfModes) -> str:
@@ -400,19 +359,11 @@ def doubt_of(found: FrfModes) -> str:
     return ""
 
 
-def _chart(poles: Sequence[Pole]) -> tuple[ChartPole, ...]:
-    """Poles of all bands by the order of their model."""
-    by_order: dict[int, Starts] = {}
-    for pole in poles:
-        by_order.setdefault(pole.order, []).append((pole.omega, pole.zeta))
-    return chart_of(sorted(by_order.items()))
-
-
 # --- The modes of a window --------------------------------------------------------------------------------------------
 def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], sought: Sought) -> list[IdentifiedMode]:
     if not window.inside():
         return []
-    fit, known = window.fit, uncertainty_of(window)
+    fit, known = window.fit, frf_search.uncertainty_of(window)
     others = _other_fits(window)
     found = []
     for index in window.inside():
@@ -438,9 +389,9 @@ def _other_fits(window: Window) -> list[ModalFit]:
     found = []
     for parts in (narrow, other):
         columns = (2 + 1 + parts[0].complex_modes) * len(starts) + 6
-        if min(2 * len(lines.s) * lines.independent for lines in parts) > _ENOUGH * columns:
-            found.append(fitted(parts, starts))
-    return [each for each in found if each is not None]
+        enough = min(2 * len(lines.s) * lines.independent for lines in parts) > _ENOUGH * columns
+        found += [fit] if enough and (fit := fitted(parts, starts)) is not None else []
+    return found
 
 
 def _logarithms(
@@ -448,16 +399,16 @@ def _logarithms(
 ) -> tuple[FloatArray, FloatArray]:
     """ln of frequency (Hz), damping ratio, mass, viscous damping, stiffness, and half of their 95 % intervals."""
     fit = window.fit
-    residue = abs(residues_of(fit)[0, index])
+    residue = abs(frf_search.residues_of(fit)[0, index])
     omega, zeta = starts_of(fit)[index]
     base = np.array([np.log(omega), np.log(zeta), np.log(max(residue, 1e-300))])
     scale = np.array([1.0, 1.0, 1.0 / max(residue, 1e-300)])
     covariance = _misfit(fit, window.parts, index) * known.each[0, index] * np.outer(scale, scale)
-    change = LOGARITHMS
+    change = model_search.LOGARITHMS
     values = change @ base + np.array([-np.log(2.0 * np.pi), 0.0, 0.0, np.log(2.0), 0.0])
     half = float(stats.t.ppf(0.975, known.freedom)) * np.sqrt(np.maximum(np.diag(change @ covariance @ change.T), 0.0))
     for other in others:
-        size = abs(residues_of(other)[0, index])
+        size = abs(frf_search.residues_of(other)[0, index])
         moved = np.array([np.log(other.omega[index]), np.log(other.zeta[index]), np.log(max(size, 1e-300))]) - base
         half = np.hypot(half, np.abs(change @ moved))
     if measured.hits is not None:
@@ -480,7 +431,12 @@ def _misfit(fit: ModalFit, parts: Sequence[Lines], index: int) -> float:
 
 
 def _scatter(
-    window: Window, known: Uncertainty, index: int, measured: _Measured, change: FloatArray, scale: FloatArray
+    window: Window,
+    known: Uncertainty,
+    index: int,
+    measured: _Measured,
+    change: FloatArray,
+    scale: FloatArray,
 ) -> FloatArray:
     """Half widths of the intervals from the scatter of a mode between single impacts; 0 if noise explains it."""
     hits, fit, lines = measured.hits, window.fit, window.parts[0]
@@ -501,7 +457,7 @@ def _scatter(
     moved = (change * scale) @ (rows @ stacked.T)
     spread = np.sqrt(count / (count - 1.0) * np.sum((moved - moved.mean(axis=1, keepdims=True)) ** 2, axis=1))
     expected = np.sqrt(np.maximum(np.diag(change @ (known.each[0, index] * np.outer(scale, scale)) @ change.T), 1e-300))
-    limit = np.sqrt(stats.chi2.ppf(1.0 - SCATTER_PROBABILITY, count - 1) / (count - 1))
+    limit = np.sqrt(stats.chi2.ppf(1.0 - model_search.SCATTER_PROBABILITY, count - 1) / (count - 1))
     return np.asarray(np.where(spread > limit * expected, stats.t.ppf(0.975, count - 1) * spread, 0.0))
 
 
@@ -513,7 +469,7 @@ def _refusal(
     hertz, width = omega / (2.0 * np.pi), 2.0 * zeta * omega
     return (
         _record_refusal(hertz, zeta, measured)
-        or (_response_refusal(residues_of(window.fit)[:, index]) if sought.phase_known else "")
+        or (_response_refusal(frf_search.residues_of(window.fit)[:, index]) if sought.phase_known else "")
         or _evidence_refusal(window, index, hertz, pool)
         or _local_refusal(window, omega, width)
         or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent or _ACCEPTED_PERCENT)
@@ -529,9 +485,9 @@ def _record_refusal(hertz: float, zeta: float, measured: _Measured) -> str:
             f"its half-power width of {width:.3g} Hz is less than the {measured.resolution_hz:.3g} Hz between two "
             "lines: window and length of the record make such a peak; needed is a finer resolution, or the time record"
         )
-    lasting = lasting_share(hertz, zeta, measured.record_s)
-    if lasting > LASTING:
-        return lasting_refusal(lasting, measured.record_s)
+    refusal, lasting = model_search.lasting_refusal(hertz, zeta, measured.record_s)
+    if refusal:
+        return refusal
     mains = min((k * base for base in _MAINS_HZ for k in range(1, _HARMONICS)), key=lambda each: abs(each - hertz))
     if lasting > _HUM and abs(mains - hertz) < min(_HUM_WIDTH * measured.resolution_hz, _MAINS_WIDTH_HZ):
         return f"beside {mains:g} Hz, a harmonic of the mains, and still at {100.0 * lasting:.0f} %: it may be hum"
@@ -574,8 +530,9 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
     # Where another mode lies within its width, that one must not take its part.
     effort = (0, 1.0) if np.count_nonzero(~apart) == 1 else (10, 1e-4)
     without = fitted(window.parts, starts, effort)
-    gain = np.inf if without is None else evidence_of(without, share) - evidence_of(fit, share)
-    stable = any(abs(each.omega - omega) < max(each.zeta, zeta) * omega and each.share >= STABLE for each in pool)
+    gain = np.inf if without is None else frf_search.evidence_of(without, share) - frf_search.evidence_of(fit, share)
+    known = [each for each in pool if each.share >= frf_search.STABLE]
+    stable = any(abs(each.omega - omega) < max(each.zeta, zeta) * omega for each in known)
     lines, left = window.parts[0], fit.left[0]
     modelled_lines = (lines.response - left / lines.weight) * lines.s ** (1 - lines.power)
     near = np.flatnonzero(lines.near(omega, _PEAK * 2.0 * zeta * omega, steps=1.0))
@@ -591,12 +548,8 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
 
 
 def _local_refusal(window: Window, omega: float, width: float) -> str:
-    left = total = 0.0
-    for lines, rest in zip(window.parts, window.fit.left, strict=True):
-        near = lines.near(omega, _LOCAL_WIDTHS * width)
-        left += float(np.sum(np.abs(rest[near]) ** 2))
-        total += float(np.sum(np.abs((lines.weight * lines.response)[near]) ** 2))
-    percent = 100.0 * float(np.sqrt(left / max(total, 1e-300)))
+    near = [lines.near(omega, _LOCAL_WIDTHS * width) for lines in window.parts]
+    percent = 100.0 * _share_left(window.parts, window.fit.left, near)
     if percent <= _LOCAL:
         return ""
     return f"the model leaves {percent:.0f} % of the response around it unexplained (limit {_LOCAL:g} %)"

@@ -41,7 +41,8 @@ class Lines:
     @cached_property
     def goal(self) -> FloatArray:
         """(2n,) weighted response."""
-        return stacked(np.asarray(self.weight * self.response, dtype=np.complex128))
+        values = self.weight * self.response
+        return np.concatenate((values.real, values.imag))
 
     @cached_property
     def weighted_background(self) -> FloatArray:
@@ -98,11 +99,6 @@ def mode_columns(lines: Lines, omega: FloatArray, zeta: FloatArray) -> tuple[Com
     column = (s * s if lines.power == 2 else s**lines.power) / below
     shared = -column / below
     return column, shared * (damping + 2.0 * omega**2), shared * damping
-
-
-def stacked(values: ComplexArray) -> FloatArray:
-    """Real parts, then imaginary parts."""
-    return np.concatenate((values.real, values.imag))
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,10 +192,3 @@ def fit_modes(
         omega, zeta, np.array(residues, dtype=np.complex128), tuple(part[first:] for part in at.linear), tuple(left),
         tuple(at.jacobian), complex_modes,
     )  # fmt: skip
-
-
-def modelled(lines: Lines, omega: FloatArray, zeta: FloatArray, residues: ComplexArray) -> ComplexArray:
-    """Response of modes alone at the lines; the imaginary part of a residue goes with s/omega."""
-    column = mode_columns(lines, omega, zeta)[0]
-    turn = lines.s[:, None] / omega
-    return np.asarray(np.sum(column * (residues.real + residues.imag * turn), axis=1), dtype=np.complex128)

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg
 
 from shapegcode.errors import ArgumentError
-from shapegcode.identification.frf_model import Lines, ModalFit, fit_modes, mode_columns, modelled
+from shapegcode.identification.frf_model import Lines, ModalFit, fit_modes, mode_columns
 from shapegcode.identification.problem import Starts
 from shapegcode.io.frequency_response import ComplexArray
 from shapegcode.io.units import FloatArray
@@ -22,8 +22,8 @@ _CORE = 1.35  # upper end of a window over its lower end
 _MARGIN = 1.3  # the lines of a window reach so far beyond its ends
 _BESIDE = 0.02, 3.0  # modes that count beyond the lines: share of the frequency, and damping ratios
 STABLE = 0.34  # share of the higher orders that have a pole which is fitted from the start
-_CLEARLY = 40.0  # times ln of the samples: by so much less a fit without a mode explains, before the others move
 _SEEN = 0.12  # ... which is tried
+_CLEARLY = 40.0  # times ln of the samples: by so much less a fit without a mode explains, before the others move
 _QUICK, _FULL = (8, 1e-3), (40, 1e-8)  # iterations, and the gain below which they end
 _TRIED, _WEAKEST = 3, 2
 _MORE_REAL = 2  # real modes may be half as many again as complex ones, and so many more: more cost more than they tell
@@ -34,8 +34,7 @@ _BAND_LINES = 48  # a band or window has at least so many
 _MAX_CHANGES, _ROUNDS = 60, 4  # with few lines, and behind those with all
 _FEWEST = 12  # lines below which a window is left out
 _DEGREE = 2  # of the background of a window
-CLEAR = 6.0  # by so much beyond Bayes' criterion a mode must better the fit
-_OPPOSED = 8.0  # ... and one that moves against the push of the hammer by so much more
+_CLEAR, _OPPOSED = 6.0, 8.0  # by so much beyond Bayes' criterion a mode must better the fit; one against the push more
 _TWINS = 0.02  # modes nearer than this share of their width are one
 _START_DAMPING = (0.005, 0.02, 0.06)
 _NO_VIBRATION = 0.5
@@ -62,10 +61,9 @@ def candidates_of(parts: Sequence[Lines]) -> tuple[list[StablePole], list[Pole]]
         last = end if end == high else end / _EDGE
         kept = [pole for pole in poles if first <= pole.omega <= last]
         everything += kept
-        if kept:
-            highest = max(pole.order for pole in poles)
-            orders = {pole.order for pole in poles if pole.order > highest // 3}
-            found += _clusters([pole for pole in kept if pole.order in orders], len(orders))
+        highest = max((pole.order for pole in poles), default=0)
+        orders = {pole.order for pole in poles if pole.order > highest // 3}
+        found += _clusters([pole for pole in kept if pole.order in orders], len(orders))
         begin *= _STEP
     candidates: list[StablePole] = []
     for each in sorted(found, key=lambda each: -each.share):
@@ -112,11 +110,10 @@ def search(
     parts: Sequence[Lines], low: float, high: float, most: int, candidates: Sequence[StablePole], starts: Starts | None
 ) -> list[Window]:
     """Fit windows, each without what the modes outside of it do in it; from poles that are stable, or from `starts`."""
-    spare = [(each.omega, each.zeta) for each in candidates]
-    final = starts is not None
+    final, least = starts is not None, STABLE if starts is None else np.inf
+    spare = [(each.omega, each.zeta) for each in candidates if each.share < least]
     if starts is None:
         starts = [(each.omega, each.zeta) for each in candidates if each.share >= STABLE]
-        spare = [(each.omega, each.zeta) for each in candidates if each.share < STABLE]
     known = _linear(parts, starts)
     windows: list[Window] = []
     begin = low
@@ -169,7 +166,9 @@ def _without(lines: Lines, modes: Starts, residues: ComplexArray) -> Lines:
     if not modes:
         return lines
     omega, zeta = np.array(modes).T
-    return replace(lines, response=lines.response - modelled(lines, omega, zeta, residues))
+    # The imaginary part of a residue goes with s/omega.
+    gain = residues.real + residues.imag * (lines.s[:, None] / omega)
+    return replace(lines, response=lines.response - np.sum(mode_columns(lines, omega, zeta)[0] * gain, axis=1))
 
 
 def cut(lines: Lines, low: float, high: float, complex_modes: bool, degree: int = _DEGREE) -> Lines:
@@ -212,16 +211,15 @@ def _fit_window(
 
 def _best_of(wide: Sequence[Lines], near: Starts, spare: Starts, room: int, final: bool) -> ModalFit | None:
     fewer = [_thinned(lines) for lines in wide]
-    share = min(lines.independent for lines in fewer)
-    both = [_selected(fewer, near[:room], spare, room)]
+    both = [_Selection(fewer, near[:room]).best_of(spare, room)]
     # Complex modes are the second time searched from those of the first.
-    pruned = near[:room] if final and wide[0].complex_modes else _pruned(fewer, [*near, *spare], share)[:room]
+    pruned = near[:room] if final and wide[0].complex_modes else _pruned(fewer, [*near, *spare])[:room]
     if sorted(pruned) != sorted(near[:room]):
-        both.append(_selected(fewer, pruned, spare, room))
-    usable = [each for each in both if each is not None]
-    best = min(usable, key=lambda fit: evidence_of(fit, share)) if usable else None
+        both.append(_Selection(fewer, pruned).best_of(spare, room))
+    share = min(lines.independent for lines in fewer)
+    best = min(filter(None, both), key=lambda fit: evidence_of(fit, share), default=None)
     if final and fewer[0] is not wide[0]:
-        best = _selected(wide, starts_of(best), spare, room, _ROUNDS)
+        best = _Selection(wide, starts_of(best)).best_of(spare, room, _ROUNDS)
     return fitted(wide, starts_of(best), _FULL if final else _QUICK)
 
 
@@ -235,33 +233,115 @@ def _thinned(lines: Lines) -> Lines:
     )  # fmt: skip
 
 
-def _selected(
-    parts: Sequence[Lines], starts: Starts, spare: Starts, room: int, rounds: int = _MAX_CHANGES
-) -> ModalFit | None:
-    """From some modes on, with one more or one less as long as the data speak for it."""
-    share = min(lines.independent for lines in parts)
-    best = fitted(parts, starts, _QUICK)
-    while starts and (best is None or _twins(best)):
-        starts = starts[:-1] if best is None else _apart(best)
-        best = fitted(parts, starts, _QUICK)
-    evidence = evidence_of(best, share) if best is not None else _empty(parts, share)
-    for _ in range(rounds):
-        changed = _reduced(parts, best, share, evidence) if best is not None else None
-        if changed is None and (best is None or len(best.omega) < room):
-            changed = _grown(parts, best, spare, share, evidence)
-        if changed is None and best is not None and len(best.omega) < room:
-            changed = _split(parts, best, share, evidence)
-        if changed is None:
-            break
-        best, evidence = changed
-    return best
+class _Selection:
+    """Modes of a window from some on, with one more or one less as long as the data speak for it."""
+
+    def __init__(self, parts: Sequence[Lines], starts: Starts) -> None:
+        self.parts, self.share = parts, min(lines.independent for lines in parts)
+        self.best = fitted(parts, starts, _QUICK)
+        while starts and (self.best is None or _twins(self.best)):
+            starts = starts[:-1] if self.best is None else _apart(self.best)
+            self.best = fitted(parts, starts, _QUICK)
+        self.evidence = self._empty() if self.best is None else evidence_of(self.best, self.share)
+
+    def best_of(self, spare: Starts, room: int, rounds: int = _MAX_CHANGES) -> ModalFit | None:
+        for _ in range(rounds):
+            has_room = self.best is None or len(self.best.omega) < room
+            if not (self._reduces() or (has_room and (self._grows(spare) or self._splits()))):
+                break
+        return self.best
+
+    def _betters(self, starts: Starts, *, apart: bool = False) -> bool:
+        """Take a fit from these modes on if it is better; with `apart` only if no two of its modes are one."""
+        found = fitted(self.parts, starts, _QUICK)
+        if found is None or (apart and _twins(found)) or not evidence_of(found, self.share) < self.evidence:
+            return False
+        self.best, self.evidence = found, evidence_of(found, self.share)
+        return True
+
+    def _empty(self) -> float:
+        """Evidence of a model without modes."""
+        squares, samples, columns = 0.0, 0.0, 0
+        for lines in self.parts:
+            basis, goal = lines.weighted(lines.background), lines.goal
+            squares += float(np.sum((goal - basis @ np.linalg.lstsq(basis, goal, rcond=None)[0]) ** 2))
+            samples += len(goal) * self.share
+            columns += basis.shape[1]
+        return float(samples * np.log(max(squares, 1e-300)) + columns * np.log(samples))
+
+    def _reduces(self) -> bool:
+        """Leave out the mode that explains least, if the data do not speak for it."""
+        fit = self.best
+        if fit is None:
+            return False
+        samples = 2 * sum(map(len, fit.left)) * self.share
+        # Standard errors of the residues, up to a common factor.
+        spread = [_inverse(jacobian, 1e-13)[1:] for jacobian in fit.jacobian]
+        squares = np.max((np.abs(fit.residues) / [each[: len(fit.omega)] for _, each in spread]) ** 2, axis=0)
+        for index in np.argsort(squares)[:_WEAKEST]:
+            if samples * np.log1p(squares[index] / fit.squares) > _CLEARLY * np.log(samples):
+                break
+            starts = [each for place, each in enumerate(starts_of(fit)) if place != index]
+            if not starts and (empty := self._empty()) < self.evidence:
+                self.best, self.evidence = None, empty
+                return True
+            if self._betters(starts):
+                return True
+        return False
+
+    def _grows(self, spare: Starts) -> bool:
+        """One mode more for which the data speak: of the pool, or where most is left."""
+        parts = self.parts
+        whole = [lines.weight * lines.response for lines in parts]
+        left: Sequence[ComplexArray] = whole if self.best is None else self.best.left
+        highest = float(parts[0].omega[int(np.argmax(np.convolve(np.abs(left[0]), np.ones(3), "same")))])
+        tried = [*spare, *((highest, zeta) for zeta in _START_DAMPING)]
+        gains = []
+        for omega, zeta in tried:
+            gain = 0.0
+            for lines, rest in zip(parts, left, strict=True):
+                column = lines.weight * mode_columns(lines, np.array([omega]), np.array([zeta]))[0][:, 0]
+                near = np.abs(lines.omega - omega) < 3.0 * max(zeta * omega, lines.omega[1] - lines.omega[0])
+                norm = float(np.sum(np.abs(column[near]) ** 2))
+                gain += float(np.sum((np.conj(column[near]) * rest[near]).real)) ** 2 / norm if norm > 0.0 else 0.0
+            gains.append(gain)
+        squares = sum(float(np.sum(np.abs(part) ** 2)) for part in left)
+        samples = 2 * sum(map(len, left)) * self.share
+        for index in np.argsort(gains)[::-1][:_TRIED]:
+            # Poles move and residues with them: a mode may come to explain some times more than at its start.
+            if samples * np.log(max(1.0 - 3.0 * gains[index] / squares, 1e-9)) + 4.0 * np.log(samples) > 0.0:
+                break
+            if self._betters([*starts_of(self.best), tried[index]], apart=True):
+                return True
+        return False
+
+    def _splits(self) -> bool:
+        """Two modes instead of the one around which the residual is largest relative to its width."""
+        if self.best is None:
+            return False
+        fit, left = self.best, []
+        for omega, zeta in starts_of(fit):
+            near = np.abs(self.parts[0].omega - omega) < 2.0 * zeta * omega
+            enough = np.count_nonzero(near) > _FEWEST // 2
+            left.append(float(np.mean(np.abs(fit.left[0][near]) ** 2)) if enough else 0.0)
+        usual = float(np.median(np.abs(fit.left[0]) ** 2))
+        for index in np.argsort(left)[::-1][:_TRIED]:
+            if left[index] < _UNUSUAL * usual:
+                break
+            starts = starts_of(fit)
+            omega, zeta = starts.pop(index)
+            pair = [(omega * (1.0 - 0.5 * zeta), 0.8 * zeta), (omega * (1.0 + 0.5 * zeta), 0.8 * zeta)]
+            if self._betters([*starts, *pair], apart=True):
+                return True
+        return False
 
 
-def _pruned(parts: Sequence[Lines], starts: Starts, share: float) -> Starts:
+def _pruned(parts: Sequence[Lines], starts: Starts) -> Starts:
     """Of more poles than there are modes those that explain most, left as they are, as many as the data speak for."""
     if not starts:
         return []
     omega, zeta = np.array(starts).T
+    share = min(lines.independent for lines in parts)
     gram, goal, squares, samples = [], [], 0.0, 0.0
     for lines in parts:
         columns, wanted = lines.weighted(np.hstack((lines.background, mode_columns(lines, omega, zeta)[0]))), lines.goal
@@ -281,7 +361,7 @@ def _pruned(parts: Sequence[Lines], starts: Starts, share: float) -> Starts:
             left -= float(factors @ right[index])
             loss += factors[fixed:] ** 2 / np.maximum(np.diag(inverse)[fixed:], 1e-300)
         parameters = len(parts) * (fixed + len(kept)) + 3 * len(kept)
-        evidence = samples * np.log(max(left, 1e-12 * squares)) + parameters * np.log(samples) + CLEAR * len(kept)
+        evidence = samples * np.log(max(left, 1e-12 * squares)) + parameters * np.log(samples) + _CLEAR * len(kept)
         if evidence < best:
             best, chosen = evidence, list(kept)
         if not kept:
@@ -289,48 +369,12 @@ def _pruned(parts: Sequence[Lines], starts: Starts, share: float) -> Starts:
         kept.pop(int(np.argmin(loss)))
 
 
-def _split(parts: Sequence[Lines], fit: ModalFit, share: float, evidence: float) -> tuple[ModalFit, float] | None:
-    """The fit with two modes instead of the one around which the residual is largest relative to its width."""
-    left = []
-    for omega, zeta in starts_of(fit):
-        near = np.abs(parts[0].omega - omega) < 2.0 * zeta * omega
-        left.append(float(np.mean(np.abs(fit.left[0][near]) ** 2)) if np.count_nonzero(near) > _FEWEST // 2 else 0.0)
-    usual = float(np.median(np.abs(fit.left[0]) ** 2))
-    for index in np.argsort(left)[::-1][:_TRIED]:
-        if left[index] < _UNUSUAL * usual:
-            break
-        starts = starts_of(fit)
-        omega, zeta = starts.pop(index)
-        pair = [(omega * (1.0 - 0.5 * zeta), 0.8 * zeta), (omega * (1.0 + 0.5 * zeta), 0.8 * zeta)]
-        better = _better(parts, [*starts, *pair], share, evidence)
-        if better is not None and not _twins(better[0]):
-            return better
-    return None
-
-
-def _better(parts: Sequence[Lines], starts: Starts, share: float, evidence: float) -> tuple[ModalFit, float] | None:
-    """A fit from these modes on and its evidence, if that is better than the one given."""
-    found = fitted(parts, starts, _QUICK)
-    reached = np.inf if found is None else evidence_of(found, share)
-    return (found, reached) if found is not None and reached < evidence else None
-
-
 def evidence_of(fit: ModalFit, share: float) -> float:
     """Bayes' criterion of a fit: lower is better."""
     samples = 2 * sum(len(part) for part in fit.left) * share
     opposed = np.count_nonzero(fit.residues.real < 0.0) if len(fit.residues) == 1 else 0
-    cost = (fit.parameters + len(fit.omega)) * np.log(samples) + _OPPOSED * opposed + CLEAR * len(fit.omega)
+    cost = (fit.parameters + len(fit.omega)) * np.log(samples) + _OPPOSED * opposed + _CLEAR * len(fit.omega)
     return float(samples * np.log(max(fit.squares, 1e-300)) + cost)
-
-
-def _empty(parts: Sequence[Lines], share: float) -> float:
-    squares, samples, columns = 0.0, 0.0, 0
-    for lines in parts:
-        basis, goal = lines.weighted(lines.background), lines.goal
-        squares += float(np.sum((goal - basis @ np.linalg.lstsq(basis, goal, rcond=None)[0]) ** 2))
-        samples += len(goal) * share
-        columns += basis.shape[1]
-    return float(samples * np.log(max(squares, 1e-300)) + columns * np.log(samples))
 
 
 def fitted(parts: Sequence[Lines], starts: Starts, effort: tuple[int, float] = _FULL) -> ModalFit | None:
@@ -349,37 +393,8 @@ def starts_of(fit: ModalFit | None) -> Starts:
     return [] if fit is None else list(zip(fit.omega.tolist(), fit.zeta.tolist(), strict=True))
 
 
-def _grown(
-    parts: Sequence[Lines], fit: ModalFit | None, spare: Starts, share: float, evidence: float
-) -> tuple[ModalFit, float] | None:
-    """The fit with one mode more for which the data speak: of the pool, or where most is left."""
-    left: Sequence[ComplexArray] = [lines.weight * lines.response for lines in parts] if fit is None else fit.left
-    highest = float(parts[0].omega[int(np.argmax(np.convolve(np.abs(left[0]), np.ones(3), "same")))])
-    tried = [*spare, *((highest, zeta) for zeta in _START_DAMPING)]
-    gains = []
-    for omega, zeta in tried:
-        gain = 0.0
-        for lines, rest in zip(parts, left, strict=True):
-            column = lines.weight * mode_columns(lines, np.array([omega]), np.array([zeta]))[0][:, 0]
-            near = np.abs(lines.omega - omega) < 3.0 * max(zeta * omega, lines.omega[1] - lines.omega[0])
-            norm = float(np.sum(np.abs(column[near]) ** 2))
-            gain += float(np.sum((np.conj(column[near]) * rest[near]).real)) ** 2 / norm if norm > 0.0 else 0.0
-        gains.append(gain)
-    squares = sum(float(np.sum(np.abs(part) ** 2)) for part in left)
-    samples = 2 * sum(len(part) for part in left) * share
-    for index in np.argsort(gains)[::-1][:_TRIED]:
-        # Poles move and residues with them: a mode may come to explain some times more than at its start.
-        if samples * np.log(max(1.0 - 3.0 * gains[index] / squares, 1e-9)) + 4.0 * np.log(samples) > 0.0:
-            break
-        better = _better(parts, [*starts_of(fit), tried[index]], share, evidence)
-        if better is not None and not _twins(better[0]):
-            return better
-    return None
-
-
 def _twins(fit: ModalFit) -> bool:
-    """Whether two modes are really one, fitted twice to compensate for something that is no mode, or one is no
-    vibration."""
+    """Whether two modes are one, fitted twice to make up for what is no mode, or one is no vibration."""
     order = np.argsort(fit.omega)
     omega, zeta = fit.omega[order], fit.zeta[order]
     near = np.diff(omega) < _TWINS * np.maximum(zeta[1:], zeta[:-1]) * omega[1:]
@@ -398,34 +413,12 @@ def _apart(fit: ModalFit) -> Starts:
     return [starts[i] for i in kept[: len(starts) - 1]]
 
 
-def _reduced(
-    parts: Sequence[Lines], fit: ModalFit, share: float, evidence: float
-) -> tuple[ModalFit | None, float] | None:
-    """The fit without the mode that explains least, if the data do not speak for it."""
-    samples = 2 * sum(len(part) for part in fit.left) * share
-    squares = np.max((np.abs(fit.residues) / _residue_spread(fit)) ** 2, axis=0) / fit.squares
-    for index in np.argsort(squares)[:_WEAKEST]:
-        if samples * np.log1p(squares[index]) > _CLEARLY * np.log(samples):
-            break
-        starts = [each for place, each in enumerate(starts_of(fit)) if place != index]
-        if not starts:
-            empty = _empty(parts, share)
-            return (None, empty) if empty < evidence else None
-        better = _better(parts, starts, share, evidence)
-        if better is not None:
-            return better
-    return None
-
-
-def _residue_spread(fit: ModalFit) -> FloatArray:
-    """(responses, m) standard errors of the residues up to a common factor."""
-    modes, spread = len(fit.omega), []
-    for jacobian in fit.jacobian:
-        norms = np.maximum(np.sqrt(np.sum(jacobian**2, axis=0)), 1e-300)
-        scaled = jacobian / norms
-        inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True, rcond=1e-13)
-        spread.append(np.sqrt(np.maximum(np.diag(inverse), 1e-300))[:modes] / norms[:modes])
-    return np.array(spread)
+def _inverse(jacobian: FloatArray, rcond: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Inverse of the normal matrix of scaled columns; norms of the columns; standard errors up to a common factor."""
+    norms = np.maximum(np.sqrt(np.sum(jacobian**2, axis=0)), 1e-300)
+    scaled = jacobian / norms
+    inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True, rcond=rcond)
+    return inverse, norms, np.sqrt(np.maximum(np.diag(inverse), 1e-300)) / norms
 
 
 @dataclass(frozen=True, eq=False)
@@ -450,9 +443,8 @@ def uncertainty_of(window: Window) -> Uncertainty:
         jacobian[at : at + len(part), column : column + count] = part[:, :count]
         jacobian[at : at + len(part), sum(counts) :] = part[:, count:]
         at, column = at + len(part), column + count
-    norms = np.maximum(np.sqrt(np.sum(jacobian**2, axis=0)), 1e-300)
+    inverse, norms, _ = _inverse(jacobian, 1e-14)
     scaled = jacobian / norms
-    inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True, rcond=1e-14)
     spread = np.zeros((size, size))
     at = 0
     for lines, count in zip(parts, rows, strict=True):
@@ -485,10 +477,7 @@ def _correlated(columns: ComplexArray, correlation: ComplexArray) -> ComplexArra
 # --- poles by poly-reference least squares in the frequency domain (pLSCF), band by band -----------------------------
 
 _CIRCLE = 0.85  # share of the unit circle that a band is laid on
-_LINES_PER_ORDER = 4
-_MAX_ORDER = 24
-_MIN_ORDER = 2
-_MOST_POLE_DAMPING = 0.3
+_LINES_PER_ORDER, _MAX_ORDER, _MIN_ORDER, _MOST_POLE_DAMPING = 4, 24, 2, 0.3
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,12 @@ from threadpoolctl import threadpool_limits
 from shapegcode import _core
 from shapegcode.errors import ArgumentError, NumericError, RecordError
 from shapegcode.identification import model_search
-from shapegcode.identification.across import left_by, measured, measured_across, with_moves
+from shapegcode.identification.across import left_by, measured, with_moves
 from shapegcode.identification.capture import find_modes_of_captures, is_capture
 from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.decay import split_stops
 from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf_modes, find_hit_modes
-from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Fit, FitProblem, Taps, are_blows, problem_of
+from shapegcode.identification.problem import HIGHEST_SHARE, Fit, FitProblem, are_blows, problem_of
 from shapegcode.identification.result import Identification, MassCheck, by_support
 from shapegcode.identification.sweep import find_swept_modes
 from shapegcode.io.data_file import open_file
@@ -119,22 +119,16 @@ def identify(
     )
     if across is False or sweep is not None or (not found.modes and found.reason):
         return found
-    return with_moves(found, measured_across(sources, across, options), window_s)
+    others: Any = [across] if isinstance(across, str | Path | Record | FrequencyResponse) else across
+    files = sources if isinstance(across, bool) else others
+    return with_moves(found, measured(files, replace(options, axis=None, response_columns=())), window_s)
 
 
 def _identified(
-    sources: Sequence[Any],
-    names: tuple[str, ...],
-    options: ReadOptions,
-    sought: model_search.Sought,
-    start_s: float | None,
-    sweep: Program | str | Path | None,
-    machine: Machine | str | Path | None,
-    *,
-    stops: bool,
-    across: bool,
-    strict: bool,
-) -> Identification:
+    sources: Sequence[Any], names: tuple[str, ...], options: ReadOptions, sought: model_search.Sought,
+    start_s: float | None, sweep: Program | str | Path | None, machine: Machine | str | Path | None, *, stops: bool,
+    across: bool, strict: bool,
+) -> Identification:  # fmt: skip
     """The modes along one axis; of a sweep what they move across too."""
     ready: Prepared | None = None
     band_hz = sought.band_hz
@@ -164,7 +158,7 @@ def _identified(
             if stops:
                 if start_s is not None:
                     raise ArgumentError(f"start at {start_s:g} s: goes with one decay, --stops finds where each begins")
-                return _modes_of_stops(_stops_in(records, None if band_hz is None else band_hz[0]), names, sought)
+                return _modes_of_stops(records, names, sought)
             ready = prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
             return _turned_if_opposed(ready, find_modes(ready, names, sought), sought)
     except (ArgumentError, NumericError) as error:
@@ -191,7 +185,6 @@ def _refuse_of_sensors(
 
 
 def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: bool = False) -> None:
-    """Refuse options for a decay or impact that would have no effect."""
     for option, is_said in (("--stops", stops), ("--start", start_s is not None), ("--across", across)):
         if is_said:
             raise ArgumentError(f"{what}, in which {option} changes nothing: it goes with the record of a tap or decay")
@@ -211,7 +204,6 @@ def _turned_if_opposed(ready: Prepared, found: Identification, sought: model_sea
 
 
 def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record], list[FrequencyResponse]]:
-    """Records over time or frequency responses: either of both is empty."""
     found = measured(sources, options)
     records = [each for each in found if isinstance(each, Record)]
     responses = [each for each in found if isinstance(each, FrequencyResponse)]
@@ -223,23 +215,19 @@ def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record
     return records, responses
 
 
-def _stops_in(records: Sequence[Record], lowest_hz: float | None) -> list[Record]:
-    """The stops of ordinary runs, each as a record."""
+def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: model_search.Sought) -> Identification:
+    """Modes of the stops of ordinary runs with least motion in them, then of all that these explain."""
     forced = [record for record in records if record.force_n is not None]
     if forced:
         raise ArgumentError(f"{forced[0].source}: holds a force: stops are looked for in a run without a hammer")
-    found = [stop for record in records for stop in split_stops(record, lowest_hz)]
-    if not found:
+    lowest_hz, highest_hz = sought.band_hz or (None, None)
+    stops = [stop for record in records for stop in split_stops(record, lowest_hz)]
+    if not stops:
         raise RecordError(
             f"{records[0].source}: no stop behind which the machine rests for a third of a second and its vibration "
             "falls to a third: needed is a run with pauses, such as dwells, or the decay after one stop"
         )
-    return found
-
-
-def _modes_of_stops(records: list[Record], files: tuple[str, ...], sought: model_search.Sought) -> Identification:
-    """Modes of the stops with least motion in them, then of all that these explain."""
-    ready = prepare(records, band_hz=None if sought.band_hz is None else sought.band_hz[1])
+    ready = prepare(stops, band_hz=highest_hz)
     first = ready.usable[: max(_FIRST_STOPS, len(ready.usable) // 3)]
     found = find_modes(replace(ready, usable=first), files, sought)
     if not found.modes:
@@ -252,7 +240,6 @@ def _modes_of_stops(records: list[Record], files: tuple[str, ...], sought: model
 
 
 def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quantity: Quantity) -> Record:
-    """Arrays as a record."""
     times = np.asarray(time_s, dtype=np.float64)
     samples = np.asarray(response, dtype=np.float64)
     if times.shape != samples.shape or times.ndim != 1 or len(times) < _MIN_SAMPLES:
@@ -273,9 +260,8 @@ def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quanti
 
 def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
     """The record of a resonance sweep, if that is what the file holds; None: it is anything else."""
-    paths = [Path(each) for each in sources if isinstance(each, str | Path)]
     found = []
-    for path in paths:
+    for path in [Path(each) for each in sources if isinstance(each, str | Path)]:
         if path.is_file():
             with open_file(path) as file:
                 found += [path] if is_klipper(file.read(400)) else []
@@ -286,8 +272,7 @@ def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
     return read_sweep(found[0], options)
 
 
-_FEW_MODES, _MORE = 4, 2  # that are fitted over time; beyond those that are seen at once
-_START_DAMPING = 0.02
+_FEW_MODES, _MORE, _START_DAMPING = 4, 2, 0.02  # that are fitted over time; beyond those that are seen at once
 _SAMPLES_IN_TIME = 20_000  # of all records together; more take too long
 _EXPLAINED, _NOISE_SHARE = 0.003, 1.5  # of the record's RMS that few modes may leave; or times its noise
 _MANY = "many modes, or more than modes: fitted over frequency, band by band, in what the hits excite"
@@ -304,12 +289,15 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sou
     """Find the modes that checked records of the same point support; see `identify.identify`."""
     problem = problem_of(ready, sought.band_hz, within=sought.modes is not None)
     windowed = sought.exponential_window_s is not None
-    if windowed and not isinstance(problem, Taps):
+    if windowed and problem.forces is None:
         raise RecordError(
             "an exponential window of a free decay cannot be told from its damping: state it with the force"
         )
-    if isinstance(problem, Taps) and (windowed or (sought.modes is None and not are_blows(ready))):
-        long = _of_similar_length(ready)
+    if problem.forces is not None and (windowed or (sought.modes is None and not are_blows(ready))):
+        # Over frequency all are cut to the shortest.
+        longest = max(len(record.response) for record in ready.records)
+        short = [each for each in ready.usable if 2 * len(each.record.response) < longest]
+        long = ready.without(short, "shorter than half of the longest record")
         many, fitted = find_hit_modes(long, sought)
         few = None if windowed else _few(ready, problem, many, sought.band_hz is not None)
         if few is None:
@@ -318,16 +306,15 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sou
     models = model_search.search(problem, sought)
     sought.order(models)
     others: list[Fit] = []
-    if isinstance(problem, Taps) and models.fits:
+    if problem.forces is not None and models.fits:
         problem, models, others = _choose_course(problem, models, sought)
     return _result(ready, files, problem, models, others, sought)
 
 
-def _few(ready: Prepared, problem: Taps, many: FrfModes, narrow: bool) -> int | None:
+def _few(ready: Prepared, problem: FitProblem, many: FrfModes, narrow: bool) -> int | None:
     """Number of modes that explain the whole record to its noise, if a fit over time is best for so few."""
-    starts = [
-        (2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in many.modes if not mode.refusal
-    ]
+    supported = [mode for mode in many.modes if not mode.refusal]
+    starts = [(2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in supported]
     power = np.mean([np.mean(record.response**2) for record in ready.records])
     noise = np.mean([(each.response_noise or 0.0) ** 2 for each in ready.usable]) / power
     limit = max(_EXPLAINED**2, _NOISE_SHARE**2 * noise)
@@ -337,7 +324,7 @@ def _few(ready: Prepared, problem: Taps, many: FrfModes, narrow: bool) -> int | 
     quick: Fit | None = None
     while len(starts) <= _FEW_MODES:
         try:
-            quick = problem.fit_quickly(starts) if starts else None
+            quick = problem.fit(starts, quick=True) if starts else None
         except (ArgumentError, NumericError):
             return None
         if quick is not None and quick.sum_of_squares < limit * problem.squares:
@@ -346,15 +333,7 @@ def _few(ready: Prepared, problem: Taps, many: FrfModes, narrow: bool) -> int | 
         if not peaks:
             return len(starts) if quick is None else None
         starts = [*(model_search.starts_of(quick) if quick is not None else []), (peaks[0], _START_DAMPING)]
-    return None if any(mode.refusal == "" for mode in many.modes) else _FEW_MODES
-
-
-def _of_similar_length(ready: Prepared) -> Prepared:
-    """The impacts whose records are at least half as long as the longest: over frequency all are cut to the
-    shortest."""
-    longest = max(len(record.response) for record in ready.records)
-    short = [each for each in ready.usable if 2 * len(each.record.response) < longest]
-    return ready.without(short, "shorter than half of the longest record")
+    return None if supported else _FEW_MODES
 
 
 def _many(ready: Prepared, files: tuple[str, ...], many: FrfModes, fitted: Sequence[FloatArray]) -> Identification:
@@ -381,8 +360,8 @@ def _warnings_of(ready: Prepared) -> list[str]:
 
 
 def _choose_course(
-    problem: Taps, models: model_search.Search, sought: model_search.Sought
-) -> tuple[Taps, model_search.Search, list[Fit]]:
+    problem: FitProblem, models: model_search.Search, sought: model_search.Sought
+) -> tuple[FitProblem, model_search.Search, list[Fit]]:
     """The course of the force between its samples for which the data speak, and fits of what else it may have been."""
     courses = [(problem, models)]
     order = max(sought.order(models), 1)
@@ -403,33 +382,37 @@ def _choose_course(
 
 
 def _result(
-    ready: Prepared,
-    files: tuple[str, ...],
-    problem: FitProblem,
-    models: model_search.Search,
-    others: Sequence[Fit],
+    ready: Prepared, files: tuple[str, ...], problem: FitProblem, models: model_search.Search, others: Sequence[Fit],
     sought: model_search.Sought,
-) -> Identification:
+) -> Identification:  # fmt: skip
     order = sought.order(models)
     warnings = _warnings_of(ready)
     squares = sum(float(np.sum(response**2)) for response in problem.responses)
+    fitted_records, thinned = ready.records, problem.thinned
+    if thinned is not None and problem.forces is not None:
+        parts = zip(ready.records, problem.responses, problem.forces, thinned.first_s, strict=True)
+        fitted_records = tuple(
+            replace(each, response=response, force_n=force, period_s=thinned.period_s, start_s=each.start_s + first_s)
+            for each, response, force, first_s in parts
+        )
     without = Identification(
         files=files,
         evidence=dict(enumerate(models.evidence)),
         fit_percent=0.0,
-        noise_rms=float(np.sqrt(squares / sum(len(response) for response in problem.responses))),
+        noise_rms=float(np.sqrt(squares / problem.samples)),
         reason="no mode exceeds the noise",
         warnings=tuple(warnings),
         notes=(*ready.notes, *_thinned_note(ready, problem, sought.band_hz)),
         prepared=ready,
         chart=model_search.chart_of(enumerate(model_search.chart_modes(problem), start=1)),
         fitted=tuple(np.zeros(len(response)) for response in problem.responses),
-        fitted_records=_fitted_records(ready, problem),
+        fitted_records=fitted_records,
     )
     if order == 0:
         return without
     fit = models.fits[order - 1]
-    coloured = abs(fit.residual_autocorrelation - problem.noise_correlation) * np.sqrt(fit.samples) > _COLOURED
+    of_white = 0.0 if thinned is None else thinned.noise_correlation
+    coloured = abs(fit.residual_autocorrelation - of_white) * np.sqrt(fit.samples) > _COLOURED
     if coloured:
         fit = problem.fit(model_search.starts_of(fit), coloured=True)
         warnings.append(
@@ -437,7 +420,6 @@ def _result(
             "intervals allow for it; other causes than modes, or a mode that is not linear"
         )
     white_share = 1.0 / max(record.widened for record in ready.records) ** 2 if coloured else problem.white_share
-    is_whole = isinstance(problem, Decays) or problem.thinned is None
     doubts = model_search.Doubts(
         limit_percent=sought.accepted_percent or model_search.ACCEPTED_PERCENT,
         band_hz=sought.band_hz or problem.band_hz,
@@ -445,7 +427,7 @@ def _result(
         rival=model_search.rival_of(order, models.fits, problem.white_share),
         aliased=_aliased(ready, problem),
         white_share=white_share,
-        least=(0.0, 0.0) if is_whole else _FILTER_MOVES,
+        least=(0.0, 0.0) if thinned is None else _FILTER_MOVES,
     )
     found = model_search.judged_modes(fit, _alone(problem, fit), others, doubts)
     left = float(np.sqrt(fit.sum_of_squares / squares)) if squares > 0.0 else 1.0
@@ -464,23 +446,10 @@ def _result(
     )
 
 
-def _fitted_records(ready: Prepared, problem: FitProblem) -> tuple[Record, ...]:
-    """The records as they were fitted: thinned out, if they were."""
-    if isinstance(problem, Decays) or problem.thinned is None:
-        return ready.records
-    thinned = problem.thinned
-    parts = zip(ready.records, problem.responses, problem.forces, thinned.first_s, strict=True)
-    return tuple(
-        replace(each, response=response, force_n=force, period_s=thinned.period_s, start_s=each.start_s + first_s)
-        for each, response, force, first_s in parts
-    )
-
-
 def _thinned_note(ready: Prepared, problem: FitProblem, band_hz: tuple[float, float] | None) -> list[str]:
-    thinned = problem.thinned if isinstance(problem, Taps) else None
-    if thinned is None:
+    if problem.thinned is None:
         return []
-    rates = f"{1.0 / ready.records[0].period_s:.6g} samples per second are thinned out to {1.0 / thinned.period_s:.6g}"
+    rates = f"{1.0 / ready.records[0].period_s:.6g} samples per second are thinned out to {1.0 / problem.period_s:.6g}"
     if band_hz is not None:
         return [
             f"{rates}, which the band up to {band_hz[1]:g} Hz and what stands out of the response above it need, "
@@ -494,8 +463,6 @@ def _thinned_note(ready: Prepared, problem: FitProblem, band_hz: tuple[float, fl
 
 def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
     """Share of the force's spectrum at a frequency that may have been folded down from above half the sampling rate."""
-    if isinstance(problem, Decays):
-        return lambda _hz: 0.0
     is_simulated = problem.force_noise_n == 0.0 and problem.hold != "band_limited"
     record = ready.records[0]
     least = 0.0 if problem.thinned is None else _FILTER_ERROR
@@ -518,25 +485,19 @@ def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
 
 def _alone(problem: FitProblem, fit: Fit) -> list[Fit]:
     """The same modes fitted to each record by itself; none if there is but one, or a record does not hold them."""
-    if len(problem.responses) < 2:
-        return []
+    count = len(problem.responses)
     try:
-        return [problem.record(index).fit(model_search.starts_of(fit)) for index in range(len(problem.responses))]
+        return [problem.record(index).fit(model_search.starts_of(fit)) for index in range(count if count > 1 else 0)]
     except _core.ArgumentError:
         return []
 
 
 def _mass_check(problem: FitProblem, fit: Fit) -> MassCheck | None:
     """The equivalent mass by paper 003's method, from the first impact, if the model has one mode."""
-    if isinstance(problem, Decays) or len(fit.omega_rad_s) != 1 or problem.hold == "impulse":
+    if problem.forces is None or len(fit.omega_rad_s) != 1 or problem.hold == "impulse":
         return None
-    args = (
-        _finer(problem.forces[0], problem.held),
-        _finer(problem.responses[0], "band_limited"),
-        problem.period_s / _FINER,
-        float(fit.omega_rad_s[0]),
-        float(fit.damping_ratio[0]),
-    )
+    signals = _finer(problem.forces[0], problem.held), _finer(problem.responses[0], "band_limited")
+    args = *signals, problem.period_s / _FINER, float(fit.omega_rad_s[0]), float(fit.damping_ratio[0])
     closed = _core.equivalent_mass_closed_form(*args, quantity=problem.quantity)
     halved = _core.equivalent_mass_bisection(*args, quantity=problem.quantity)
     return MassCheck(closed.mass_kg, halved.mass_kg, halved.halvings)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +22,8 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.across import with_moves
 from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.model_search import Sought
-from shapegcode.identification.parts import REST_S, Spectra, moving_parts, transforms
-from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, as_sweep
+from shapegcode.identification.result import Estimate, Identification, as_sweep
+from shapegcode.identification.spectra import REST_S, Spectra, moving_parts, transforms
 from shapegcode.identification.sweep_program import commanded
 from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_records
@@ -36,13 +37,10 @@ _COARSE_STEP, _FINE_STEP = 0.001, 5e-4
 _FURTHEST_RATE, _EXACT_RATE = 0.003, 3e-6  # from the one that is found below 40 Hz
 _LONGEST_WAIT_S, _WAIT_STEP_S = 0.21, 0.015  # that a part of the program lasts longer or shorter than simulated
 _WAIT_GRID_S = np.arange(-0.025, 0.025, 2.5e-4)  # about the one that is found below 40 Hz
-_TOLD_WAIT_S = 0.005
-_NEAR_S = 0.03
-_CLOCK_KNOWN = 3e-4  # of a frequency, 95 %
-_CLOCK_HZ = 150.0  # the clock is refined by the lines below
+_TOLD_WAIT_S, _NEAR_S = 0.005, 0.03
+_CLOCK_KNOWN, _CLOCK_HZ = 3e-4, 150.0  # of a frequency, 95 %; the clock is refined by the lines below
 _COARSE_HZ = 40.0  # start and clock are first looked for in what lies below
-_AFTER_S = 3.0  # of the record behind the last part
-_RINGS_S = 2.0  # of the record that a part needs behind it, or up to the next part
+_AFTER_S, _RINGS_S = 3.0, 2.0  # of the record behind the last part; that a part needs behind it, or up to the next
 _OVER_HALF = 2.5  # samples per cycle of the highest line
 _LONGEST_LAG_S = 0.02  # of a part against the others
 _IRREGULAR_S = 0.008  # of what is between a rise and its fall
@@ -51,14 +49,10 @@ _LAG_STEP_S = 5e-4
 _UNLIKELY = 0.3  # of a correlation, that a part is the longest lag away
 _EXPLAINED = 0.5  # share of a part's power that the others must explain
 _FEWEST_PARTS = 2
-_LOWEST_HZ = 4.0
-_NARROWEST = 8.0  # highest line over the lowest
+_LOWEST_HZ, _NARROWEST = 4.0, 8.0  # lowest line; highest line over it
 _HELD = 0.002  # share of samples at an end of the range that stand beside another one
-_LOUD = 0.1  # of the loudest part: below 40 Hz
-_QUIET = 0.01
-_LEVELLED_HZ = 1.0
-_SAME_START_S = 0.15
-_AWAY_S, _STANDS_OUT = 0.5, 2.0
+_LOUD, _QUIET, _LEVELLED_HZ = 0.1, 0.01, 1.0  # of the loudest part: below 40 Hz
+_SAME_START_S, _AWAY_S, _STANDS_OUT = 0.15, 0.5, 2.0
 _GAINS_PER_S = np.geomspace(10.0, 200.0, 14)
 _LOWEST_SHARE = 0.15  # of the power of the command
 _CORRELATED = 0.25  # squared correlation of a part, below 40 Hz
@@ -105,19 +99,13 @@ def known_command(program: str | Path | Program, machine: Machine | str | Path) 
         )
     x = positions[:, axis]
     kicks = np.diff(np.diff(x, prepend=x[0], append=x[-1])) * 1e-3 / period_s
-    parts = [(first * period_s, end * period_s) for first, end in moving_parts(x, period_s)]
-    return KnownCommand(
-        program.source, "xyz"[axis], np.asarray(np.arange(len(x)) * period_s, dtype=np.float64), kicks, tuple(parts)
-    )
+    parts = tuple((first * period_s, end * period_s) for first, end in moving_parts(x, period_s))
+    times_s = np.asarray(np.arange(len(x)) * period_s, dtype=np.float64)
+    return KnownCommand(program.source, "xyz"[axis], times_s, kicks, parts)
 
 
 def find_modes_of_command(
-    command: KnownCommand,
-    sources: Sequence[str | Path | Record],
-    options: ReadOptions,
-    sought: Sought,
-    *,
-    across: bool = False,
+    command: KnownCommand, sources: Sequence[str | Path | Record], options: ReadOptions, sought: Sought, *, across: bool
 ) -> Identification:
     """Find the modes in records of a known command; with `across` their motion along the sensor's other axes, too."""
     if options.axis not in (None, command.axis):
@@ -135,18 +123,16 @@ def find_modes_of_command(
     if across:
         others = [_between(one, max(ends[0]), min(ends[1])) for each in aligned for one in each.others]
         found = with_moves(found, others)
-    found = replace(found, modes=tuple(_by_clock(each) for each in found.modes))
+    modes = []
+    for mode in found.modes:  # the interval of the frequency holds how well the logger's clock is found
+        known, own = mode.frequency_hz, _CLOCK_KNOWN * mode.frequency_hz.value
+        below, above = np.hypot((known.value - known.low, known.high - known.value), own)
+        modes.append(replace(mode, frequency_hz=Estimate(known.value, known.value - below, known.value + above)))
     rate = min(1.0 / each.record.period_s for each in aligned)
     looked = f"looked at from {lines[0]:.0f} to {lines[-1]:.0f} Hz; {rate:.0f} samples per second reach "
     notes = (*(note for each in aligned for note in each.notes), f"{looked}{rate / _OVER_HALF:.0f} Hz")
+    found = replace(found, modes=tuple(modes))
     return as_sweep(found, notes, first.source, len(first.response), first.period_s, command.source)
-
-
-def _by_clock(mode: IdentifiedMode) -> IdentifiedMode:
-    """The mode with an interval of its frequency that holds how well the logger's clock is found."""
-    known, own = mode.frequency_hz, _CLOCK_KNOWN * mode.frequency_hz.value
-    below, above = (float(np.hypot(each, own)) for each in (known.value - known.low, known.high - known.value))
-    return replace(mode, frequency_hz=Estimate(known.value, known.value - below, known.value + above))
 
 
 def _between(each: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyResponse:
@@ -166,13 +152,9 @@ class _Aligned:
 
 
 def _aligned(
-    command: KnownCommand,
-    source: str | Path | Record,
-    options: ReadOptions,
-    band_hz: tuple[float, float] | None,
-    *,
+    command: KnownCommand, source: str | Path | Record, options: ReadOptions, band_hz: tuple[float, float] | None, *,
     across: bool,
-) -> _Aligned:
+) -> _Aligned:  # fmt: skip
     """The record of a file that goes with the command, on the program's time."""
     records = [source] if isinstance(source, Record) else read_records(source, replace(options, ignore_force=True))
     clocks = [_Clock(command, record) for record in records]
@@ -184,11 +166,9 @@ def _aligned(
 
 def _held_at_ends(values: FloatArray) -> bool:
     """Whether the largest or smallest value is repeated for several samples, more than once."""
-    for end in (np.max(values), np.min(values)):
-        at = np.flatnonzero(values == end)
-        if np.count_nonzero(np.diff(at) == 1) > _HELD * len(values) and abs(end - np.median(values)) > 0.0:
-            return True
-    return False
+    ends = [end for end in (np.max(values), np.min(values)) if abs(end - np.median(values)) > 0.0]
+    beside = (np.diff(np.flatnonzero(values == end)) == 1 for end in ends)
+    return any(np.count_nonzero(each) > _HELD * len(values) for each in beside)
 
 
 class _Clock:
@@ -222,10 +202,7 @@ class _Clock:
             )
         self.command, self.record = command, record
         self.values = record.response - np.mean(record.response)
-        ends = [begin for begin, _ in command.parts[1:]]
-        self.windows = list(
-            zip([begin for begin, _ in command.parts], [*ends, command.parts[-1][1] + _AFTER_S], strict=True)
-        )
+        self.windows = list(pairwise([*(begin for begin, _ in command.parts), command.parts[-1][1] + _AFTER_S]))
         self.middles = np.array([np.mean(each) for each in self.windows])
         self.rate, start_s, self.wait_s, self.shares = self._coarse()
         late = self.wait_s * np.arange(len(self.windows))
@@ -239,9 +216,8 @@ class _Clock:
         values = resample_poly(self.values, 1, thinner)
         step = period * thinner
         smooth, times = _low_passed(command, min(_COARSE_HZ, 0.4 / step))
-        energy = np.array(
-            [np.sum(np.abs(smooth[(times >= begin) & (times < end)]) ** 2) for begin, end in self.windows]
-        )
+        inside = [(times >= begin) & (times < end) for begin, end in self.windows]
+        energy = np.array([np.sum(np.abs(smooth[part]) ** 2) for part in inside])
         used = np.flatnonzero(energy > _LOUD * energy.max())
         size = 1 << int(np.ceil(np.log2(len(values) + len(smooth) * (times[1] - times[0]) / step + 1)))
         # A mode that rings for long would be most of the record: every frequency counts alike.
@@ -301,10 +277,11 @@ class _Clock:
                 break
             rows = np.delete(rows, worst)
         if np.min(explained) < _EXPLAINED:
-            raise RecordError(
-                self._no_relation(f"parts of the program explain {100 * max(np.min(explained), 0.0):.0f} % of another")
-            )
-        rows = self._whole(rows)
+            percent = 100 * max(np.min(explained), 0.0)
+            raise RecordError(self._no_relation(f"parts of the program explain {percent:.0f} % of another"))
+        # Those of which the other of their two is there: else ringing is cut off, or another's.
+        alone = len(self.windows) - 1 if len(self.windows) % 2 else -1
+        rows = self._recorded(rows[np.isin(rows ^ 1, rows) | (rows == alone)], 1)
         if len(rows) > 1:
             self._refine(rows, _FINE_STEP)  # without those that did not go with the others
         spectra = self._spectra(None)
@@ -334,22 +311,16 @@ class _Clock:
         return _Aligned(self.record, response, tuple(notes), tuple(beside))
 
     def _spectra(
-        self,
-        band_hz: tuple[float, float] | None,
-        rate: float | None = None,
-        rows: npt.NDArray[np.intp] | None = None,
+        self, band_hz: tuple[float, float] | None, rate: float | None = None, rows: npt.NDArray[np.intp] | None = None
     ) -> Spectra:
-        """Lines of command and response of each part."""
         stretch = 1.0 + (self.rate if rate is None else rate)
         period = self.record.period_s * stretch
         low, high = band_hz or (_LOWEST_HZ, np.inf)
         high = min(high, 1.0 / (_OVER_HALF * period))
-        longest = max(end - begin for begin, end in self.windows)
-        step = 0.5 / longest
-        hertz = np.arange(max(low, _LOWEST_HZ), high, step)
+        begins, ends = np.array(self.windows).T
+        hertz = np.arange(max(low, _LOWEST_HZ), high, 0.5 / np.max(ends - begins))
         rows = np.arange(len(self.windows)) if rows is None else rows
         before = self.places_s * stretch - self.middles  # of the program time of each part in the record
-        begins, ends = (np.array(each) for each in zip(*self.windows, strict=True))
         first = np.ceil((begins + before) / period).astype(int)
         last = np.append(first[1:], np.ceil((ends[-1] + before[-1]) / period).astype(int))  # A window ends at the next
         first, last = np.maximum(first, 0)[rows], np.minimum(last, len(self.values))[rows]
@@ -362,22 +333,12 @@ class _Clock:
         return Spectra(hertz, transforms(kicks, first * every, every, hertz), response)
 
     def _clear_parts(self) -> npt.NDArray[np.intp]:
-        """Parts of the program that the record shows beyond doubt."""
         rows = np.flatnonzero(self.shares >= _CORRELATED)
         if len(rows) < _FEWEST_PARTS:
-            best = 100.0 * float(np.sqrt(np.max(self.shares)))
-            raise RecordError(
-                self._no_relation(
-                    f"{len(rows)} of {np.count_nonzero(self.shares)} parts of the program correlate with it, the best "
-                    f"by {best:.0f} % (limit {100.0 * _CORRELATED**0.5:.0f} %)"
-                )
-            )
+            few = f"{len(rows)} of {np.count_nonzero(self.shares)} parts of the program correlate with it, the best by"
+            best, limit = 100.0 * np.sqrt(np.max(self.shares)), 100.0 * _CORRELATED**0.5
+            raise RecordError(self._no_relation(f"{few} {best:.0f} % (limit {limit:.0f} %)"))
         return rows
-
-    def _whole(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-        """Those of the parts of which the other of their two is there: else ringing is cut off, or another's."""
-        alone = len(self.windows) - 1 if len(self.windows) % 2 else -1
-        return self._recorded(rows[np.isin(rows ^ 1, rows) | (rows == alone)], 1)
 
     def _recorded(self, rows: npt.NDArray[np.intp], fewest: int) -> npt.NDArray[np.intp]:
         """Those of the parts that the record holds from their begin until they rang down, or the next one begins."""
@@ -406,14 +367,12 @@ class _Clock:
         """Find the rate for which each part agrees best with the next, wherever that begins, and the wait between."""
         band_hz = _LOWEST_HZ, _CLOCK_HZ
 
-        def shares(rate: float) -> Spectra:
-            """With the response times the conjugate of the command, as a share of all parts' power."""
+        def shares(rate: float) -> Spectra:  # the response times the conjugate of the command, of all parts' power
             spectra = self._spectra(band_hz, rate, rows)
             share = np.conj(spectra.command) * spectra.response / np.sqrt(np.maximum(spectra.power, 1e-300))
             return replace(spectra, response=share)
 
-        def missed(rate: float) -> float:
-            """Minus the power on which neighbours agree."""
+        def missed(rate: float) -> float:  # minus the power on which neighbours agree
             spectra = shares(rate)
             both = np.conj(spectra.response[:-1]) * spectra.response[1:]
             agreed = (both @ np.exp(spectra.turn[:, None] * _WAIT_GRID_S)).real
@@ -430,34 +389,32 @@ class _Clock:
         self.places_s = self.places_s + _WAIT_GRID_S[int(np.argmax(agreed))] * late / (1.0 + self.rate)
 
     def _notes(self, rows: npt.NDArray[np.intp]) -> list[str]:
-        """Notes on the clock, and on parts that are not used."""
         first = int(rows[0])
         begins_s = self.places_s[first] - self.middles[first] / (1.0 + self.rate)
         waits = np.polyfit(rows, self.places_s[rows] * (1.0 + self.rate) - self.middles[rows], 1)[0]
         notes = [
-            f"{self.record.source}: the program begins {abs(begins_s):.3f} s "
-            f"{'after' if begins_s >= 0.0 else 'before'} the record; the "
+            f"the program begins {abs(begins_s):.3f} s {'after' if begins_s >= 0.0 else 'before'} the record; the "
             f"logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
         ]
         if abs(waits) > _TOLD_WAIT_S:
             notes.append(
-                f"{self.record.source}: each part of the program with the rest behind it takes {1e3 * abs(waits):.0f} "
-                f"ms {'longer' if waits > 0.0 else 'less'} than simulated: the control's ramps or waits are not those "
-                "of the machine file, on which the modes do not rest; or the override was not 100 %, and frequencies "
-                "are off by as much"
+                f"each part of the program with the rest behind it takes {1e3 * abs(waits):.0f} ms "
+                f"{'longer' if waits > 0.0 else 'less'} than simulated: the control's ramps or waits are not those of "
+                "the machine file, on which the modes do not rest; or the override was not 100 %, and frequencies are "
+                "off by as much"
             )
         missing = sorted(set(range(len(self.windows))) - set(rows.tolist()))
         if missing:
             begin = self.windows[missing[0]][0]
-            after = missing == list(range(missing[0], len(self.windows)))
-            cause = (
-                "feed hold, another override, a jump of the logger's clock, a short record, or too little motion"
-                if after
-                else "little of it was recorded, or the control does not move as its machine file says"
-            )
-            what = f"from {begin:.1f} s on" if after else f"in {len(missing)} of {len(self.windows)} parts"
-            notes.append(f"{self.record.source}: {what} the record does not go with the program ({cause}): not used")
-        return notes
+            what = f"in {len(missing)} of {len(self.windows)} parts"
+            cause = "little of it was recorded, or the control does not move as its machine file says"
+            if missing == list(range(missing[0], len(self.windows))):
+                what = f"from {begin:.1f} s on"
+                cause = (
+                    "feed hold, another override, a jump of the logger's clock, a short record, or too little motion"
+                )
+            notes.append(f"{what} the record does not go with the program ({cause}): not used")
+        return [f"{self.record.source}: {note}" for note in notes]
 
     def _response(self, spectra: Spectra) -> FrequencyResponse:
         """Minus the response over the command where the command excites and parts agree."""
@@ -477,9 +434,8 @@ class _Clock:
         power = power[used]
         lowest = np.cumsum(power) <= _LOWEST_SHARE * np.sum(power)
         ratio = ratio * best * (np.sign(np.sum((unit * best * power)[lowest].real)) or 1.0)
-        return FrequencyResponse(
-            self.record.source, hertz, -ratio, "acceleration", coherence, self.command.axis, scaled=False
-        )
+        source, axis = self.record.source, self.command.axis
+        return FrequencyResponse(source, hertz, -ratio, "acceleration", coherence, axis, scaled=False)
 
 
 def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
@@ -539,9 +495,9 @@ def _lag(spectra: Spectra, block: npt.NDArray[np.intp], own: npt.NDArray[np.bool
 
 def _explained(spectra: Spectra) -> FloatArray:
     """Share of the power of each part, where the command has most of its own, that the other parts explain."""
-    found = []
-    for row in range(len(spectra.command)):
-        others = spectra.of(np.flatnonzero(np.arange(len(spectra.command)) != row))
+    found, rows = [], np.arange(len(spectra.command))
+    for row in rows:
+        others = spectra.of(rows[rows != row])
         own = np.abs(spectra.command[row]) ** 2
         inside = own > _OWN * np.max(own)
         left = (spectra.response[row] - others.ratio() * spectra.command[row])[inside]

@@ -15,8 +15,7 @@ from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.units import FloatArray
 
 _END = 1e-2  # of the exponential window
-_LEAD = 4  # samples before a pulse
-_LAGS = 64
+_LEAD, _LAGS = 4, 64  # samples before a pulse
 _QUIETEST = 1e-6  # of the largest line: no sensor has less noise
 _LATE = 0.4  # a steady disturbance is looked for behind this share of the record
 _STANDS_OUT = 8.0  # times the median of the spectrum there
@@ -48,10 +47,9 @@ def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, lis
     if not chosen:
         return np.zeros(samples), []
     time_s = np.arange(samples) * period_s
-    columns = [np.ones(samples), time_s]
-    for hertz in chosen:
-        columns += [np.cos(2.0 * np.pi * hertz * time_s), np.sin(2.0 * np.pi * hertz * time_s)]
-    stacked = np.array(columns).T
+    turns = [2.0 * np.pi * hertz * time_s for hertz in chosen]
+    waves = [wave(turn) for turn in turns for wave in (np.cos, np.sin)]
+    stacked = np.array([np.ones(samples), time_s, *waves]).T
     late = slice(samples - 2 * half, samples)
     factors = np.linalg.lstsq(stacked[late], response[late], rcond=None)[0]
     return np.asarray(stacked[:, 2:] @ factors[2:], dtype=np.float64), chosen
@@ -137,8 +135,7 @@ def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
         noise = np.maximum(noise, power * smoothed((1.0 - coherence) / coherence))
     applied = 0.0 if applied_s is None else 1.0 / applied_s
     plane = np.asarray(applied + 1j * omega, dtype=np.complex128)
-    nothing = np.zeros((len(omega), 0), dtype=np.complex128)
-    alone = np.ones(1, dtype=np.complex128)
+    nothing, alone = np.zeros((len(omega), 0), dtype=np.complex128), np.ones(1, dtype=np.complex128)
     return weighted(Lines(plane, each.response, np.ones(len(omega)), quantity, nothing, alone), noise)
 
 
@@ -157,7 +154,7 @@ def smoothed(power: FloatArray) -> FloatArray:
     return np.asarray(uniform_filter1d(level, width, mode="nearest"), dtype=np.float64)
 
 
-def neighbours_correlation(left: Sequence[ComplexArray]) -> ComplexArray:
+def correlation_of(left: Sequence[ComplexArray]) -> ComplexArray:
     """Correlation of the residual between lines 0, 1, 2, ... apart, if it is significant."""
     power = sum(float(np.sum(np.abs(part) ** 2)) for part in left)
     count = sum(len(part) for part in left)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -24,8 +24,8 @@ _TWINS = 0.25  # of the half width of a resonance
 _STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of the chart: the model one order lower has the pole too
 _APART = np.pi  # rad: two modes must come half a turn apart in the record
 _CHART_ORDERS = 20  # of the stabilisation chart
-_SAME_PLACE = 0.2  # of the half width of a resonance: two poles of the chart are one start
-_SAME_DAMPING = 0.2  # and in the logarithm of their damping
+# Two poles of the chart are one start: of the half width of a resonance, and in the logarithm of their damping.
+_SAME_PLACE, _SAME_DAMPING = 0.2, 0.2
 _MAX_DAMPING = 0.7  # of a pole to begin with
 _PATIENCE = 2  # Two models in a row that the data do not ask for end the search: one may only have missed its place
 
@@ -54,8 +54,7 @@ class Search:
 
     fits: tuple[Fit, ...]  # the best fit of each number of modes, from 1
     # by number of modes, from 0: samples * ln(mean square of the residual) + (parameters + modes) * ln(samples);
-    # lower is better. One more than the parameters is counted for each mode, because its place was looked for
-    # among all frequencies
+    # lower is better. One more is counted for each mode, as its place was looked for among all frequencies
     evidence: tuple[float, ...]
 
     @property
@@ -86,7 +85,7 @@ def search(problem: FitProblem, sought: Sought) -> Search:
 
 def evidence_of(problem: FitProblem, fit: Fit | None) -> float:
     """Evidence of a fit, as in `Search.evidence`; None: of a model without modes."""
-    squares, count, parameters, modes = problem.squares, problem.samples, problem.constants, 0
+    squares, count, parameters, modes = problem.squares, problem.samples, len(problem.responses), 0
     if fit is not None:
         squares, count, parameters = fit.sum_of_squares, fit.samples, fit.parameters
         modes = len(fit.omega_rad_s)
@@ -96,7 +95,9 @@ def evidence_of(problem: FitProblem, fit: Fit | None) -> float:
 
 def chart_modes(problem: FitProblem) -> Iterator[Starts]:
     """Modes of the models of a stabilisation chart, by number of modes from 1."""
-    for poles in problem.poles(max(1, min(_CHART_ORDERS, problem.chart_orders))):
+    orders = (min(map(len, problem.responses)) - 8) // 8  # that the shortest record has samples for
+    most = max(1, min(_CHART_ORDERS, orders))
+    for poles in _core.stabilisation_poles(problem.responses, most, problem.forces):
         omega, zeta = _core.poles_to_modes(list(poles), problem.period_s)
         yield list(zip(map(float, omega), map(float, zeta), strict=True))
 
@@ -121,20 +122,18 @@ def _pool(problem: FitProblem) -> Starts:
     kept: Starts = []
     for w, z in reversed([mode for modes in chart_modes(problem) for mode in modes]):
         inside = z < _MAX_DAMPING and low <= w / (2.0 * np.pi) <= high
-        if inside and not any(
-            abs(w - v) < _SAME_PLACE * min(z, y) * w and abs(np.log(z / y)) < _SAME_DAMPING for v, y in kept
-        ):
+        near = [y for v, y in kept if abs(w - v) < _SAME_PLACE * min(z, y) * w]
+        if inside and not any(abs(np.log(z / y)) < _SAME_DAMPING for y in near):
             kept.append((w, z))
     return kept
 
 
 def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None:
-    """The best fit with one mode more, started from peaks of the last residual and the pole that explains most of
-    it."""
+    """The best fit with one mode more, from peaks of the last residual and the pole that explains most of it."""
     so_far = [] if last is None else starts_of(last)
     candidates: list[Starts] = []
     for omega in problem.peaks_left(last):
-        alone = [_attempt(partial(problem.fit_left, [(omega, zeta)], last)) for zeta in _START_DAMPING]
+        alone = [_attempt(problem, [(omega, zeta)], left_by=last, quick=True) for zeta in _START_DAMPING]
         usable = [fit for fit in alone if fit is not None]
         if usable:
             candidates.append([*so_far, *starts_of(min(usable, key=lambda fit: fit.sum_of_squares))])
@@ -142,11 +141,11 @@ def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None
         chosen = problem.rank([*so_far, *pool], len(so_far))
         if len(chosen) > len(so_far):
             candidates.append([*so_far, pool[chosen[len(so_far)] - len(so_far)]])
-    fits = [fit for starts in candidates if (fit := _attempt(partial(problem.fit_quickly, starts))) is not None]
+    fits = [fit for starts in candidates if (fit := _attempt(problem, starts, quick=True)) is not None]
     # The full fit may still run into twins: then the next best start has its turn.
     for quick in sorted(fits, key=lambda fit: fit.sum_of_squares):
         if not _has_twins(quick, problem.duration_s):
-            fit = _attempt(partial(problem.fit, starts_of(quick)))
+            fit = _attempt(problem, starts_of(quick))
             if fit is not None and not _has_twins(fit, problem.duration_s):
                 return fit
     return None
@@ -163,24 +162,20 @@ def starts_of(fit: Fit) -> Starts:
     return [(float(omega), float(zeta)) for omega, zeta in zip(fit.omega_rad_s, fit.damping_ratio, strict=True)]
 
 
-def _attempt(task: Callable[[], Fit]) -> Fit | None:
+def _attempt(problem: FitProblem, starts: Starts, **how: Any) -> Fit | None:
     """A fit, or None where the start cannot be used (a mode at the end of the band, too few samples)."""
     try:
-        fit = task()
+        fit = problem.fit(starts, **how)
     except (_core.ArgumentError, _core.NumericError):
         return None
     return fit if np.isfinite(fit.sum_of_squares) else None
 
 
-#: A damping ratio or stiffness less certain than this is refused: 10 % are then four standard deviations off.
-ACCEPTED_PERCENT = 5.0
-_FREQUENCY_PERCENT = 2.0
-_NOT_AT_ALL_PERCENT = 1000.0
+ACCEPTED_PERCENT = 5.0  # A damping ratio or stiffness less certain is refused: 10 % are four standard deviations off
+_FREQUENCY_PERCENT, _NOT_AT_ALL_PERCENT = 2.0, 1000.0
 _NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
-#: What has not fallen to this share at the end of the record does not decay: mains hum, a pump, a turning spindle.
-LASTING = 0.8
-#: A model with one mode more counts as a rival while it fits better by more than chance alone does in one case of 20.
-_RIVAL_PROBABILITY = 0.05
+_LASTING = 0.8  # What has not fallen to this share at the end does not decay: mains hum, a pump, a turning spindle
+_RIVAL_PROBABILITY = 0.05  # A model with a mode more is a rival while chance alone would seldom make it fit better
 _UNKNOWN = 7.0  # half width of a logarithm that says nothing: a factor of a thousand
 SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
 TURNED = (
@@ -242,10 +237,10 @@ LOGARITHMS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, -1], [2, 0, -1]]
 
 @dataclass(frozen=True, eq=False)
 class _Logarithms:
-    """Logarithms of frequency (Hz), damping ratio, mass, viscous damping, stiffness (SI), and their covariance."""
+    """Logarithms of frequency (Hz), damping ratio, mass, viscous damping, stiffness (SI), and their variances."""
 
     values: FloatArray
-    covariance: FloatArray
+    variance: FloatArray
     opposed: bool
 
 
@@ -261,20 +256,19 @@ def _logarithms(fit: Fit, mode: int) -> _Logarithms:
     size = len(scale)
     block = fit.covariance[size * mode : size * (mode + 1), size * mode : size * (mode + 1)]
     covariance = change @ (block * np.outer(scale, scale)) @ change.T
-    return _Logarithms(np.array(values), covariance, residue < 0.0)
+    return _Logarithms(np.array(values), np.diag(covariance), residue < 0.0)
 
 
 def _half_widths(row: _Logarithms, quantile: float) -> FloatArray:
     """Half widths of the intervals; where the fit has no usable covariance, as wide as can be."""
-    variance = np.diag(row.covariance)
-    usable = np.isfinite(variance) & (variance >= 0.0)
-    return np.where(usable, quantile * np.sqrt(np.where(usable, variance, 0.0)), _UNKNOWN)
+    usable = np.isfinite(row.variance) & (row.variance >= 0.0)
+    return np.where(usable, quantile * np.sqrt(np.where(usable, row.variance, 0.0)), _UNKNOWN)
 
 
 def _scatter(taps: Sequence[_Logarithms], white_share: float) -> FloatArray:
     """Half widths from the scatter of single taps; 0 where noise explains it."""
     values = np.array([tap.values for tap in taps])
-    expected = np.mean([np.diag(tap.covariance) for tap in taps], axis=0) / white_share
+    expected = np.mean([tap.variance for tap in taps], axis=0) / white_share
     seen = np.var(values, axis=0, ddof=1)
     ratio = seen / np.maximum(expected, np.finfo(float).tiny)
     more = ratio > stats.chi2.ppf(1.0 - SCATTER_PROBABILITY, len(taps) - 1) / (len(taps) - 1)
@@ -312,11 +306,8 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
             f"{frequency.value * doubts.record_s:.1f} swings in the record of {doubts.record_s:.3g} s: "
             f"{MIN_SWINGS:g} or more are needed"
         )
-    lasting = lasting_share(frequency.value, damping.value, doubts.record_s)
-    if lasting > LASTING:
-        return lasting_refusal(lasting, doubts.record_s)
-    folded = 100.0 * doubts.aliased(frequency.value)
-    refusal = interval_refusal(mode, doubts.limit_percent, folded)
+    refusal = lasting_refusal(frequency.value, damping.value, doubts.record_s)[0]
+    refusal = refusal or interval_refusal(mode, doubts.limit_percent, 100.0 * doubts.aliased(frequency.value))
     if refusal:
         return refusal
     if mode.refusal or doubts.rival is None:
@@ -336,17 +327,14 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
     return ""
 
 
-def lasting_share(frequency_hz: float, damping_ratio: float, record_s: float) -> float:
-    """What is left of a mode at the end of a record."""
-    return float(np.exp(-2.0 * np.pi * frequency_hz * damping_ratio * record_s))
-
-
-def lasting_refusal(lasting: float, record_s: float) -> str:
-    """Why what does not decay is refused."""
-    return (
+def lasting_refusal(frequency_hz: float, damping_ratio: float, record_s: float) -> tuple[str, float]:
+    """Why what does not decay is refused, empty where it does; what is left at the end of the record."""
+    lasting = float(np.exp(-2.0 * np.pi * frequency_hz * damping_ratio * record_s))
+    said = (
         f"still at {100.0 * lasting:.0f} % after {record_s:.3g} s: a steady disturbance (mains, pump, "
         "spindle), or a record too short for a mode of so little damping"
     )
+    return said if lasting > _LASTING else "", lasting
 
 
 def interval_refusal(mode: IdentifiedMode, limit_percent: float, folded_percent: float = 0.0) -> str:
@@ -357,15 +345,15 @@ def interval_refusal(mode: IdentifiedMode, limit_percent: float, folded_percent:
         ("stiffness", mode.stiffness_n_per_m, limit_percent),
     )
     for name, estimate, limit in limits:
-        if estimate is not None and not estimate.uncertainty_percent <= limit:
-            if name == "stiffness" and folded_percent > 0.5 * limit:
-                return (
-                    f"{name} is known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} %): the pulse has "
-                    "few samples, and without an anti-aliasing filter they do not tell its force at this frequency; "
-                    "sample faster or take a softer tip"
-                )
-            known = f"to {estimate.uncertainty_percent:.2g} % only"
-            if estimate.uncertainty_percent > _NOT_AT_ALL_PERCENT:
-                known = "not at all"
-            return f"{name} is known {known} (limit {limit:g} %): more taps, a longer record or less noise"
+        if estimate is None or estimate.uncertainty_percent <= limit:
+            continue
+        known = f"{name} is known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} %)"
+        if name == "stiffness" and folded_percent > 0.5 * limit:
+            return (
+                f"{known}: the pulse has few samples, and without an anti-aliasing filter they do not tell its force "
+                "at this frequency; sample faster or take a softer tip"
+            )
+        if estimate.uncertainty_percent > _NOT_AT_ALL_PERCENT:
+            known = f"{name} is known not at all (limit {limit:g} %)"
+        return f"{known}: more taps, a longer record or less noise"
     return ""

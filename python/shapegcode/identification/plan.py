@@ -7,15 +7,11 @@ import textwrap
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from shapegcode.identification import checks
 from shapegcode.machine import Machine
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
-
-if TYPE_CHECKING:
-    from shapegcode.machine import Axis
 
 
 @dataclass(frozen=True)
@@ -90,30 +86,23 @@ class TapPlan(Result):
         return [Table("recording", columns, self.recordings)]
 
 
-#: Modes of a machining centre that its own motion excites, Hz; for a plan without a machine file.
-_USUAL_HZ = (20.0, 200.0)
+_USUAL_HZ = (20.0, 200.0)  # Modes of a machining centre that its own motion excites; for a plan without a machine file
 _USUAL_DAMPING = 0.02  # Damping ratio where none is known: welded and cast structures with guides have 0.01 to 0.05
-_LOOK_ABOVE = 2.0  # Modes are looked for up to this multiple of the highest one known
-#: ... and up to here in any case: a mode that the machine file does not state is found only where it is looked for.
-_LOOK_LEAST_HZ = 500.0
+# Modes are looked for up to this multiple of the highest one known, and in any case up to so many Hz.
+_LOOK_ABOVE, _LOOK_LEAST_HZ = 2.0, 500.0
 _PULSE_SAMPLES = 10  # Samples in the pulse of the hammer: a half sine of ten is known to a percent
 _FALLEN_TO = 0.01  # The record lasts until the slowest mode has fallen to this share
 _PERIODS = 20  # ... and at least so many of its periods
-_PRE_TRIGGER_SHARE = 0.1
-_PRE_TRIGGER_SAMPLES = 100
-_TAPS = 5
+_PRE_TRIGGER_SHARE, _PRE_TRIGGER_SAMPLES = 0.1, 100
 _RATES = (1.0, 2.0, 2.5, 5.0, 10.0)
-#: Frequency up to which a tip excites at most, typically; its pulse is no shorter than that needs.
-_TIPS = (
+_TIPS = (  # Frequency up to which a tip excites at most, typically; its pulse is no shorter than that needs
     (300.0, "soft rubber"),
     (1000.0, "hard rubber or soft plastic"),
     (3000.0, "hard plastic (nylon)"),
     (math.inf, "steel, small hammer"),
 )
 _AXES = ("X", "Y", "Z")
-_STOPS = 5
-_LONG_STOP_S = 2.0
-_WIDTH = 80
+_TAPS, _STOPS, _LONG_STOP_S, _WIDTH = 5, 5, 2.0, 80
 
 
 def _round_up(value: float) -> float:
@@ -132,17 +121,8 @@ def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisReco
     fallen = max(math.log(1.0 / _FALLEN_TO) / (2.0 * math.pi * f * (z or _USUAL_DAMPING)) for f, z in known)
     duration = _round_up(max(fallen, _PERIODS / min(f for f, _ in known)))
     lead = max(_PRE_TRIGGER_SHARE * duration, _PRE_TRIGGER_SAMPLES / rate)
-    return AxisRecording(
-        axis, tuple(sorted({frequency for frequency, _ in modes})), highest, rate, duration, lead, pulse, tip
-    )
-
-
-def _modes(axis: Axis) -> tuple[tuple[float, float], ...]:
-    return tuple(
-        (frequency, mode.damping_ratio)
-        for mode in axis.modes
-        for frequency in (mode.frequency_over.frequency_hz if mode.frequency_over else (mode.frequency_hz,))
-    )
+    known_hz = tuple(sorted({frequency for frequency, _ in modes}))
+    return AxisRecording(axis, known_hz, highest, rate, duration, lead, pulse, tip)
 
 
 def rapid_stop_program(axis: str, distance_mm: float, dwell_s: float) -> str:
@@ -153,16 +133,6 @@ def rapid_stop_program(axis: str, distance_mm: float, dwell_s: float) -> str:
     dwell = f"G04 P{round(1000.0 * dwell_s)}"
     lines += [f"G00 {axis}{there}", dwell, f"G00 {axis}{back}", dwell] * _STOPS
     return "\n".join([*lines, "G90", "M30", "%"]) + "\n"
-
-
-def _stop_distance_mm(machine: Machine | None, index: int) -> float:
-    """A rapid long enough to reach its rate and to travel at it for as long as it takes to reach it."""
-    if machine is None:
-        return 100.0
-    rate = machine.axes.as_tuple()[index].rapid_mm_per_min / 60.0
-    ramp = machine.controller.rapid_time_constant_s
-    seconds = ramp if isinstance(ramp, float) else (ramp.x, ramp.y, ramp.z)[index]
-    return max(10.0, 10.0 * math.ceil(2.0 * rate * seconds / 10.0))
 
 
 def _instructions(about: str, recordings: tuple[AxisRecording, ...], stops: tuple[RapidStop, ...]) -> str:
@@ -198,6 +168,7 @@ def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
     """
     machine = None if machine is None else Machine.of(machine)
     usual = f"{_USUAL_HZ[0]:g} to {_USUAL_HZ[1]:g} Hz"
+    distances_mm = [100.0] * len(_AXES)
     if machine is None:
         recordings: tuple[AxisRecording, ...] = (recording_for("X Y Z", ()),)
         about = (
@@ -206,17 +177,28 @@ def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
             "modes."
         )
     else:
-        named = zip(_AXES, machine.axes.as_tuple(), strict=True)
-        recordings = tuple(recording_for(name, _modes(axis)) for name, axis in named)
+        axes = machine.axes.as_tuple()
+        modes = [
+            [
+                (frequency, mode.damping_ratio)
+                for mode in axis.modes
+                for frequency in (mode.frequency_over.frequency_hz if mode.frequency_over else (mode.frequency_hz,))
+            ]
+            for axis in axes
+        ]
+        recordings = tuple(recording_for(name, tuple(each)) for name, each in zip(_AXES, modes, strict=True))
+        # Long enough to reach the rapid rate and to travel at it for as long as it takes to reach it.
+        ramps_s = machine.controller.rapid_time_constant_s.as_tuple()
+        reached = (axis.rapid_mm_per_min / 60.0 * ramp_s for axis, ramp_s in zip(axes, ramps_s, strict=True))
+        distances_mm = [max(10.0, 10.0 * math.ceil(2.0 * each / 10.0)) for each in reached]
         about = (
             f"Lengths follow from the modes of the machine file (an axis without modes: {usual}); every axis is "
             f"measured up to {_LOOK_LEAST_HZ:g} Hz or more, as there may be modes that the file does not state."
         )
     dwell_s = max(_LONG_STOP_S, 2.0 * max(how.duration_s for how in recordings))
-    ways = [_stop_distance_mm(machine, index) for index in range(len(_AXES))]
     stops = tuple(
-        RapidStop(axis, way, dwell_s, rapid_stop_program(axis, way, dwell_s))
-        for axis, way in zip(_AXES, ways, strict=True)
+        RapidStop(axis, distance_mm, dwell_s, rapid_stop_program(axis, distance_mm, dwell_s))
+        for axis, distance_mm in zip(_AXES, distances_mm, strict=True)
     )
     text = _instructions(about, recordings, stops)
     return TapPlan(None if machine is None else machine.name, recordings, stops, text)

@@ -12,7 +12,6 @@ import numpy as np
 
 from shapegcode.identification.result import Identification
 from shapegcode.identification.spectra import decay_spectrum, frf, mode_envelopes
-from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.record import UNITS, Record
 from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
@@ -21,9 +20,7 @@ from shapegcode.results.outcome import Plot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MAX_TRACES = 3
-_SEEN = 0.02
-_ROOM = 2.5
+_MAX_TRACES, _SEEN, _ROOM = 3, 0.02, 2.5
 _FILE_TIME = "time in the file in s"
 _FAINT = 0.35  # opacity of poles that are not stable
 _MIN_SHOWN = 1e-5  # of the largest value, on a logarithmic axis
@@ -37,23 +34,17 @@ _MEASURED, _FITTED = plot.GREY, plot.COLOURS[0]
 def plots_of(found: Identification) -> dict[str, Plot]:
     """Its pictures by name."""
     if found.sweep is not None:
-        return {"identify-sweep": partial(plot_sweep, found)}
-    if found.responses:
-        return {
-            "identify-response": partial(plot_response, found),
-            "identify-stabilisation": partial(plot_stabilisation, found),
-        }
-    pictures: dict[str, Plot] = {
-        "identify-traces": partial(plot_traces, found),
-        "identify-stabilisation": partial(plot_stabilisation, found),
-    }
-    if found.modes:
-        pictures["identify-decay"] = partial(plot_decay, found)
-    if found.decay:
-        pictures["identify-spectrum"] = partial(plot_spectrum, found)
+        names = ["sweep"]
+    elif found.responses:
+        names = ["response", "stabilisation"]
     else:
-        pictures["identify-response"] = partial(plot_response, found)
-    return pictures
+        decays = ["decay"] if found.modes else []
+        names = ["traces", "stabilisation", *decays, "spectrum" if found.decay else "response"]
+    drawn_by = {
+        "traces": plot_traces, "response": plot_response, "stabilisation": plot_stabilisation, "decay": plot_decay,
+        "spectrum": plot_spectrum, "sweep": plot_sweep,
+    }  # fmt: skip
+    return {f"identify-{name}": partial(drawn_by[name], found) for name in names}
 
 
 def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:
@@ -79,14 +70,19 @@ def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:
             column[0].plot(time_s, record.force_n, color="black", linewidth=1.0)
             column[0].set_ylabel("force in N")
         panel = column[-1]
-        panel.plot(time_s, record.response, color=_MEASURED, linewidth=2.2, label="measured")
-        panel.plot(time_s, fitted, "--", color=_FITTED, linewidth=1.1, label="model")
-        panel.set_xlim(time_s[0], time_s[_last_seen(np.asarray(fitted))])
-        panel.set_ylabel(_quantity(record))
-        panel.set_xlabel(_FILE_TIME if found.decay else "time in s")
+        _draw_both(panel, time_s, record.response, fitted)
+        large = np.flatnonzero(np.abs(fitted - fitted[-1]) > _SEEN * np.abs(fitted).max())
+        last = int(large[-1]) if len(large) else len(fitted) - 1
+        xlabel = _FILE_TIME if found.decay else "time in s"
+        panel.set(xlim=(time_s[0], time_s[last]), ylabel=_quantity(record), xlabel=xlabel)
         column[0].set_title(Path(record.source).name, fontsize=9, loc="right")
         plot.legend_above(panel)
     return panels[0][0]
+
+
+def _draw_both(panel: Axes, x: FloatArray, measured: FloatArray, fitted: FloatArray) -> None:
+    panel.plot(x, measured, color=_MEASURED, linewidth=2.2, label="measured")
+    panel.plot(x[: len(fitted)], fitted, "--", color=_FITTED, linewidth=1.1, label="model")
 
 
 def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
@@ -99,30 +95,31 @@ def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
     Returns:
         The panel of the magnitude.
     """
-    measured, model, title = _responses(found)
+    if found.responses:
+        measured, name = found.responses[0], Path(found.responses[0].source).name
+        model, title = replace(measured, response=found.fitted_lines[0], coherence=None), f"Frequency response: {name}"
+    else:
+        measured, model = frf(found.fitted_records), frf(_as_fitted(found))
+        taps = len(found.taps)
+        title = f"Frequency response, {taps} {'tap' if taps == 1 else 'taps averaged'}"
     seen = _seen(measured.frequency_hz, found)
     rows = 2 if measured.coherence is None else 3
     column = plot.column(ax, rows, size_inch=(9.0, 2.1 + 1.8 * rows), title=title)
     magnitude, phase = column[:2]
-    for each, style, colour, width, label in (
-        (measured, "-", _MEASURED, 2.2, "measured"),
-        (model, "--", _FITTED, 1.1, "model"),
-    ):
-        frequency, ratio = each.frequency_hz[seen], each.response[seen]
-        magnitude.semilogy(frequency, np.abs(ratio), style, color=colour, linewidth=width, label=label)
-        # From -90 to 270 degrees: below a mode the phase of an acceleration is 180 and noise would wrap it.
-        phase.plot(frequency, 90.0 + np.degrees(np.angle(-1j * ratio)), style, color=colour, linewidth=width)
+    magnitude.set_yscale("log")
+    lines = [each.response[seen] for each in (measured, model)]
+    _draw_both(magnitude, measured.frequency_hz[seen], *(np.abs(ratio) for ratio in lines))
+    # From -90 to 270 degrees: below a mode the phase of an acceleration is 180 and noise would wrap it.
+    degrees = (90.0 + np.degrees(np.angle(-1j * ratio)) for ratio in lines)
+    _draw_both(phase, measured.frequency_hz[seen], *degrees)
     if measured.coherence is not None:
         column[2].plot(measured.frequency_hz[seen], measured.coherence[seen], color=plot.COLOURS[1], linewidth=1.0)
-        column[2].set_ylabel("coherence")
-        column[2].set_ylim(0.0, 1.05)
-    magnitude.set_ylabel(f"({UNITS[measured.quantity]})/N")
-    phase.set_ylabel("phase in degrees")
-    phase.set_yticks([-90, 0, 90, 180, 270])
+        column[2].set(ylabel="coherence", ylim=(0.0, 1.05))
+    phase.set(ylabel="phase in degrees", yticks=[-90, 0, 90, 180, 270])
     column[-1].set_xlabel("frequency in Hz")
     column[-1].margins(x=0.01)
     bottom, top = magnitude.get_ylim()
-    magnitude.set_ylim(bottom, 4.0 * top)  # room for the labels
+    magnitude.set(ylabel=f"({UNITS[measured.quantity]})/N", ylim=(bottom, 4.0 * top))  # room for the labels
     _mark_modes(column, found)
     plot.legend_above(magnitude)
     return magnitude
@@ -166,10 +163,8 @@ def plot_stabilisation(found: Identification, ax: Axes | None = None) -> Axes:
         )  # fmt: skip
     panel.plot([], [], color="#c8c8c8", linewidth=1.0, label="spectrum")
     panel.axhline(found.order, color="black", linewidth=0.8, linestyle="--", label=f"chosen: {found.order}")
-    panel.set_xlabel("frequency in Hz")
-    panel.set_ylabel("modes in the model")
+    panel.set(xlabel="frequency in Hz", ylabel="modes in the model", xlim=(frequency[seen][0], highest))
     panel.set_yticks(range(1, max((pole.order for pole in found.chart), default=1) + 1))
-    panel.set_xlim(frequency[seen][0], highest)
     panel.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, frameon=False, borderaxespad=0.2, fontsize=9,
         columnspacing=1.2, handletextpad=0.4,
@@ -204,13 +199,15 @@ def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
     for panel, frequency, measured, fitted, rest in zip(column, frequencies, *bands, strict=True):
         top = float(measured.max())
         noise = max(float(np.median(rest)), _MIN_SHOWN * top)
-        end = _first_below(fitted, _CLEAR * noise)
+        peak = int(np.argmax(fitted))
+        below = np.flatnonzero(fitted[peak:] < _CLEAR * noise)
+        end = peak + int(below[0]) if len(below) else len(fitted)
         longest = max(longest, end)
-        panel.semilogy(time_s, measured, color=_MEASURED, linewidth=2.2, label="measured")
-        panel.semilogy(time_s[:end], fitted[:end], "--", color=_FITTED, linewidth=1.1, label="model")
+        panel.set_yscale("log")
+        _draw_both(panel, time_s, measured, fitted[:end])
         panel.axhline(noise, color="black", linewidth=0.8, linestyle=":", label="noise in the band")
-        panel.set_ylim(_BELOW_NOISE * noise, 2.0 * top)
-        panel.set_ylabel(f"{plot.number(frequency, 4)} Hz, {UNITS[record.quantity]}")
+        unit = f"{plot.number(frequency, 4)} Hz, {UNITS[record.quantity]}"
+        panel.set(ylim=(_BELOW_NOISE * noise, 2.0 * top), ylabel=unit)
     for panel in column:
         panel.set_xlim(time_s[0], time_s[min(round(_BEYOND_NOISE * longest), len(time_s) - 1)])
     column[-1].set_xlabel(_FILE_TIME if found.decay else "time since the hit in s")
@@ -235,14 +232,12 @@ def plot_spectrum(found: Identification, ax: Axes | None = None) -> Axes:
     top = float(amplitude.max())
     panel.semilogy(spectrum.frequency_hz[seen], amplitude, color=plot.COLOURS[1], linewidth=1.2)
     panel.margins(x=0.01)
-    panel.set_xlabel("frequency in Hz")
-    panel.set_ylabel(_quantity(found.taps[0]))
-    panel.set_ylim(max(_BELOW_NOISE * float(np.median(amplitude)), _MIN_SHOWN * top), 3.0 * top)
+    lowest = max(_BELOW_NOISE * float(np.median(amplitude)), _MIN_SHOWN * top)
+    panel.set(xlabel="frequency in Hz", ylabel=_quantity(found.taps[0]), ylim=(lowest, 3.0 * top))
     for peak in spectrum.peaks:
         if peak.frequency_hz <= spectrum.frequency_hz[seen][-1]:
-            panel.annotate(
-                peak.label, (peak.frequency_hz, peak.amplitude), (0, 6), textcoords="offset points", ha="center"
-            )
+            top_of = peak.frequency_hz, peak.amplitude
+            panel.annotate(peak.label, top_of, (0, 6), textcoords="offset points", ha="center")
     return panel
 
 
@@ -259,10 +254,9 @@ def plot_sweep(found: Identification, ax: Axes | None = None) -> Axes:
     sweep = found.sweep
     assert sweep is not None
     panel = plot.axes(ax, size_inch=(9.0, 4.5))
-    panel.semilogy(sweep.frequency_hz, sweep.amplitude, color=_MEASURED, linewidth=2.2, label="measured")
-    panel.semilogy(sweep.frequency_hz, sweep.fitted, "--", color=_FITTED, linewidth=1.1, label="model")
-    panel.set_xlabel("frequency in Hz")
-    panel.set_ylabel("acceleration over that\nof the command, any unit")
+    panel.set_yscale("log")
+    _draw_both(panel, sweep.frequency_hz, sweep.amplitude, sweep.fitted)
+    panel.set(xlabel="frequency in Hz", ylabel="acceleration over that\nof the command, any unit")
     _mark_modes([panel], found)
     plot.legend_above(panel)
     return panel
@@ -273,38 +267,21 @@ def _quantity(record: Record) -> str:
 
 
 def _as_fitted(found: Identification) -> list[Record]:
-    """The same with the model's response."""
     return [
         replace(record, response=np.asarray(fitted))
         for record, fitted in zip(found.fitted_records, found.fitted, strict=True)
     ]
 
 
-def _responses(found: Identification) -> tuple[FrequencyResponse, FrequencyResponse, str]:
-    """Measured lines and those of the model, and what they are."""
-    if found.responses:
-        measured = found.responses[0]
-        model = replace(measured, response=found.fitted_lines[0], coherence=None)
-        return measured, model, f"Frequency response: {Path(measured.source).name}"
-    taps = len(found.taps)
-    title = f"Frequency response, {taps} {'tap' if taps == 1 else 'taps averaged'}"
-    return frf(found.fitted_records), frf(_as_fitted(found)), title
-
-
 def _spectrum(found: Identification) -> tuple[FloatArray, FloatArray]:
     """Frequencies and root mean square over the records of their amplitude spectra, 2/n |FFT|."""
     if found.responses:
         return found.responses[0].frequency_hz, np.abs(found.responses[0].response)
-    parts = found.fitted_records
-    count = 1 << max(len(part.response) for part in parts).bit_length()
-    squares = [
-        (2.0 / len(part.response) * np.abs(np.fft.rfft(part.response - part.response.mean(), count))) ** 2
-        for part in parts
-    ]
-    return (
-        np.asarray(np.fft.rfftfreq(count, parts[0].period_s), dtype=np.float64),
-        np.asarray(np.sqrt(np.mean(squares, axis=0)), dtype=np.float64),
-    )
+    parts = [record.response for record in found.fitted_records]
+    count = 1 << max(map(len, parts)).bit_length()
+    squares = [(2.0 / len(part) * np.abs(np.fft.rfft(part - part.mean(), count))) ** 2 for part in parts]
+    frequency = np.fft.rfftfreq(count, found.fitted_records[0].period_s)
+    return np.asarray(frequency, dtype=np.float64), np.asarray(np.sqrt(np.mean(squares, axis=0)), dtype=np.float64)
 
 
 def _seen(frequency_hz: FloatArray, found: Identification, peaks_hz: Sequence[float] = ()) -> slice:
@@ -314,7 +291,6 @@ def _seen(frequency_hz: FloatArray, found: Identification, peaks_hz: Sequence[fl
 
 
 def _mark_modes(column: list[Axes], found: Identification) -> None:
-    """Thin lines at the modes, refused ones dotted, their frequencies above."""
     for mode in (*found.modes, *found.refused):
         hertz, style = mode.frequency_hz.value, ":" if mode.refusal else "--"
         for panel in column:
@@ -323,16 +299,3 @@ def _mark_modes(column: list[Axes], found: Identification) -> None:
             f"{plot.number(hertz, 4)} Hz", (hertz, 0.98), (3, 0), xycoords=("data", "axes fraction"),
             textcoords="offset points", va="top", fontsize=8,
         )  # fmt: skip
-
-
-def _first_below(envelope: FloatArray, level: float) -> int:
-    """The first sample behind the largest that lies below a level, or the number of samples."""
-    peak = int(np.argmax(envelope))
-    below = np.flatnonzero(envelope[peak:] < level)
-    return peak + int(below[0]) if len(below) else len(envelope)
-
-
-def _last_seen(fitted: FloatArray) -> int:
-    """The last sample that a plot shows."""
-    large = np.flatnonzero(np.abs(fitted - fitted[-1]) > _SEEN * np.abs(fitted).max())
-    return int(large[-1]) if len(large) else len(fitted) - 1

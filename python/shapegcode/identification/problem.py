@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import firwin, kaiserord, oaconvolve
 
 from shapegcode import _core
@@ -23,51 +22,47 @@ _STEPS, _QUICK_STEPS = 60, 15  # of a fit; of one that only shows where a mode m
 _PEAKS = 2  # of the residual's spectrum that are tried
 
 
-class _OverTime:
-    """What records over time have in common, taps or decays."""
+@dataclass(frozen=True, eq=False)
+class FitProblem:
+    """Records over time: taps with force, or free decays without."""
 
-    forces: list[FloatArray] | None
-    responses: list[FloatArray]
-    period_s: float
-    band_hz: tuple[float, float]
-    quantity: str
+    responses: list[FloatArray]  # (n,) each, in the unit of the quantity
+    forces: list[FloatArray] | None  # (n,) each, N; None: decays
+    period_s: float  # time between two samples
+    band_hz: tuple[float, float]  # modes are looked for in it
+    widened: float  # what intervals are multiplied with; see `Record`
+    quantity: str = "acceleration"  # what the sensor measured; of decays whatever it is: amplitudes are fitted
+    force_noise_n: float = 0.0  # RMS of the force off the pulse
+    hold: str = "band_limited"  # course of the force between samples: "band_limited", "linear" or "impulse"
+    thinned: Thinned | None = None  # what was thinned out before the fit; None: every sample is fitted
+    starts_in_pulse: bool = False  # the record begins within the pulse
 
-    def _fit(self, starts: Starts, responses: list[FloatArray], *, coloured: bool = False, quick: bool = False) -> Fit:
-        raise NotImplementedError
-
-    def fit(self, starts: Starts, coloured: bool = False) -> Fit:
-        """The best model near some modes, its residual white or coloured."""
-        return self._fit(starts, self.responses, coloured=coloured)
-
-    def fit_quickly(self, starts: Starts) -> Fit:
-        """A model in a few steps."""
-        return self._fit(starts, self.responses, quick=True)
-
-    def fit_left(self, starts: Starts, last: Fit | None) -> Fit:
-        """A model in a few steps of what another one leaves."""
-        return self._fit(starts, self.left(last), quick=True)
-
-    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
-        """Discrete poles of models with 1 to `most` modes."""
-        return _core.stabilisation_poles(self.responses, most, self.forces)
+    def fit(self, starts: Starts, *, left_by: Fit | None = None, coloured: bool = False, quick: bool = False) -> Fit:
+        """The best model near some modes, its residual white or coloured; or in a few steps, of what another leaves."""
+        omega, zeta = np.array(starts).T
+        responses, steps = self.left(left_by), _QUICK_STEPS if quick else _STEPS
+        if self.forces is None:
+            return _core.fit_decay(
+                responses, self.period_s, omega, zeta, coloured_residuals=coloured, most_iterations=steps
+            )
+        return _core.fit_modes(
+            self.forces, responses, self.period_s, omega, zeta, quantity=self.quantity, hold=self.held,
+            # What is read after a blow lacks the force over the mass: so much of the force is fitted along.
+            with_mass_line=self.hold == "impulse" and self.held != "impulse" and self.quantity == "acceleration",
+            force_noise_n=0.0 if quick else self.force_noise_n, coloured_residuals=coloured, most_iterations=steps,
+        )  # fmt: skip
 
     def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
         """Indices of the candidates that explain most in addition to those already chosen."""
         omega, zeta = np.array(candidates).T
-        ranking = _core.rank_modes(
-            self.responses, self.period_s, omega, zeta, kept + 1, self.forces, self.quantity, kept
-        )
+        records = self.responses, self.period_s
+        ranking = _core.rank_modes(*records, omega, zeta, kept + 1, self.forces, self.quantity, kept)
         return [int(index) for index in ranking.chosen]
 
     @property
     def samples(self) -> int:
         """Of all records together."""
-        return sum(len(response) for response in self.responses)
-
-    @property
-    def constants(self) -> int:
-        """Parameters of a model without modes: an offset per record."""
-        return len(self.responses)
+        return sum(map(len, self.responses))
 
     @property
     def squares(self) -> float:
@@ -77,12 +72,17 @@ class _OverTime:
     @property
     def duration_s(self) -> float:
         """Of the longest record."""
-        return max(len(response) for response in self.responses) * self.period_s
+        return max(map(len, self.responses)) * self.period_s
 
     @property
-    def chart_orders(self) -> int:
-        """Number of modes that the shortest record has samples for."""
-        return (min(len(response) for response in self.responses) - 8) // 8
+    def white_share(self) -> float:
+        """Share of white noise that reaches the samples: so many of them are independent."""
+        return (1.0 if self.thinned is None else self.thinned.white_share) / self.widened**2
+
+    @property
+    def held(self) -> str:
+        """Course of the force that is fitted: what was thinned out is band-limited, whatever it was."""
+        return self.hold if self.thinned is None else "band_limited"
 
     def left(self, last: Fit | None) -> list[FloatArray]:
         """What a model leaves of the responses."""
@@ -93,7 +93,7 @@ class _OverTime:
     def peaks_left(self, last: Fit | None) -> list[float]:
         """Frequencies (rad/s) of the highest peaks within the band of what a model leaves, the highest first."""
         residuals = self.left(last)
-        length = 2 * max(len(residual) for residual in residuals)
+        length = 2 * max(map(len, residuals))
         power = np.zeros(length // 2 + 1)
         for residual in residuals:
             power += np.abs(np.fft.rfft(residual - residual.mean(), length)) ** 2
@@ -103,38 +103,7 @@ class _OverTime:
         highest = inner[np.argsort(power[inner])[::-1][:_PEAKS]]
         return [float(2.0 * np.pi * frequency[index]) for index in highest]
 
-
-@dataclass(frozen=True, eq=False)
-class Taps(_OverTime):
-    """Records with force."""
-
-    forces: list[FloatArray]  # (n,) each, N
-    responses: list[FloatArray]  # (n,) each, in the unit of the quantity
-    period_s: float  # time between two samples
-    band_hz: tuple[float, float]  # modes are looked for in it
-    quantity: str  # what the sensor measured
-    force_noise_n: float  # RMS of the force off the pulse
-    hold: str  # course of the force between samples: "band_limited", "linear" or "impulse"
-    thinned: Thinned | None = None  # what was thinned out before the fit; None: every sample is fitted
-    starts_in_pulse: bool = False  # the record begins within the pulse
-    widened: float = 1.0  # what intervals are multiplied with; see `Record`
-
-    @property
-    def white_share(self) -> float:
-        """Share of white noise that reaches the samples: so many of them are independent."""
-        return (1.0 if self.thinned is None else self.thinned.white_share) / self.widened**2
-
-    @property
-    def noise_correlation(self) -> float:
-        """Between two samples on end, of noise that was white."""
-        return 0.0 if self.thinned is None else self.thinned.noise_correlation
-
-    @property
-    def held(self) -> str:
-        """Course of the force that is fitted: what was thinned out is band-limited, whatever it was."""
-        return self.hold if self.thinned is None else "band_limited"
-
-    def other_courses(self, near: Fit) -> list[Taps]:
+    def other_courses(self, near: Fit) -> list[FitProblem]:
         """The same taps with every other course that the force may take between its samples."""
         if self.thinned is None:
             return [replace(self, hold="linear"), replace(self, hold="impulse")]
@@ -142,56 +111,16 @@ class Taps(_OverTime):
             return []
         straight, responses = self.thinned.straight, self.responses
         # An acceleration holds the force over the mass as it was at the samples, whatever its course between them.
-        if self.quantity == "acceleration" and isinstance(near, _core.ModalFit):
+        if self.quantity == "acceleration" and isinstance(near, _core.ModalFit) and self.forces is not None:
             free = float(np.sum(near.inverse_mass))
             parts = zip(responses, self.forces, straight, strict=True)
             responses = [response - free * (sampled - course) for response, sampled, course in parts]
         return [replace(self, forces=straight, responses=responses, hold="linear")]
 
-    def _fit(
-        self, starts: Starts, responses: list[FloatArray], *, coloured: bool = False, quick: bool = False
-    ) -> _core.ModalFit:
-        omega, zeta = np.array(starts).T
-        return _core.fit_modes(
-            self.forces, responses, self.period_s, omega, zeta, quantity=self.quantity, hold=self.held,
-            # What is read after a blow lacks the force over the mass: so much of the force is fitted along.
-            with_mass_line=self.hold == "impulse" and self.held != "impulse" and self.quantity == "acceleration",
-            force_noise_n=0.0 if quick else self.force_noise_n, coloured_residuals=coloured,
-            most_iterations=_QUICK_STEPS if quick else _STEPS,
-        )  # fmt: skip
-
-    def record(self, index: int) -> Taps:
+    def record(self, index: int) -> FitProblem:
         """One record alone."""
-        return replace(self, forces=[self.forces[index]], responses=[self.responses[index]])
-
-
-@dataclass(frozen=True, eq=False)
-class Decays(_OverTime):
-    """Records without force."""
-
-    responses: list[FloatArray]  # (n,) each
-    period_s: float  # time between two samples
-    band_hz: tuple[float, float]  # modes are looked for in it
-    white_share: float  # of the samples, how many are independent
-    forces: None = None
-    quantity: str = "acceleration"  # whatever it is: amplitudes are fitted
-    noise_correlation: float = 0.0  # none
-
-    def _fit(
-        self, starts: Starts, responses: list[FloatArray], *, coloured: bool = False, quick: bool = False
-    ) -> _core.DecayFit:
-        omega, zeta = np.array(starts).T
-        steps = _QUICK_STEPS if quick else _STEPS
-        return _core.fit_decay(
-            responses, self.period_s, omega, zeta, coloured_residuals=coloured, most_iterations=steps
-        )
-
-    def record(self, index: int) -> Decays:
-        """One record alone."""
-        return replace(self, responses=[self.responses[index]])
-
-
-FitProblem = Taps | Decays
+        forces = None if self.forces is None else [self.forces[index]]
+        return replace(self, forces=forces, responses=[self.responses[index]])
 
 
 def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: bool = False) -> FitProblem:
@@ -209,27 +138,22 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
         band = band_hz if within else (min(band[0], band_hz[0]), max(band[1], band_hz[1]))
     widest = max(record.widened for record in ready.records)
     if first.force_n is None:
-        return Decays(responses, first.period_s, band, 1.0 / widest**2)
+        return FitProblem(responses, None, first.period_s, band, widest)
     forces = [record.force_n for record in ready.records if record.force_n is not None]
     noise = [each.force_noise_n for each in ready.usable if each.force_noise_n is not None]
     noise_n = float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0
-    in_pulse = any(force[0] != 0.0 for force in forces)
-    taps = Taps(
-        forces, responses, first.period_s, band, first.quantity, noise_n, "band_limited", None, in_pulse, widest
-    )
+    taps = FitProblem(
+        responses, forces, first.period_s, band, widest, first.quantity, noise_n,
+        starts_in_pulse=any(force[0] != 0.0 for force in forces),
+    )  # fmt: skip
     thinned = thin(ready, highest_of_interest_hz(ready, None if band_hz is None else band_hz[1]))
     if thinned is None:
         return taps
     return replace(
-        taps,
-        forces=thinned.forces,
-        responses=thinned.responses,
-        period_s=thinned.period_s,
-        band_hz=(band[0], min(band[1], FLAT / thinned.period_s)),
-        force_noise_n=taps.force_noise_n * thinned.force_noise,
-        thinned=thinned,
+        taps, forces=thinned.forces, responses=thinned.responses, period_s=thinned.period_s, thinned=thinned,
+        band_hz=(band[0], min(band[1], FLAT / thinned.period_s)), force_noise_n=noise_n * thinned.force_noise,
         hold="impulse" if are_blows(ready) else taps.hold,
-    )
+    )  # fmt: skip
 
 
 FLAT = 0.35  # Of the new sampling rate: the filter is flat up to here

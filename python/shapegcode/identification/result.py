@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -36,7 +37,6 @@ class Estimate:
     high: float
 
     def __post_init__(self) -> None:
-        """Numbers of Python, whatever they come as."""
         for name in ("value", "low", "high"):
             object.__setattr__(self, name, float(getattr(self, name)))
 
@@ -99,16 +99,7 @@ def mode_line(mode: IdentifiedMode) -> str:
         ("c", mode.damping_n_s_per_m, 1.0, "N s/m"),
         ("k", mode.stiffness_n_per_m, 1e-6, "N/µm"),
     )
-    parts = (
-        f"{name} {estimate_cell(estimate, factor)} {unit}"
-        for name, estimate, factor, unit in named
-        if estimate is not None
-    )
-    return ", ".join(parts)
-
-
-def _decimals(half: float) -> int:
-    return min(max(0, 1 - math.floor(math.log10(half))), 6)
+    return ", ".join(f"{name} {estimate_cell(each, factor)} {unit}" for name, each, factor, unit in named if each)
 
 
 def estimate_cell(estimate: Estimate | None, factor: float) -> str:
@@ -119,11 +110,12 @@ def estimate_cell(estimate: Estimate | None, factor: float) -> str:
     above, below = high - value, value - low
     if not (math.isfinite(above) and math.isfinite(below) and above > 0.0 and below > 0.0):
         return f"{value:.4g} ({low:.4g} ... {high:.4g})"
-    if max(above, below) > _SKEWED * min(above, below):
-        decimals = _decimals(min(above, below))
+    skewed = max(above, below) > _SKEWED * min(above, below)
+    half = min(above, below) if skewed else max(above, below)
+    decimals = min(max(0, 1 - math.floor(math.log10(half))), 6)
+    if skewed:
         return f"{value:z.{decimals}f} ({low:z.{decimals}f} ... {high:z.{decimals}f})"
-    decimals = _decimals(max(above, below))
-    return f"{value:z.{decimals}f} ± {max(above, below):.{decimals}f}"
+    return f"{value:z.{decimals}f} ± {half:.{decimals}f}"
 
 
 @dataclass(frozen=True)
@@ -278,18 +270,16 @@ class Identification(Result):
         if self.sweep is not None:
             sweep = self.sweep
             return (RecordUse(sweep.source, True, "", sweep.samples, sweep.period_s, quantity="acceleration"),)
-        if self.prepared is None:
-            return tuple(
-                RecordUse(
-                    each.source, True, "", len(each.response), quantity=each.quantity, resolution_hz=each.resolution_hz
-                )
-                for each in self.responses
-            )
         used = []
+        for lines in self.responses:
+            about: dict[str, Any] = {"quantity": lines.quantity, "resolution_hz": lines.resolution_hz}
+            used.append(RecordUse(lines.source, True, "", len(lines.response), **about))
+        if self.prepared is None:
+            return tuple(used)
         for each in self.prepared.usable:
             tap = each.record
-            about = len(tap.response), tap.period_s, tap.start_s, tap.quantity, each.excited_hz
-            used.append(RecordUse(tap.source, True, "", *about))
+            measured = len(tap.response), tap.period_s, tap.start_s, tap.quantity, each.excited_hz
+            used.append(RecordUse(tap.source, True, "", *measured))
         return (*used, *self.prepared.refused)
 
     @property
@@ -319,12 +309,8 @@ class Identification(Result):
     def answer(self) -> str:
         """Whether to use it or why not, the frequencies, and how well the model explains the records."""
         if not self.modes:
-            why = (
-                "the peaks are not supported by the data, see the table for the reasons"
-                if self.refused
-                else self.reason
-            )
-            return f"do not use: no mode in {', '.join(self.files)}: {why}"
+            peaks = "the peaks are not supported by the data, see the table for the reasons"
+            return f"do not use: no mode in {', '.join(self.files)}: {peaks if self.refused else self.reason}"
         count = f"{len(self.modes)} mode{'' if len(self.modes) == 1 else 's'}"
         axis = "" if self.axis is None else f" of the {self.axis.upper()} axis"
         hertz = ", ".join(f"{mode.frequency_hz.value:.4g}" for mode in self.modes)
@@ -351,7 +337,6 @@ class Identification(Result):
         return f"shapegcode identify {' '.join((*self.files, how, *self.options))} --update mine.toml"
 
     def __repr__(self) -> str:
-        """One line per mode; what else there is stays in the attributes."""
         lines = [super().__repr__(), *(f"  {mode_line(mode)}" for mode in (*self.modes, *self.refused))]
         if self.warnings:
             lines.append(f"  {len(self.warnings)} warning{'' if len(self.warnings) == 1 else 's'}: see .warnings")
@@ -359,28 +344,20 @@ class Identification(Result):
 
     def tables(self) -> list[Table]:
         """Modes with their intervals; what is not supported; the records."""
-        found = []
-        if self.modes:
-            found.append(Table("modes, each ± 95 %", _MODE_COLUMNS, self.modes, caption=self._check_line()))
-        if any(mode.moves is not None for mode in self.modes):
-            found.append(
-                Table("what each mode moves, as shares of its motion along its axis", _MOVE_COLUMNS, self.modes)
+        check, caption = self.mass_check, ""
+        if check is not None:
+            caption = (
+                f"check, equivalent mass as in paper 003: closed form {check.closed_form_kg:.4g} kg, bisection "
+                f"{check.bisection_kg:.4g} kg after {check.halvings} halving{'' if check.halvings == 1 else 's'}"
             )
-        if self.refused:
-            title = "not supported by the data" if self._unsupported else "left out"
-            found.append(Table(title, _REFUSAL_COLUMNS, self.refused))
-        if self.records:
-            found.append(Table("records", _RECORD_COLUMNS, self.records))
-        return found
-
-    def _check_line(self) -> str:
-        check = self.mass_check
-        if check is None:
-            return ""
-        return (
-            f"check, equivalent mass as in paper 003: closed form {check.closed_form_kg:.4g} kg, bisection "
-            f"{check.bisection_kg:.4g} kg after {check.halvings} halving{'' if check.halvings == 1 else 's'}"
+        moving = self.modes if any(mode.moves is not None for mode in self.modes) else ()
+        tables = (
+            Table("modes, each ± 95 %", _MODE_COLUMNS, self.modes, caption=caption),
+            Table("what each mode moves, as shares of its motion along its axis", _MOVE_COLUMNS, moving),
+            Table("not supported by the data" if self._unsupported else "left out", _REFUSAL_COLUMNS, self.refused),
+            Table("records", _RECORD_COLUMNS, self.records),
         )
+        return [table for table in tables if table.rows]
 
     def plots(self) -> Mapping[str, Plot]:
         """`identify-traces`, `-stabilisation`, `-decay`, and `-response` or `-spectrum`; none without a model.
@@ -402,10 +379,6 @@ def as_sweep(
     return replace(found, notes=notes, responses=(), fitted_lines=(), noise_rms=None, sweep=sweep)
 
 
-def _estimate(name: str, factor: float = 1.0) -> Any:
-    return lambda mode: estimate_cell(getattr(mode, name), factor)
-
-
 def by_support(found: Sequence[IdentifiedMode]) -> dict[str, Any]:
     """The modes that the data support, those that they do not, and why there is no mode (empty: there is)."""
     modes, refused = (tuple(mode for mode in found if bool(mode.refusal) == bad) for bad in (False, True))
@@ -418,31 +391,23 @@ def by_support(found: Sequence[IdentifiedMode]) -> dict[str, Any]:
 
 
 _MODE_COLUMNS = (
-    Column("frequency", "Hz", _estimate("frequency_hz")),
-    Column("damping", "%", _estimate("damping_ratio", 100.0)),
-    Column("m", "kg", _estimate("mass_kg")),
-    Column("c", "N s/m", _estimate("damping_n_s_per_m")),
-    Column("k", "N/µm", _estimate("stiffness_n_per_m", 1e-6)),
+    Column("frequency", "Hz", lambda mode: estimate_cell(mode.frequency_hz, 1.0)),
+    Column("damping", "%", lambda mode: estimate_cell(mode.damping_ratio, 100.0)),
+    Column("m", "kg", lambda mode: estimate_cell(mode.mass_kg, 1.0)),
+    Column("c", "N s/m", lambda mode: estimate_cell(mode.damping_n_s_per_m, 1.0)),
+    Column("k", "N/µm", lambda mode: estimate_cell(mode.stiffness_n_per_m, 1e-6)),
 )
 
 
-def _move(letter: str) -> Any:
-    def cell(mode: IdentifiedMode) -> str:
-        estimate: Estimate | None = getattr(mode.moves, letter)
-        exact = estimate is not None and estimate.low == estimate.high
-        return f"{estimate.value:g}" if estimate is not None and exact else estimate_cell(estimate, 1.0)
-
-    return cell
+def _move_cell(letter: str, mode: IdentifiedMode) -> str:
+    estimate: Estimate | None = getattr(mode.moves, letter)
+    exact = estimate is not None and estimate.low == estimate.high
+    return f"{estimate.value:g}" if estimate is not None and exact else estimate_cell(estimate, 1.0)
 
 
-_MOVE_COLUMNS = (
-    Column("frequency", "Hz", lambda mode: f"{mode.frequency_hz.value:.4g}"),
-    *(Column(letter.upper(), "1", _move(letter)) for letter in "xyz"),
-)
-_REFUSAL_COLUMNS = (
-    Column("frequency", "Hz", lambda mode: f"{mode.frequency_hz.value:.4g}"),
-    Column("why", value="refusal", text=True),
-)
+_FREQUENCY = Column("frequency", "Hz", lambda mode: f"{mode.frequency_hz.value:.4g}")
+_MOVE_COLUMNS = (_FREQUENCY, *(Column(letter.upper(), "1", partial(_move_cell, letter)) for letter in "xyz"))
+_REFUSAL_COLUMNS = (_FREQUENCY, Column("why", value="refusal", text=True))
 _RECORD_COLUMNS = (
     Column("record", value="source", text=True),
     Column("samples"),

@@ -1,7 +1,6 @@
 """Frequency and damping from a resonance sweep without force, as the firmware Klipper drives and records it.
 
-The command's spectrum grows as f between the ends of the sweep; what the sensor on the axis shows beyond that is the
-magnitude of the transmissibility 1 - sum of G s²/(s² + 2 zeta omega s + omega²).
+The command's spectrum grows as f; the sensor shows the magnitude of 1 - sum of G s²/(s² + 2 zeta omega s + omega²).
 """
 
 from __future__ import annotations
@@ -39,22 +38,30 @@ class _Model:
     covariance: FloatArray
     squares: float
 
+    @property
+    def starts(self) -> list[tuple[float, ...]]:
+        return [tuple(row) for row in np.exp(self.parameters[2:].reshape(-1, 3))]
+
+    def evidence(self, bins: int) -> float:
+        """Bayes' criterion; bins are known to some percent at best, since the harmonics of the command interfere."""
+        return float(bins * np.log(self.squares / bins + _BIN_NOISE**2) + len(self.parameters) * np.log(bins))
+
 
 def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> Identification:
     """Find the modes that a sweep of Klipper's resonance tester shows; see `identify.identify`."""
     band, modes = sought.band_hz or SWEPT_HZ, sought.modes
     frequency, power = _spectrum(record, band)
     fits = [_fit(frequency, power, [], free=False)]
-    evidence = [_evidence(fits[0], len(power))]
+    evidence = [fits[0].evidence(len(power))]
     while len(fits) - 1 < (modes or min(sought.max_modes or _MAX_MODES, _MAX_MODES)):
         fits.append(_next(frequency, power, fits[-1]))
-        evidence.append(_evidence(fits[-1], len(power)))
+        evidence.append(fits[-1].evidence(len(power)))
         if modes is None and len(fits) - 1 - int(np.argmin(evidence)) >= 1:
             break
     order = modes if modes is not None else int(np.argmin(evidence))
     best = fits[order]
     # What a free slope of the command's spectrum changes is not known.
-    other = _fit(frequency, power, [tuple(row) for row in np.exp(best.parameters[2:].reshape(-1, 3))], free=True)
+    other = _fit(frequency, power, best.starts, free=True)
     found = [_judge_mode(best, other, index, len(power)) for index in range(order)]
     found = [mode for mode in found if band[0] <= mode.frequency_hz.value <= band[1]]
     found.sort(key=lambda mode: mode.frequency_hz.value)
@@ -64,7 +71,7 @@ def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> 
         files=files,
         **by_support(found),
         order=order,
-        evidence=dict(enumerate(float(each) for each in evidence)),
+        evidence=dict(enumerate(evidence)),
         fit_percent=100.0 * (1.0 - float(np.linalg.norm(fitted - amplitude) / np.linalg.norm(amplitude))),
         warnings=(
             *record.warnings,
@@ -74,11 +81,6 @@ def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> 
         notes=(*record.notes, f"looked at from {band[0]:g} to {band[1]:g} Hz (--frequencies LOW:HIGH)"),
         sweep=Sweep(record.source, record.axis, len(record.response), record.period_s, frequency, amplitude, fitted),
     )
-
-
-def _evidence(fit: _Model, bins: int) -> float:
-    """Bayes' criterion; bins are known to some percent at best, since the harmonics of the command interfere."""
-    return float(bins * np.log(fit.squares / bins + _BIN_NOISE**2) + len(fit.parameters) * np.log(bins))
 
 
 def _spectrum(record: Record, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
@@ -129,8 +131,7 @@ def _fit(frequency: FloatArray, power: FloatArray, starts: list[tuple[float, ...
 
     begin = np.clip(first, low + 1e-12, high - 1e-12)
     found = least_squares(left, begin, bounds=(low, high), loss="soft_l1", f_scale=0.5)
-    residual = _log_power(found.x, frequency) - goal
-    squares = float(2.0 * found.cost)
+    residual, squares = left(found.x), float(2.0 * found.cost)
     jacobian = np.asarray(found.jac, dtype=np.float64)
     freedom = max(len(goal) - len(first), 1)
     # Neighbouring bins share what the model lacks.
@@ -141,13 +142,12 @@ def _fit(frequency: FloatArray, power: FloatArray, starts: list[tuple[float, ...
 
 def _next(frequency: FloatArray, power: FloatArray, last: _Model) -> _Model:
     """The best model with one mode more, started where the last residual is largest."""
-    rows = [tuple(row) for row in np.exp(last.parameters[2:].reshape(-1, 3))]
     left = np.log(power) - _log_power(last.parameters, frequency)
     smooth = np.convolve(left, np.ones(5) / 5.0, "same")
     first = int(np.argmax(smooth))
     peaks = [first, int(np.argmax(smooth * (np.abs(frequency - frequency[first]) > _APART_HZ)))]
     tried = [
-        _fit(frequency, power, [*rows, (share, 2.0 * np.pi * frequency[peak], zeta)], free=False)
+        _fit(frequency, power, [*last.starts, (share, 2.0 * np.pi * frequency[peak], zeta)], free=False)
         for peak in peaks
         for share in (0.1, 0.7)
         for zeta in (0.03, 0.1)

@@ -12,7 +12,7 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError
-from shapegcode.identification.parts import moving_parts
+from shapegcode.identification.spectra import moving_parts
 from shapegcode.io.data_file import write_text
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
@@ -162,25 +162,15 @@ def write_sweep(
         ArgumentError: the control does not reach the band within these limits; what it reaches is said.
         OSError: the file cannot be written.
     """
-    found, text = plan_sweep(
-        file, machine, axis, band_hz=band_hz, travel_mm=travel_mm, acceleration_share=acceleration_share,
-        seconds=seconds, number=number,
-    )  # fmt: skip
+    found, text = plan_sweep(file, machine, axis, band_hz, travel_mm, acceleration_share, seconds, number)
     write_text(file, text)
     return found
 
 
 def plan_sweep(
-    file: str | Path,
-    machine: Machine | str | Path,
-    axis: Literal["x", "y", "z"] = "x",
-    *,
-    band_hz: tuple[float, float] | None = None,
-    travel_mm: float = 5.0,
-    acceleration_share: float = 0.3,
-    seconds: float = 60.0,
-    number: int = 7201,
-) -> tuple[SweepProgram, str]:
+    file: str | Path, machine: Machine | str | Path, axis: Literal["x", "y", "z"], band_hz: tuple[float, float] | None,
+    travel_mm: float, acceleration_share: float, seconds: float, number: int = 7201,
+) -> tuple[SweepProgram, str]:  # fmt: skip
     """Plan what `write_sweep` writes: the same, and the text, which is not written."""
     machine = Machine.of(machine)
     for name, value in (("travel_mm", travel_mm), ("acceleration_share", acceleration_share), ("seconds", seconds)):
@@ -236,8 +226,6 @@ class _Stroke:
 
 
 class _Planner:
-    """Plan the moves of an axis by frequency."""
-
     def __init__(self, machine: Machine, axis: str, travel_mm: float, share: float) -> None:
         limits = getattr(machine.axes, axis)
         self._machine, self._model, self._travel_mm = machine, MachineModel(machine), travel_mm
@@ -290,10 +278,10 @@ class _Planner:
             (below, low), (above, high) = tried[place - 1], tried[place]
             share = (math.log(goal) - math.log(low)) / (math.log(high) - math.log(low))
             tried[place] = self._tried(hertz, below.feed_mm_per_min ** (1.0 - share) * above.feed_mm_per_min**share)
-        stroke, amplitude = tried[place]
-        if amplitude > self.wanted:  # The lowest feed asks for too much: shorter strokes would be faster ones
-            return self._tried(hertz, stroke.feed_mm_per_min * (self.wanted / amplitude))
-        return stroke, amplitude
+        stroke, size = tried[place]
+        if size > self.wanted:  # The lowest feed asks for too much: shorter strokes would be faster ones
+            return self._tried(hertz, stroke.feed_mm_per_min * (self.wanted / size))
+        return stroke, size
 
     def _tried(self, hertz: float, feed: float) -> tuple[_Stroke, float]:
         """The stroke that lasts half a cycle, and its amplitude."""
@@ -355,13 +343,16 @@ def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[lis
     return found
 
 
+def plain_name(name: str) -> str:
+    """A name as a comment of any control may hold it."""
+    return "".join(sign for sign in name.upper() if sign.isalnum() or sign in " -.")[:30]
+
+
 def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) -> str:
-    """The program."""
     decimals = max(1, round(-math.log10(machine.controller.least_increment_mm)))
     reach = max(stroke.length_mm for band in bands for stroke in band)
-    plain = "".join(sign for sign in machine.name.upper() if sign.isalnum() or sign in " -.")[:30]
     lines = [
-        "%", f"O{number:04d}(SWEEP {axis.upper()})", f"(SWEEP BY SHAPEGCODE FOR {plain})",
+        "%", f"O{number:04d}(SWEEP {axis.upper()})", f"(SWEEP BY SHAPEGCODE FOR {plain_name(machine.name)})",
         f"(SHAKES {axis.upper()}: 0 TO +{reach:.{decimals}f} MM FROM THE START POINT)",
         "(AIR ONLY: NO SPINDLE, NO OTHER AXIS MOVES, ENDS WHERE IT BEGAN)",
         "(START THE LOGGER FIRST, STOP IT LAST. OVERRIDE 100 PERCENT)",
@@ -369,20 +360,18 @@ def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) 
         "G21 G17 G91 G94 G64", f"G04 P{round(1e3 * _BEFORE_S)}",
     ]  # fmt: skip
     for count, band in enumerate(bands):
-        feed = None
+        code, feed = f"G01 {axis.upper()}", ""
         for stroke in band:
-            new = f"{stroke.feed_mm_per_min:.{machine.controller.feed_decimals_mm}f}"
+            new = f" F{stroke.feed_mm_per_min:.{machine.controller.feed_decimals_mm}f}"
             new = new if "." in new else f"{new}."
             size = f"{stroke.length_mm:.{decimals}f}".lstrip("0")
-            word = "" if new == feed else f" F{new}"
-            lines += [f"{'G01 ' if feed is None else ''}{axis.upper()}{size}{word}", f"{axis.upper()}-{size}"]
-            feed = new
+            lines += [f"{code}{size}{'' if new == feed else new}", f"{axis.upper()}-{size}"]
+            code, feed = axis.upper(), new
         lines.append(f"G04 P{round(1e3 * _PAUSE_S[count % 2])}")
     return "\n".join([*lines, "G90", "M30", "%"]) + "\n"
 
 
 def _swept(bands: list[list[_Stroke]], x_mm: FloatArray, period_s: float) -> tuple[SweptBand, ...]:
-    """Each rise with its fall, as simulated."""
     moves = moving_parts(x_mm, period_s)
     if len(moves) != len(bands):
         raise ArgumentError(
@@ -393,10 +382,6 @@ def _swept(bands: list[list[_Stroke]], x_mm: FloatArray, period_s: float) -> tup
         low, high = rising[0].hertz, rising[-1].hertz
         lasts_s = (end - first) * period_s - _PAUSE_S[0]
         size = amplitude(x_mm[first:end], period_s, (0.95 * low, 1.05 * high), lasts_s)
-        found.append(
-            SweptBand(
-                low, high, max(each.length_mm for each in rising), max(each.feed_mm_per_min for each in rising), size,
-                4 * len(rising), lasts_s + sum(_PAUSE_S),
-            )
-        )  # fmt: skip
+        _, length_mm, feed = np.max([astuple(each) for each in rising], axis=0).tolist()
+        found.append(SweptBand(low, high, length_mm, feed, size, 4 * len(rising), lasts_s + sum(_PAUSE_S)))
     return tuple(found)

@@ -6,7 +6,7 @@ import copy
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
@@ -122,17 +122,11 @@ def update_modes(
     tables = ModeTables(body, axis, source, file)
     new, notes = decide_axes(tables.put(modes, refused), keep_modes, rigid, file)
     machine = Machine.from_toml(new, file)
-    return MachineUpdate(mark + new, machine, (*tables.notes, *notes, *_unknown(machine)))
-
-
-def _unknown(machine: Machine) -> Iterator[str]:
-    """A note on axes of which it is not known whether they have a mode."""
-    names = [
-        name for name, axis in zip("XYZ", machine.axes.as_tuple(), strict=True) if not axis.modes and not axis.rigid
-    ]
-    if names:
-        letters = "".join(names)
-        yield f"no mode of {', '.join(names)} is known: tap, or say --rigid {letters}; until then taken as rigid"
+    named = zip("XYZ", machine.axes.as_tuple(), strict=True)
+    if unknown := [name for name, each in named if not each.modes and not each.rigid]:
+        say = f"say --rigid {''.join(unknown)}; until then taken as rigid"
+        notes.append(f"no mode of {', '.join(unknown)} is known: tap, or {say}")
+    return MachineUpdate(mark + new, machine, (*tables.notes, *notes))
 
 
 _KEPT = ", kept"
@@ -197,7 +191,6 @@ class ModeTables:
     """The modes of one axis in the text of a machine file."""
 
     def __init__(self, text: str, axis: str, source: str, file: str) -> None:
-        """Find them."""
         self._remarks = remarks_of(text)
         text = edit.without_origins(text)
         self.newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
@@ -222,7 +215,6 @@ class ModeTables:
             )
 
     def _axis_table(self) -> Table:
-        """The table [axes.x] of the axis."""
         for key, axes in self.document.body:
             if key is not None and key.key == "axes" and isinstance(axes, Table) and not key.is_dotted():
                 for inner, table in axes.value.body:
@@ -247,7 +239,13 @@ class ModeTables:
         share_of = dict(zip(map(id, modes), shares, strict=True))
         added = [self._table(mode, share_of[id(mode)], meaning) for mode in fresh]
         self._insert(stay, added, left)
-        self._tell_sum(modes)
+        total = sum(float(mode.get("participation", 1.0)) for mode in self.expected)
+        if total > 1.0 + _SUM_SLACK:
+            listed = ", ".join(f"{share:g}" for share in shares)
+            self.notes.append(
+                f"warning: the participations of the {self.axis.upper()} axis sum to {total:.4g}: those of all modes "
+                f"of one point sum to 1 when the axis moves; by the shares of the modes found they would be {listed}"
+            )
         said = self.data["axes"][self.axis].get("rigid")
         if said:
             self.notes.append("it was marked as rigid: the mark is removed")
@@ -272,10 +270,9 @@ class ModeTables:
         before = {id(table): number for number, table in enumerate(self._before, start=1)}
         for number, table in enumerate(tables, start=1):
             was = before.get(id(table))
-            held = self.old[was - 1].keys() if was else set()
+            gone = self.old[was - 1].keys() - table.keys() if was else set()
             stem = f"{self.name}.{was}."
             old = {key.removeprefix(stem): said for key, said in self._remarks.items() if key.startswith(stem)}
-            gone = held - table.keys()
             said = {key: remark for key, remark in old.items() if key not in gone} | self._said.get(id(table), {})
             found |= {f"{self.name}.{number}.{key}": remark for key, remark in said.items() if remark}
         return edit.with_origin_table(text, found)
@@ -287,7 +284,6 @@ class ModeTables:
     def _old_tables(
         self, kept: Mapping[int, IdentifiedMode], seen: Mapping[int, IdentifiedMode], why: str = "which was not found"
     ) -> tuple[list[Table], list[edit.Entry]]:
-        """Change the tables of the file."""
         stay: list[Table] = []
         left: list[edit.Entry] = []
         for number, (table, old) in enumerate(zip(self.tables, self.old, strict=True)):
@@ -310,7 +306,6 @@ class ModeTables:
         return stay, left
 
     def _check(self, text: str, rigid: bool) -> None:
-        """The new text must say what is meant, and nothing else may have changed."""
         wanted = copy.deepcopy(self.data)
         axis = wanted["axes"][self.axis]
         axis["modes"] = self.expected
@@ -327,7 +322,6 @@ class ModeTables:
             raise self._no_place()
 
     def _change(self, table: Table, old: dict[str, Any], mode: IdentifiedMode) -> None:
-        """Put a mode into a table."""
         entries = table.value.body
         values = self._values(mode)
         if mode.moves is not None and "moves" in old:
@@ -374,32 +368,24 @@ class ModeTables:
         entries[place:place] = added
 
     def _values(self, mode: IdentifiedMode) -> dict[str, tuple[Any, str]]:
-        """Value and remark of every key that the data give."""
         values: dict[str, tuple[Any, str]] = {}
-        named: Mapping[str, Estimate | None] = {
-            "frequency_hz": mode.frequency_hz, "damping_ratio": mode.damping_ratio, "mass_kg": mode.mass_kg,
-        }  # fmt: skip
-        for key, estimate in named.items():
+        for key in ("frequency_hz", "damping_ratio", "mass_kg"):
+            estimate: Estimate | None = getattr(mode, key)
             if estimate is not None:
                 low, high = (f"{end:.{_DIGITS}g}" for end in (estimate.low, estimate.high))
                 values[key] = _rounded(estimate.value), f"95 %: {low} ... {high}"
                 uncertain = key.partition("_")[0] + "_uncertainty_percent"
                 values[uncertain] = _rounded_up(estimate.uncertainty_percent), _MEASURED
         values["source"] = self.source, ""
-        return {key: values[key] for key in _KEYS if key in values} | self._moves(mode)
-
-    def _moves(self, mode: IdentifiedMode) -> dict[str, tuple[Any, str]]:
-        """The motion of a mode along other axes, if it was measured and is significant."""
+        values = {key: values[key] for key in _KEYS if key in values}
         told = {letter: each for letter, each in told_moves(mode).items() if abs(each.value) >= LEAST_MOVE}
-        if len(told) < 2:
-            return {}
-        others = ", ".join(
-            f"{letter} {each.low:.3g} ... {each.high:.3g}" for letter, each in told.items() if letter != self.axis
-        )
-        return {"moves": ({letter: _rounded(each.value, 4) for letter, each in told.items()}, f"95 %: {others}")}
+        if len(told) > 1:  # its motion along other axes was measured and is significant
+            others = (f"{axis} {each.low:.3g} ... {each.high:.3g}" for axis, each in told.items() if axis != self.axis)
+            moves = {axis: _rounded(each.value, 4) for axis, each in told.items()}
+            values["moves"] = moves, f"95 %: {', '.join(others)}"
+        return values
 
     def _table(self, mode: IdentifiedMode, share: float, meaning: str) -> Table:
-        """A new table."""
         values = self._values(mode) | {"participation": (share, f"{meaning}, not measured")}
         self.expected.append({key: value for key, (value, _) in values.items()})
         self.notes.append(
@@ -412,33 +398,18 @@ class ModeTables:
         self._said[id(tables.body[0])] = {key: remark for key, (_, remark) in values.items()}
         return tables.body[0]
 
-    def _tell_sum(self, modes: Sequence[IdentifiedMode]) -> None:
-        """Warn of modes that together would move further than the axis does."""
-        total = sum(float(mode.get("participation", 1.0)) for mode in self.expected)
-        if total > 1.0 + _SUM_SLACK:
-            shares = ", ".join(f"{share:g}" for share in shares_of(modes)[0])
-            self.notes.append(
-                f"warning: the participations of the {self.axis.upper()} axis sum to {total:.4g}: those of all modes "
-                f"of one point sum to 1 when the axis moves; by the shares of the modes found they would be {shares}"
-            )
-
     def _insert(self, stay: list[Table], added: list[Table], left: list[edit.Entry]) -> None:
         """Put new tables behind the last one that stays, or where the first one was, or where the axis ends."""
         for table in added:
             table.trivia.indent = self.newline
-        if not self.tables:
-            self._insert_first(added)
+        if self.tables:
+            behind = edit.take_tail(stay[-1]) + left if stay else self._gap + left
+            if not stay:
+                added[0].trivia.indent = self.tables[0].trivia.indent.rstrip(" \t")
+            self.tables[:] = [*stay, *added]
+            self.tables[-1].value.body.extend(behind)
             return
-        if stay:
-            behind = edit.take_tail(stay[-1]) + left
-        else:
-            added[0].trivia.indent = self.tables[0].trivia.indent.rstrip(" \t")
-            behind = self._gap + left
-        self.tables[:] = [*stay, *added]
-        self.tables[-1].value.body.extend(behind)
-
-    def _insert_first(self, added: list[Table]) -> None:
-        """Where a commented table of modes makes room for them, or behind the axis."""
+        # Where a commented table of modes makes room for them, or behind the axis.
         entries = self.home.value.body
         modes = (SingleKey("modes"), AoT(added, "modes", parsed=True))
         for place, entry in enumerate(entries):
@@ -474,9 +445,7 @@ def _line(key: str, value: object, remark: str) -> str:
 
 
 SAME_MODE = 0.1  # Two frequencies, relative to the old one, within which a mode is taken as the one that the file has
-
-_NO_PAIR = 1e3
-_SHARE_DIGITS = 4
+_NO_PAIR, _SHARE_DIGITS = 1e3, 4
 
 
 def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:

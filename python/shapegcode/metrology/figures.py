@@ -104,9 +104,9 @@ class WallDeviation:
     @classmethod
     def of(cls, wall: _core.WallFigures) -> WallDeviation:
         """From the core, in mm."""
-        if wall.stations == 0:
-            return cls(None, None, None, None, 0)
-        return cls(wall.least_mm * 1e3, wall.mean_mm * 1e3, wall.largest_mm * 1e3, wall.band_mm * 1e3, wall.stations)
+        values_mm = (wall.least_mm, wall.mean_mm, wall.largest_mm, wall.band_mm)
+        least, mean, largest, band = (1e3 * value if wall.stations else None for value in values_mm)
+        return cls(least, mean, largest, band, wall.stations)
 
 
 @dataclass(frozen=True)
@@ -122,9 +122,9 @@ class Width:
     @classmethod
     def of(cls, width: _core.WallFigures, tool_diameter_mm: float) -> Width:
         """From the core."""
-        if width.stations == 0:
-            return cls(tool_diameter_mm, None, None, None, 0)
-        return cls(tool_diameter_mm, width.least_mm, width.mean_mm, width.largest_mm, width.stations)
+        values = (width.least_mm, width.mean_mm, width.largest_mm)
+        least, mean, largest = (value if width.stations else None for value in values)
+        return cls(tool_diameter_mm, least, mean, largest, width.stations)
 
 
 @dataclass(frozen=True)
@@ -190,6 +190,8 @@ class MeasuredSection:
         settling = None
         if rest is not None:
             settling = Xyz(*(float(value) if math.isfinite(value) else None for value in rest.settling_s))
+        of_command = SidedError.of([figures.command], [figures.command_sides])
+        of_response = SidedError.of([figures.response], [figures.response_sides])
         return cls(
             region=region,
             kind=section.kind.name,
@@ -201,10 +203,7 @@ class MeasuredSection:
             residual_vibration_um=None if rest is None else largest_xyz_um([rest.residual_mm]),
             settling_time_s=settling,
             observed_rest_s=None if rest is None else rest.observed_s,
-            contour_error_um=Tracks(
-                SidedError.of([figures.command], [figures.command_sides]),
-                SidedError.of([figures.response], [figures.response_sides]),
-            ),
+            contour_error_um=Tracks(of_command, of_response),
             arc=MeasuredArc.of(figures, tool_diameter_mm) if section.kind == _core.SectionKind.arc else None,
             wall_deviation_um=Sides(WallDeviation.of(figures.left), WallDeviation.of(figures.right)),
             width_mm=Width.of(figures.width, tool_diameter_mm),

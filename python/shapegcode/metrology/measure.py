@@ -28,9 +28,7 @@ _LONGEST_REST_S = 10.0  # that a vibration is waited for behind a stop
 _MIN_REST_S = 0.25
 _MILLIONTH = math.log(1e6)
 _MAX_PROFILE_STATIONS = 200_000  # kept of each program for pictures
-_MAX_TOOL_MM = 1000.0
-_MIN_SPACING_MM = 1e-3
-_SHORT_MM = 0.5
+_MAX_TOOL_MM, _MIN_SPACING_MM, _SHORT_MM = 1000.0, 1e-3, 0.5
 _MAX_SECTIONS = 20_000  # of a program: each is a row with its walls
 _MAX_FACTOR = 2.0**20
 _LAST_LINE = 2**32 - 1
@@ -105,8 +103,12 @@ def measure(
 
     limit_um = machine.tolerance.contour_um
     beside = [(each.source, ours, (against or each).source) for each, ours in zip(several, shaped, strict=True)]
+    # Held against the tolerance are the shaped ones beside the programmed path, if there are any; the own path of a
+    # shaped one is not the programmed one.
+    judged = [ours and path != name for name, ours, path in beside]
+    judged = judged if any(judged) else [not ours for ours in shaped]
     measured = []
-    for program, about, counts in zip(several, beside, _judged(beside), strict=True):
+    for program, about, counts in zip(several, beside, judged, strict=True):
         jobs = jobs_of(program, against or program, machine, lines)
         regions = tuple(_measured_regions(jobs, machine, plant, options, one_done))
         warnings = (
@@ -119,25 +121,9 @@ def measure(
         measured.append(MeasuredProgram.of(about, regions, limit_um if counts else None, warnings))
     names = [Path(program.source).name for program in several]
     second = several[1] if len(several) > 1 else None
-    return Measurement(
-        machine=machine.name,
-        plant=plant,
-        tool_diameter_mm=tool_diameter_mm,
-        settling_band_um=band_um,
-        station_spacing_mm=station_spacing_mm,
-        roughness_cutoff_mm=cutoff_mm,
-        roughness_lambda_s_mm=lambda_s_mm,
-        contour_tolerance_um=limit_um,
-        programs=tuple(measured),
-        simulated=SimulatedPrograms(several[0], machine, second, labels=(names[0], names[-1]), plant=plant),
-    )
-
-
-def _judged(programs: Sequence[tuple[str, bool, str]]) -> list[bool]:
-    """Which programs are held against the tolerance; each: name, whether it is shaped, against what it is measured."""
-    # Shaped ones beside the programmed path, if there are any; the own path of a shaped one is not the programmed one.
-    beside = [shaped and against != name for name, shaped, against in programs]
-    return beside if any(beside) else [not shaped for _, shaped, _ in programs]
+    simulated = SimulatedPrograms(several[0], machine, second, labels=(names[0], names[-1]), plant=plant)
+    asked = tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm
+    return Measurement(machine.name, plant, *asked, limit_um, tuple(measured), simulated)
 
 
 def _coarse_warnings(regions: Iterable[MeasuredRegion], asked_mm: float, jobs: Iterable[Job]) -> Iterator[str]:
@@ -159,24 +145,19 @@ def _options(
     tool_diameter_mm: float, band_um: float, station_spacing_mm: float, cutoff_mm: float | None, lambda_s_mm: float
 ) -> _core.MetrologyOptions:
     """With what is measured; what nobody can measure with is refused before anything is simulated."""
-    for name, value in (("tool diameter", tool_diameter_mm), ("station spacing", station_spacing_mm)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise _core.ArgumentError(f"{name} is {value:g} mm, must be above 0")
-    if tool_diameter_mm > _MAX_TOOL_MM:
-        raise _core.ArgumentError(f"tool diameter is {tool_diameter_mm:g} mm, must be at most {_MAX_TOOL_MM:g} mm")
-    if station_spacing_mm < _MIN_SPACING_MM:
-        raise _core.ArgumentError(
-            f"station spacing is {station_spacing_mm:g} mm, must be at least {_MIN_SPACING_MM:g} mm"
-        )
-    for name, value in (("cut-off", cutoff_mm or 0.0), ("lambda s", lambda_s_mm)):
-        if not (math.isfinite(value) and value >= 0.0):
-            raise _core.ArgumentError(f"{name} is {value:g} mm, must be at least 0")
+    diameter, spacing, cutoff = tool_diameter_mm, station_spacing_mm, cutoff_mm or 0.0
+    for name, value, is_in, limit in (
+        ("tool diameter", diameter, diameter > 0.0, "above 0"), ("station spacing", spacing, spacing > 0.0, "above 0"),
+        ("tool diameter", diameter, diameter <= _MAX_TOOL_MM, f"at most {_MAX_TOOL_MM:g} mm"),
+        ("station spacing", spacing, spacing >= _MIN_SPACING_MM, f"at least {_MIN_SPACING_MM:g} mm"),
+        ("cut-off", cutoff, cutoff >= 0.0, "at least 0"), ("lambda s", lambda_s_mm, lambda_s_mm >= 0.0, "at least 0"),
+    ):  # fmt: skip
+        if not (is_in and math.isfinite(value)):
+            raise _core.ArgumentError(f"{name} is {value:g} mm, must be {limit}")
     options = _core.MetrologyOptions()
     options.tool_radius_mm = tool_diameter_mm / 2.0
-    options.station_spacing_mm = station_spacing_mm
-    options.band_mm = band_um * 1e-3
-    options.cutoff_mm = cutoff_mm or 0.0
-    options.lambda_s_mm = lambda_s_mm
+    options.station_spacing_mm, options.band_mm = station_spacing_mm, band_um * 1e-3
+    options.cutoff_mm, options.lambda_s_mm = cutoff, lambda_s_mm
     return options
 
 
@@ -212,7 +193,8 @@ def measure_samples(
         ArgumentError: a value outside its range, arrays of other shapes, or values that are not finite.
     """
     options = _options(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
-    return _measured(chunks, path, _core.path_sections(path), options, period_s, lines)
+    options.period_s = period_s
+    return _measured(chunks, path, _core.path_sections(path), options, lines)
 
 
 def _measured_regions(
@@ -220,42 +202,32 @@ def _measured_regions(
 ) -> Iterator[MeasuredRegion]:
     """Every region of a program, simulated and measured."""
     kept = 0
+    options.period_s = machine.controller.interpolation_period_s
     for number, job in enumerate(jobs, start=1):
-        samples = _samples(job, machine, plant)
+        samples, keep = _samples(job, machine, plant), kept < _MAX_PROFILE_STATIONS
         lines = (job.nominal.first_line, job.nominal.last_line)
-        period_s, keep = machine.controller.interpolation_period_s, kept < _MAX_PROFILE_STATIONS
-        region = _measured(samples, job.path, job.sections, options, period_s, lines, number, keep_walls=keep)
+        region = _measured(samples, job.path, job.sections, options, lines, number, keep_walls=keep)
         kept += sum(each.walls.distance_mm.size for each in region.sections if each.walls is not None)
         yield region
         on_done()
 
 
 def _measured(
-    chunks: Iterable[tuple[FloatArray, FloatArray]],
-    path: _core.Path,
-    sections: list[_core.PathSection],
-    options: _core.MetrologyOptions,
-    period_s: float,
-    lines: tuple[int, int],
-    region: int = 1,
-    *,
-    keep_walls: bool = True,
-) -> MeasuredRegion:
-    options.period_s = period_s
+    chunks: Iterable[tuple[FloatArray, FloatArray]], path: _core.Path, sections: list[_core.PathSection],
+    options: _core.MetrologyOptions, lines: tuple[int, int], region: int = 1, *, keep_walls: bool = True,
+) -> MeasuredRegion:  # fmt: skip
     metrology = _core.SectionMetrology(path, sections, options)
     for command, response in chunks:
         metrology.feed(command, response)
-    walls = [_wall(metrology, index) if keep_walls else None for index in range(len(sections))]
+    walls: list[WallProfile | None] = [None] * len(sections)
+    for index in range(len(sections)) if keep_walls else ():
+        first_mm, spacing_mm, left, right, point, normal = metrology.wall_profile(index)
+        distance_mm = first_mm + spacing_mm * np.arange(left.size, dtype=np.float64)
+        walls[index] = WallProfile(distance_mm, left * 1e3, right * 1e3, point, normal)
     figures, diameter_mm = metrology.finish(), 2.0 * options.tool_radius_mm
     both = zip(figures.sections, walls, strict=True)
     found = tuple(MeasuredSection.of(each, region, diameter_mm, wall) for each, wall in both)
     return MeasuredRegion(lines, path, figures, found, metrology.station_spacing_mm)
-
-
-def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
-    first_mm, spacing_mm, left, right, point, normal = metrology.wall_profile(index)
-    distance_mm = first_mm + spacing_mm * np.arange(left.size, dtype=np.float64)
-    return WallProfile(distance_mm, left * 1e3, right * 1e3, point, normal)
 
 
 def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -286,37 +258,25 @@ class Job:
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:
     """Pairs of regions that are measured, without those that have no section."""
     pairs = [pair for pair in paired_regions(program, nominal) if pair[1].path.length_mm > 0.0]
-    own_blocks = program.shaped_regions > 0 and nominal is program
-    joined = 1.0 if lines is not None else _joined(pairs, machine, own_blocks=own_blocks)
+    blocks = _BLOCKS_PER_CURVE * machine.controller.block_time_s
+    blocks = blocks if program.shaped_regions > 0 and nominal is program else 0.0
+    # Runs shorter than this that follow each other are one curve.
+    paths = [(region.path, max(_SHORT_MM, blocks * region.path.fastest_feed_mm_per_s)) for _, region in pairs]
+    joined = 1.0
+    if lines is None:
+        # So many times longer must runs be to stand alone that somebody may look at all sections; a region has one.
+        most = max(_MAX_SECTIONS, len(pairs))
+        while joined < _MAX_FACTOR and sum(len(_core.path_sections(path, joined * mm)) for path, mm in paths) > most:
+            joined *= 2.0
     jobs = []
-    for simulated, region in pairs:
-        path = region.path
+    for (simulated, region), (path, short_mm) in zip(pairs, paths, strict=True):
         if lines is None:
-            short_mm = joined * _short_mm(path, machine, own_blocks=own_blocks)
-            sections = _core.path_sections(path, short_mm)
+            sections = _core.path_sections(path, joined * short_mm)
         else:
-            short_mm = 0.0
             sections = _core.line_sections(path, [(min(a, _LAST_LINE), min(b, _LAST_LINE)) for a, b in lines])
         if sections:
-            jobs.append(Job(simulated, region, path, sections, short_mm if joined > 1.0 else 0.0))
+            jobs.append(Job(simulated, region, path, sections, joined * short_mm if joined > 1.0 else 0.0))
     if lines is not None and not jobs:
         names = ", ".join(f"{first}-{last}" for first, last in lines)
         raise _core.ArgumentError(f"{nominal.source}: no cutting move in lines {names}")
     return jobs
-
-
-def _joined(pairs: Sequence[tuple[_core.Region, _core.Region]], machine: Machine, *, own_blocks: bool) -> float:
-    """How many times longer than elsewhere runs must be to stand alone, so that somebody may look at all sections."""
-    most = max(_MAX_SECTIONS, len(pairs))  # a region has one at least
-    shortest = [(region.path, _short_mm(region.path, machine, own_blocks=own_blocks)) for _, region in pairs]
-    factor = 1.0
-    while factor < _MAX_FACTOR and sum(len(_core.path_sections(path, factor * mm)) for path, mm in shortest) > most:
-        factor *= 2.0
-    return factor
-
-
-def _short_mm(path: _core.Path, machine: Machine, *, own_blocks: bool) -> float:
-    """Runs shorter than this that follow each other are one curve."""
-    if not own_blocks:
-        return _SHORT_MM
-    return max(_SHORT_MM, _BLOCKS_PER_CURVE * path.fastest_feed_mm_per_s * machine.controller.block_time_s)

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _SHARE_OF_TOOL = 0.8  # of the tool's radius that the largest deviation takes in the drawing
-_SHARE_OF_PART = 0.03
-_MIN_DRAWN_UM = 1e-3
-_MAX_MARKED = 12
+_SHARE_OF_PART, _MIN_DRAWN_UM, _MAX_MARKED = 0.03, 1e-3, 12
 
 
 def plots_of(measurement: Measurement) -> dict[str, Plot]:
@@ -49,9 +47,8 @@ def plot_part(measurement: Measurement, ax: Axes | None = None, *, region: int |
     everything = np.concatenate([wall.point_mm for wall in _walls(drawn[0][1])])
     extent = float(np.ptp(everything, axis=0).max())
     largest_mm = max(_largest_um(each) for _, each in drawn) * 1e-3
-    magnified = plot.round_below(
-        max(_SHARE_OF_TOOL * radius, _SHARE_OF_PART * extent) / max(largest_mm, _MIN_DRAWN_UM * 1e-3)
-    )
+    wanted_mm = max(_SHARE_OF_TOOL * radius, _SHARE_OF_PART * extent)
+    magnified = plot.round_below(wanted_mm / max(largest_mm, _MIN_DRAWN_UM * 1e-3))
     title = (
         f"Walls cut by a tool of {measurement.tool_diameter_mm:g} mm, deviations magnified {magnified:g} times "
         f"(1 mm drawn is {1e3 / magnified:g} µm)"
@@ -63,15 +60,11 @@ def plot_part(measurement: Measurement, ax: Axes | None = None, *, region: int |
     panel.plot(*nominal.point_mm.T, color=plot.GREY, linewidth=0.6, linestyle=(0, (8, 3, 2, 3)))
     for number, (program, each) in enumerate(drawn):
         wall = _joined(each)
-        for deviation, side in ((wall.left_um, radius), (wall.right_um, -radius)):
-            label = program.name if side > 0.0 else None
-            panel.plot(
-                *_edge(wall, deviation * 1e-3 * magnified, side).T, color=_colour(number), linewidth=1.2, label=label
-            )
+        for deviation, side, label in ((wall.left_um, radius, program.name), (wall.right_um, -radius, None)):
+            edge = _edge(wall, deviation * 1e-3 * magnified, side)
+            panel.plot(*edge.T, color=_colour(number), linewidth=1.2, label=label)
     panel.grid(False)
-    panel.set_aspect("equal")
-    panel.set_xlabel("X in mm")
-    panel.set_ylabel("Y in mm")
+    panel.set(aspect="equal", xlabel="X in mm", ylabel="Y in mm")
     plot.legend_above(panel)
     return panel
 
@@ -101,25 +94,18 @@ def plot_walls(measurement: Measurement, ax: Axes | None = None, *, region: int 
             panel.margins(x=0.01)
     left.set_ylabel("left wall, µm\npositive: cut too far")
     right.set_ylabel("right wall, µm\nnegative: cut too far")
-    width.set_ylabel(f"width less {measurement.tool_diameter_mm:g} mm, µm")
-    width.set_xlabel("distance along the programmed path, mm")
-    _mark_sections(column, drawn[0][1])
-    plot.legend_above(left)
-    return left
-
-
-def _mark_sections(panels: list[Axes], region: MeasuredRegion) -> None:
-    if len(region.sections) > _MAX_MARKED:
-        return
-    for panel in panels:
-        for section in region.sections[1:]:
+    ylabel = f"width less {measurement.tool_diameter_mm:g} mm, µm"
+    width.set(ylabel=ylabel, xlabel="distance along the programmed path, mm")
+    sections = drawn[0][1].sections
+    for section in sections if len(sections) <= _MAX_MARKED else ():
+        for panel in column if section is not sections[0] else ():
             panel.axvline(section.begin_mm, color=plot.GREY, linewidth=0.7, linestyle=":")
-    lowest = panels[-1]
-    for section in region.sections:
-        lowest.annotate(
-            section.kind, (section.begin_mm + section.length_mm / 2.0, 1.0), xycoords=lowest.get_xaxis_transform(),
+        width.annotate(
+            section.kind, (section.begin_mm + section.length_mm / 2.0, 1.0), xycoords=width.get_xaxis_transform(),
             ha="center", va="top", fontsize=8, color=plot.GREY,
         )  # fmt: skip
+    plot.legend_above(left)
+    return left
 
 
 def _worst_region(measurement: Measurement) -> int | None:
@@ -138,7 +124,6 @@ def _drawn(measurement: Measurement, region: int | None) -> list[tuple[MeasuredP
 
 
 def _walls(region: MeasuredRegion) -> list[WallProfile]:
-    """The profiles of a region that hold a wall."""
     return [
         section.walls
         for section in region.sections
@@ -149,9 +134,8 @@ def _walls(region: MeasuredRegion) -> list[WallProfile]:
 
 def _joined(region: MeasuredRegion) -> WallProfile:
     """All walls of a region as one, with a gap between two sections."""
-    walls = _walls(region)
     gap = WallProfile(*(np.full(1, np.nan) for _ in range(3)), *(np.full((1, 2), np.nan) for _ in range(2)))
-    with_gaps = [each for wall in walls for each in (wall, gap)]
+    with_gaps = [each for wall in _walls(region) for each in (wall, gap)]
     return WallProfile(*(np.concatenate([getattr(each, field.name) for each in with_gaps]) for field in fields(gap)))
 
 

@@ -25,8 +25,6 @@ Values = Callable[[MeasuredSection], Sequence[float | None]]
 
 @dataclass(frozen=True)
 class _Row:
-    """One row of a table."""
-
     name: str  # what is measured
     values: tuple[str, ...]  # as text, one per program
     nominal: str = ""  # what it should be; empty where that is nothing but zero
@@ -38,28 +36,31 @@ class _Row:
 def _program_columns(names: Sequence[str]) -> tuple[Column, ...]:
     """One per program; the values of more than two wrap, so that they fit beside each other."""
 
-    def column(rank: int, name: str) -> Column:
-        def style(row: _Row) -> str:
-            return "bold red" if row.out and row.out[rank] else ""
+    def text(rank: int, row: _Row) -> str:
+        return row.values[rank] if row.values else ""
 
-        return Column(name, value=lambda row: row.values[rank] if row.values else "", style=style, text=len(names) > 2)
+    def style(rank: int, row: _Row) -> str:
+        return "bold red" if row.out and row.out[rank] else ""
 
-    return tuple(column(rank, name) for rank, name in enumerate(names))
+    return tuple(
+        Column(name, value=partial(text, rank), style=partial(style, rank), text=len(names) > 2)
+        for rank, name in enumerate(names)
+    )
 
 
 # --- the worst of every figure ----------------------------------------------------------------------------------------
 
 
-def summary_table(
-    title: str, programs: Mapping[str, Sections], whole: Mapping[str, tuple[float, float]], band_um: float
-) -> Table:
+def _summary_table(title: str, programs: Mapping[str, MeasuredProgram], band_um: float) -> Table:
     """The largest of each figure with section and line, one column per program."""
+    all_of = programs.values()
+    largest = (each.contour_error_um.response.max for each in all_of)
     rows = [
-        _Row("cutting time s", tuple(f"{time_s:.2f}" for time_s, _ in whole.values())),
-        _Row("contour error µm, corners included", tuple(f"{largest:.2f}" for _, largest in whole.values())),
+        _Row("cutting time s", tuple(f"{each.cutting_time_s:.2f}" for each in all_of)),
+        _Row("contour error µm, corners included", tuple(f"{value:.2f}" for value in largest)),
     ]
     for name, values in _figures(band_um):
-        worst = [_worst(sections, values) for sections in programs.values()]
+        worst = [_worst(each.sections, values) for each in all_of]
         if any(worst):
             rows.append(_Row(name, tuple(cell or "–" for cell in worst)))
     columns = (Column("largest (section, line)", value="name", text=True), *_program_columns(list(programs)))
@@ -119,18 +120,18 @@ def _width_off_um(section: MeasuredSection) -> list[float | None]:
 # --- section by section -----------------------------------------------------------------------------------------------
 
 
-def section_table(
-    title: str, programs: Mapping[str, Sections], limit_um: float | None, band_um: float, *, every: bool
+def _section_table(
+    title: str, programs: Mapping[str, MeasuredProgram], limit_um: float | None, band_um: float, *, every: bool
 ) -> Table:
     """The figures of each section, one column per program."""
-    count = min(len(sections) for sections in programs.values())
-    worst = [max(each[index].contour_error_um.response.max for each in programs.values()) for index in range(count)]
+    beside = list(zip(*(each.sections for each in programs.values()), strict=False))
+    count = len(beside)
+    worst = [max(each.contour_error_um.response.max for each in sections) for sections in beside]
     shown = sorted(range(count), key=lambda index: -worst[index])[: None if every else _MAX_SECTIONS]
     rows: list[_Row] = []
     for index in sorted(shown):
-        beside = [sections[index] for sections in programs.values()]
-        rows.append(_Row(beside[0].name(index + 1), (), heading=True))
-        rows += _section_rows(beside, limit_um, band_um)
+        rows.append(_Row(beside[index][0].name(index + 1), (), heading=True))
+        rows += _section_rows(beside[index], limit_um, band_um)
     columns = (
         Column("figure", value="name", text=True),
         Column("nominal", value="nominal"),
@@ -147,7 +148,6 @@ def section_table(
 
 
 def _section_rows(sections: Sections, limit_um: float | None, band_um: float) -> Iterator[_Row]:
-    """The rows of one section, as it came out in each program."""
     yield _Row("length mm, time s", _each(sections, lambda s: f"{s.time_s:.3f}"), f"{sections[0].length_mm:.3f}")
     yield from _contour_rows(sections, limit_um)
     arcs = [section.arc for section in sections if section.arc is not None]
@@ -211,9 +211,8 @@ def _wall_rows(sections: Sections) -> Iterator[_Row]:
     yield _Row("right wall, from / to µm", tuple(_span(each.right) for each in walls), "0")
     bands = tuple(_pair([wall.band for wall in each.both()], 2) for each in walls)
     yield _Row("cut-width band left / right µm", bands, "0")
-    widths = [section.width_mm for section in sections]
-    ends = (_pair((width.min, width.max), 4) for width in widths)
-    yield _Row("width least / most mm", tuple(ends), f"{widths[0].nominal:.3f}")
+    ends = _each(sections, lambda s: _pair((s.width_mm.min, s.width_mm.max), 4))
+    yield _Row("width least / most mm", ends, f"{sections[0].width_mm.nominal:.3f}")
 
 
 def _span(wall: WallDeviation) -> str:
@@ -308,10 +307,8 @@ class MeasuredProgram:
         simulated = "block by block, as a shaped program" if self.shaped else "with the controller's own motion"
         own = self.measured_against == self.program
         path = "its own path" if own else f"the path of {self.measured_against}"
-        judged = ""
-        if self.ok is None:
-            judged = ", which is not the programmed one" if self.shaped else ", to compare the shaped with"
-            judged += ": not judged"
+        why = ", which is not the programmed one" if self.shaped else ", to compare the shaped with"
+        judged = f"{why}: not judged" if self.ok is None else ""
         return f"{self.program}: simulated {simulated}, measured against {path}{judged}"
 
     def verdict(self, limit_um: float) -> str:
@@ -419,13 +416,11 @@ class Measurement(Result):
                 by_name = {f"{number} {program.program}": program for number, program in enumerate(beside, start=1)}
             judged = any(program.ok is not None for program in beside)
             limit_um = self.contour_tolerance_um if judged else None
-            sections = {name: program.sections for name, program in by_name.items()}
-            whole = {name: (each.cutting_time_s, each.contour_error_um.response.max) for name, each in by_name.items()}
             on = f"{self.machine}, tool of {self.tool_diameter_mm:g} mm, {self.plant} plant"
-            if any(sections.values()):
-                found.append(summary_table(f"worst figures on {on}", sections, whole, self.settling_band_um))
+            if any(program.sections for program in beside):
+                found.append(_summary_table(f"worst figures on {on}", by_name, self.settling_band_um))
             title = f"sections measured on {on}"
-            found.append(section_table(title, sections, limit_um, self.settling_band_um, every=every_section))
+            found.append(_section_table(title, by_name, limit_um, self.settling_band_um, every=every_section))
         return found
 
     def plots(self) -> Mapping[str, Plot]:

@@ -1,7 +1,6 @@
 """A machine as the core simulates it: made once from the machine file, used by every simulation.
 
-Whether a path is planned or simulated block by block is decided in `SimulatedController` alone. At the end: which lines
-of LinuxCNC's INI file a shaped program needs.
+Whether a path is planned or simulated block by block is decided in `SimulatedController` alone.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, TypedDict, Unpack
 
 import numpy as np
 
@@ -19,15 +18,8 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.machine.controller import GrblPlanner, KlipperPlanner, LinuxcncPlanner
 from shapegcode.machine.dialects import dialect_of
-from shapegcode.model.modes import (
-    NO_OFFSET,
-    Offset,
-    drive_parameters,
-    moving_axis,
-    moving_modes,
-    region_offset,
-    slowest_mode,
-)
+from shapegcode.model import modes
+from shapegcode.model.modes import NO_OFFSET, Offset
 
 
 def fanuc_model(
@@ -117,7 +109,7 @@ def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.Mot
     limits = _core.MotionLimits()
     controller = machine.controller
     axes = machine.axes.as_tuple()
-    limits.law = getattr(_core.AccelerationLaw, controller.law)
+    limits.law, limits.arc_feed_ratio = getattr(_core.AccelerationLaw, controller.law), arc_feed_ratio
     # A ramp of one tick stands for "no ramp": zero time has no acceleration.
     limits.time_constant_s = max(controller.time_constant_s, controller.interpolation_period_s)
     limits.jerk_time_s = controller.bell_time_s
@@ -139,7 +131,6 @@ def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.Mot
     limits.block_time_s = controller.look_ahead_block_time_s
     if controller.contour_acceleration_mm_s2 is not None:
         limits.contour_acceleration_mm_per_s2 = controller.contour_acceleration_mm_s2.as_tuple()
-    limits.arc_feed_ratio = arc_feed_ratio
     return limits
 
 
@@ -147,12 +138,8 @@ def _limit(value: float | None) -> float:
     return math.inf if value is None else value
 
 
-BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
-"""Both rules of block timing."""
-
-PLANTS = ("modal", "feed-drive")
-"""The plants that there are: modes behind an ideal servo, or motor, ball screw and table with their servo loops."""
-
+BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)  # both rules of block timing
+PLANTS = ("modal", "feed-drive")  # modes behind an ideal servo; motor, ball screw and table with their servo loops
 _DRIVE_REST_S = 0.5  # how long behind a stop the error of feed drives is looked at
 _LEAST_DECAY_PER_S = 0.01  # below it a mode has no damping to speak of
 
@@ -188,12 +175,10 @@ class SimulatedController:
         self.model = model
         self._override = override
         model.limits.feed_override *= override
-        self.filters = _core.acceleration_filters(model)
-        """Filters of acceleration/deceleration after interpolation."""
+        self.filters = _core.acceleration_filters(model)  # of acceleration/deceleration after interpolation
 
     def _planned(self, path: _core.Path) -> tuple[_core.Path, _core.SpeedProfile] | None:
-        """Motion that the planner computes for a path, and its speed along it; None if the control executes block by
-        block."""
+        """Motion that the planner computes for a path, and its speed; None if the control executes block by block."""
         model = self.model
         look_ahead = model.motion == _core.MotionKind.look_ahead or model.planner.kind != _core.ControllerKind.fanuc
         return _core.controlled_motion(path, model.limits, model.planner) if look_ahead else None
@@ -230,41 +215,37 @@ class SimulatedController:
         return _core.travel_blocks(path, along, self.model.block_end, stations_mm, period_s, self.filters, window_s)
 
 
+class _Given(TypedDict, total=False):
+    """What simulations of a cut pass on to `MachineModel.options`."""
+
+    shift: float
+    only: str | None
+    offset: Offset
+
+
 class MachineModel:
     """Controller, limits and plant of a machine for the core."""
 
     def __init__(self, machine: Machine) -> None:
-        self.machine = machine
-        """What the machine file says."""
-        self.name = machine.name
-        """Of the machine."""
+        self.machine, self.name = machine, machine.name
         self.period_s = machine.controller.interpolation_period_s
-        """Interpolation period."""
         self.own_rule: _core.BlockEnd = getattr(_core.BlockEnd, machine.controller.block_end)
-        """The controller's own rule of block timing."""
+        # Whether the control plans shaped blocks too: its planner cannot be switched off.
         self.always_plans = machine.controller.kind != "fanuc"
-        """Whether the control plans shaped blocks too: its planner cannot be switched off."""
+        # Rules of block timing under which emitted blocks are simulated; a planner has one of its own.
         self.block_rules = (self.own_rule,) if self.always_plans else BLOCK_ENDS
-        """Rules of block timing under which emitted blocks are simulated; a planner has one of its own."""
-        rates = [
-            damping * 2.0 * math.pi * frequency
-            for axis in machine.axes.as_tuple()
-            for mode in axis.modes
-            for frequency, damping in (slowest_mode(mode),)
-        ]
-        self.slowest_decay_per_s = min(rates, default=math.inf)
-        """Decay rate of the mode that rings longest: damping ratio times angular frequency; infinite without modes."""
+        slowest = [modes.slowest_mode(mode) for axis in machine.axes.as_tuple() for mode in axis.modes]
+        rates = [damping * 2.0 * math.pi * frequency for frequency, damping in slowest]
+        self.slowest_decay_per_s = min(rates, default=math.inf)  # of the mode that rings longest
 
     def __reduce__(self) -> tuple[type[MachineModel], tuple[Machine]]:
         """Built again from the machine: what the core holds does not travel."""
         return MachineModel, (self.machine,)
 
     def __eq__(self, other: object) -> bool:
-        """Whether it is the same machine."""
         return self.machine == other.machine if isinstance(other, MachineModel) else NotImplemented
 
     def __hash__(self) -> int:
-        """That of the machine."""
         return hash(self.machine)
 
     @cached_property
@@ -282,13 +263,10 @@ class MachineModel:
     @cached_property
     def shaped_filter(self) -> OwnFilter:
         """Acceleration/deceleration after interpolation for shaped blocks."""
-        controller, filters = self.machine.controller, self.shaped.filters
-        return OwnFilter(
-            controller.shaped_filter_shape,
-            controller.shaped_time_constant_s,
-            controller.shaped_bell_time_s,
-            sum(each.duration_samples + 1 for each in filters) * self.period_s,
-        )
+        control = self.machine.controller
+        times_s = control.shaped_time_constant_s, control.shaped_bell_time_s
+        duration_s = sum(each.duration_samples + 1 for each in self.shaped.filters) * self.period_s
+        return OwnFilter(control.shaped_filter_shape, *times_s, duration_s)
 
     def simulated(self, *, shaped: bool) -> SimulatedController:
         """One of the two: `shaped` for a program that shapegcode wrote."""
@@ -303,9 +281,9 @@ class MachineModel:
     @cached_property
     def bounds_deviations(self) -> bool:
         """Whether deviations at other overrides cost little beside a run: no filter, modes that stay, sides alike."""
-        machine = self.machine
-        plain = machine.verdict.plant == "modal" and not self.shaped.filters and moving_axis(machine) is None
-        return plain and not self.always_plans and machine.input.material_side is None
+        moves = modes.moving_axis(self.machine) is not None
+        plain = self.machine.verdict.plant == "modal" and not self.shaped.filters and not moves
+        return plain and not self.always_plans and self.machine.input.material_side is None
 
     def limits(self, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
         """Look-ahead limits, a copy of one's own."""
@@ -313,65 +291,42 @@ class MachineModel:
 
     def offset(self, region: _core.Region) -> Offset:
         """From the program's positions in a region to the machine's; see `region_offset`."""
-        return region_offset(region, self.machine)
+        return modes.region_offset(region, self.machine)
 
     def options(
-        self,
-        *,
-        plant: str = "modal",
-        filters: Sequence[_core.Fir] = (),
-        shift: float = 0.0,
-        only: str | None = None,
+        self, *, plant: str = "modal", filters: Sequence[_core.Fir] = (), shift: float = 0.0, only: str | None = None,
         offset: Offset = NO_OFFSET,
-    ) -> _core.SimulationOptions:
+    ) -> _core.SimulationOptions:  # fmt: skip
         """Interpolation period and plant, with acceleration filters after interpolation."""
         if plant not in PLANTS:
             raise _core.ArgumentError(f"plant = {plant!r}: must be one of {', '.join(PLANTS)}")
         options = _core.SimulationOptions()
         options.period_s = self.period_s
-        pairs = moving_modes(self.machine, shift, offset, only)
+        pairs = modes.moving_modes(self.machine, shift, offset, only)
         if plant != "modal":
-            options.drives = drive_parameters(self.machine, shift, only)
+            options.drives = modes.drive_parameters(self.machine, shift, only)
             pairs = [[pair for pair in of if any(pair[0].excited_by)] for of in pairs]
         options.modes = [[mode for mode, _ in of] for of in pairs]
         options.mode_tables = [[table for _, table in of] for of in pairs]
         options.axis_filters = list(filters)
         return options
 
-    def verdict_options(
-        self,
-        *,
-        filters: Sequence[_core.Fir] = (),
-        shift: float = 0.0,
-        only: str | None = None,
-        offset: Offset = NO_OFFSET,
-    ) -> _core.SimulationOptions:
-        """Simulation options with the plant of the verdict.
-
-        With feed drives the residual is the vibration of the table relative to its motor after its arrival: the lag
-        that runs out at a stop is no vibration.
-        """
+    def verdict_options(self, *, filters: Sequence[_core.Fir] = (), **given: Unpack[_Given]) -> _core.SimulationOptions:
+        """Simulation options with the plant of the verdict."""
         plant = self.machine.verdict.plant
-        options = self.options(plant=plant, filters=filters, shift=shift, only=only, offset=offset)
+        options = self.options(plant=plant, filters=filters, **given)
         if plant != "modal":
+            # The lag that runs out at a stop is no vibration: the residual is that of table against motor.
             options.settling_limit_s = _DRIVE_REST_S
             options.arrived_mm = min(self.machine.controller.in_position_width_um.as_tuple()) * 1e-3
         return options
 
     def simulate_original(
-        self,
-        path: _core.Path,
-        *,
-        against: _core.Path | None = None,
-        override: float = 1.0,
-        shift: float = 0.0,
-        only: str | None = None,
-        record_samples: int = 0,
-        offset: Offset = NO_OFFSET,
-        emitted: bool = False,
-    ) -> _core.SimulationFigures:
+        self, path: _core.Path, *, against: _core.Path | None = None, override: float = 1.0, record_samples: int = 0,
+        emitted: bool = False, **given: Unpack[_Given],
+    ) -> _core.SimulationFigures:  # fmt: skip
         """A cut as the controller executes an ordinary program; `emitted`: with arcs as they are emitted."""
-        options = self.verdict_options(shift=shift, only=only, offset=offset)
+        options = self.verdict_options(**given)
         options.record_samples = record_samples
         controller = self._at_override(override, shaped=emitted and self.always_plans)
         return controller.simulate(path, options, against=against)
@@ -397,33 +352,18 @@ class MachineModel:
         return _core.simulate_samples(np.asfortranarray(samples), still, options)
 
     def simulate_emitted(
-        self,
-        blocks: _core.Path,
-        path: _core.Path,
-        block_end: _core.BlockEnd | None = None,
-        *,
-        override: float = 1.0,
-        contour: bool = True,
-        command_contour: bool = True,
-        response_contour: bool = True,
-        last_seconds: float = 0.0,
-        shift: float = 0.0,
-        only: str | None = None,
-        record_samples: int = 0,
-        offset: Offset = NO_OFFSET,
-        starved_blocks: Sequence[int] = (),
-        memory_s: float = 0.0,
-        other_overrides: Sequence[float] = (),
-        tracker: _core.ContourTracker | None = None,
-        increment_mm: float | None = None,
-    ) -> _core.SimulationFigures:
+        self, blocks: _core.Path, path: _core.Path, block_end: _core.BlockEnd | None = None, *, override: float = 1.0,
+        contour: bool = True, command_contour: bool = True, response_contour: bool = True, last_seconds: float = 0.0,
+        record_samples: int = 0, starved_blocks: Sequence[int] = (), memory_s: float = 0.0,
+        other_overrides: Sequence[float] = (), tracker: _core.ContourTracker | None = None,
+        increment_mm: float | None = None, **given: Unpack[_Given],
+    ) -> _core.SimulationFigures:  # fmt: skip
         """Emitted blocks as the controller simulates them, measured against the programmed path."""
-        options = self.verdict_options(filters=self.shaped.filters, shift=shift, only=only, offset=offset)
+        options = self.verdict_options(filters=self.shaped.filters, **given)
         options.measure_contour = contour
+        options.measure_command, options.measure_response = command_contour, response_contour
         if tracker is not None:
             options.tracker = tracker
-        options.measure_command = command_contour
-        options.measure_response = response_contour
         if increment_mm is not None:
             options.feed_window_s = max(self.machine.controller.block_time_s, self.period_s)
             options.feed_slack_mm = 2.0 * increment_mm
@@ -439,13 +379,9 @@ class MachineModel:
         return _core.simulate_blocks(blocks, path, block_end or self.own_rule, override, options)
 
     def simulate_planned(
-        self,
-        blocks: _core.Path,
-        path: _core.Path,
-        *,
-        offset: Offset = NO_OFFSET,
+        self, blocks: _core.Path, path: _core.Path, *, offset: Offset = NO_OFFSET,
         tracker: _core.ContourTracker | None = None,
-    ) -> _core.SimulationFigures:
+    ) -> _core.SimulationFigures:  # fmt: skip
         """Emitted blocks as the look-ahead plans them again if it is left on, against the programmed path."""
         ticks = round(self.machine.controller.look_ahead_filter_time_constant_s / self.period_s)
         filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []
@@ -459,8 +395,7 @@ class MachineModel:
         return float(_core.time_program(program, self.ordinary.model).total_s)
 
 
-RAMP_FREQUENCY_HZ = 10_000.0
-"""At which no block that is written is a ramp."""
+RAMP_FREQUENCY_HZ = 10_000.0  # at which no block that is written is a ramp
 _CORNER_RAD = 0.1  # a turn of the path itself, at which LinuxCNC blends or stops
 _MOST_KINK_RATIO = 0.7  # LinuxCNC takes 0.7071 for more
 _KINK_MARGIN = 1.25

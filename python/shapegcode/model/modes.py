@@ -18,12 +18,9 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import AxisMode, Machine
 from shapegcode.machine.axes import Drive
 
+#: Machine position minus program position of X, Y, Z in mm; None where it is not known.
 Offset = tuple[float | None, float | None, float | None]
-"""Machine position minus program position of X, Y, Z in mm; None where it is not known."""
-
 NO_OFFSET: Offset = (0.0, 0.0, 0.0)
-"""Program positions are machine positions."""
-
 _AXES = "xyz"
 
 
@@ -158,11 +155,8 @@ def region_offset(region: _core.Region, machine: Machine) -> Offset:
 def machine_warnings(machine: Machine) -> list[str]:
     """Warnings about the tables of modes before any program is read: a mass that is missing, unused or outside."""
     mass = machine.shaping.part_mass_kg
-    over_mass = [
-        (name, mode, mode.frequency_over.mass_kg)
-        for name, _, mode in numbered_modes(machine)
-        if mode.frequency_over is not None and mode.frequency_over.mass_kg is not None
-    ]
+    tables = [(name, mode, mode.frequency_over) for name, _, mode in numbered_modes(machine)]
+    over_mass = [(name, mode, over.mass_kg) for name, mode, over in tables if over is not None and over.mass_kg]
     if mass is None:
         return [
             f"{name} has a table over mass_kg, but shaping.part_mass_kg is not given: its nominal "
@@ -188,17 +182,14 @@ def region_range_warnings(regions: Sequence[_core.Region], machine: Machine) -> 
             continue
         axis = _AXES.index(over.axis)
         reached: list[float] = []
-        unknown = None
-        for region in regions:
-            offset = region_offset(region, machine)[axis]
-            if offset is None:
-                unknown = unknown or region
-                continue
-            positions = np.asarray(region.path.polyline())[:, axis] + offset
-            reached += [float(positions.min()), float(positions.max())]
-        if unknown is not None:
+        offsets = [(region, region_offset(region, machine)[axis]) for region in regions]
+        for region, offset in offsets:
+            if offset is not None:
+                positions = np.asarray(region.path.polyline())[:, axis] + offset
+                reached += [float(positions.min()), float(positions.max())]
+        if unknown := [region for region, offset in offsets if offset is None]:
             warnings.append(
-                f"line {unknown.first_line}: the position of {over.axis.upper()} is not known, over which {name} "
+                f"line {unknown[0].first_line}: the position of {over.axis.upper()} is not known, over which {name} "
                 f"varies: its nominal {mode.frequency_hz:g} Hz holds"
             )
         low, high = over.abscissa[0], over.abscissa[-1]
@@ -265,49 +256,30 @@ def drive_parameters(
         MachineError: an axis has no such table, or its loop is unstable.
     """
     machine = Machine.of(machine)
-    missing = [
-        Problem(f"axes.{name}.drive", "", "required for a simulation with feed drives, but missing")
-        for name, axis in zip("xyz", machine.axes.as_tuple(), strict=True)
-        if axis.drive is None
-    ]
-    if missing:
-        raise MachineError(machine.name, tuple(missing))
-    gains = machine.controller.position_gain_per_s.as_tuple()
-    ratios = machine.controller.feed_forward_ratio.as_tuple()
-    parameters = [
-        _of_axis(modes, axis.drive, gain, ratio)
-        for axis, modes, gain, ratio in zip(
-            machine.axes.as_tuple(), own_modes(machine, shift, only), gains, ratios, strict=True
-        )
-        if axis.drive is not None
-    ]
-    unstable = [
-        problem
-        for name, axis, gain in zip("xyz", machine.axes.as_tuple(), gains, strict=True)
-        if axis.drive is not None
-        for problem in _instability(name, axis.drive, gain)
-    ]
+    control, axes = machine.controller, machine.axes.as_tuple()
+    drives = {f"axes.{name}.drive": axis.drive for name, axis in zip(_AXES, axes, strict=True)}
+    absent = "required for a simulation with feed drives, but missing"
+    if missing := tuple(Problem(key, "", absent) for key, drive in drives.items() if drive is None):
+        raise MachineError(machine.name, missing)
+    loops = zip(control.position_gain_per_s.as_tuple(), control.feed_forward_ratio.as_tuple(), strict=True)
+    parameters, unstable = [], []
+    for (key, drive), modes, (gain, ratio) in zip(drives.items(), own_modes(machine, shift, only), loops, strict=True):
+        assert drive is not None
+        parameters.append(_of_axis(modes, drive, gain, ratio))
+        # Whether the loop grows by itself, dry friction, backlash and force limit left out.
+        linear = _of_axis([], drive.model_copy(update=_LINEAR), gain, 0.0)
+        poles = np.linalg.eigvals(np.array(_core.linear_model(linear)[0]))
+        worst = poles[np.argmax(poles.real)]
+        if worst.real > _GROWING_PER_S:
+            said = (
+                f"the loop is unstable: it grows by a factor e in {1.0 / worst.real:.3g} s at "
+                f"{abs(worst.imag) / (2.0 * math.pi):.4g} Hz; lower controller.position_gain_per_s ({gain:g}), raise "
+                "velocity_bandwidth_hz or velocity_integral_time_s"
+            )
+            unstable.append(Problem(key, "", said))
     if unstable:
         raise MachineError(machine.name, tuple(unstable))
     return parameters
-
-
-def _instability(name: str, drive: Drive, gain_per_s: float) -> list[Problem]:
-    """The problem of a loop of an axis that grows by itself, dry friction, backlash and force limit left out."""
-    linear = _of_axis([], drive.model_copy(update=_LINEAR), gain_per_s, 0.0)
-    poles = np.linalg.eigvals(np.array(_core.linear_model(linear)[0]))
-    worst = poles[np.argmax(poles.real)]
-    if worst.real <= _GROWING_PER_S:
-        return []
-    return [
-        Problem(
-            f"axes.{name}.drive",
-            "",
-            f"the loop is unstable: it grows by a factor e in {1.0 / worst.real:.3g} s at "
-            f"{abs(worst.imag) / (2.0 * math.pi):.4g} Hz; lower controller.position_gain_per_s ({gain_per_s:g}), raise "
-            "velocity_bandwidth_hz or velocity_integral_time_s",
-        )
-    ]
 
 
 def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: float) -> _core.FeedDriveParameters:
@@ -315,38 +287,29 @@ def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: fl
     motor_mass = drive.motor_inertia_kg_m2 * rad_per_m**2
     reduced_mass = motor_mass * drive.table_mass_kg / (motor_mass + drive.table_mass_kg)
     stiffness = drive.stiffness_n_per_um * _N_PER_UM
-    return _core.FeedDriveParameters(
-        motor_mass_kg=motor_mass,
-        table_mass_kg=drive.table_mass_kg,
-        stiffness_n_per_m=stiffness,
-        damping_n_s_per_m=2.0 * drive.damping_ratio * math.sqrt(stiffness * reduced_mass),
-        position_gain_per_s=gain_per_s,
-        velocity_gain_n_s_per_m=2.0 * math.pi * drive.velocity_bandwidth_hz * (motor_mass + drive.table_mass_kg),
-        velocity_integral_time_s=drive.velocity_integral_time_s,
-        velocity_feed_forward_ratio=ratio,
-        acceleration_feed_forward_ratio=drive.acceleration_feed_forward_ratio,
-        position_feedback=getattr(_core.PositionFeedback, drive.position_feedback),
-        backlash_m=drive.backlash_um * _UM,
-        force_limit_n=0.0 if drive.torque_limit_n_m is None else drive.torque_limit_n_m * rad_per_m,
-        table_friction=_table_friction(drive),
-        motor_friction=_core.FrictionParameters(
-            viscous_n_s_per_m=drive.motor_friction_viscous_n_m_s_per_rad * rad_per_m**2
-        ),
-        modes=modes,
-    )
-
-
-def _table_friction(drive: Drive) -> _core.FrictionParameters:
-    return _core.FrictionParameters(
+    table_friction = _core.FrictionParameters(
         getattr(_core.FrictionModel, drive.friction_model),
         viscous_n_s_per_m=drive.friction_viscous_n_s_per_m,
-        coulomb_n=drive.friction_coulomb_n or 0.0,
-        static_n=drive.friction_static_n or 0.0,
+        coulomb_n=drive.friction_coulomb_n or 0.0, static_n=drive.friction_static_n or 0.0,
         stribeck_velocity_m_per_s=drive.friction_stribeck_velocity_mm_per_s * _MM,
         smoothing_velocity_m_per_s=drive.friction_smoothing_velocity_mm_per_s * _MM,
         bristle_stiffness_n_per_m=drive.friction_bristle_stiffness_n_per_um * _N_PER_UM,
         bristle_damping_n_s_per_m=drive.friction_bristle_damping_n_s_per_m,
-    )
+    )  # fmt: skip
+    motor_viscous = drive.motor_friction_viscous_n_m_s_per_rad * rad_per_m**2
+    return _core.FeedDriveParameters(
+        motor_mass_kg=motor_mass, table_mass_kg=drive.table_mass_kg, stiffness_n_per_m=stiffness,
+        damping_n_s_per_m=2.0 * drive.damping_ratio * math.sqrt(stiffness * reduced_mass),
+        position_gain_per_s=gain_per_s,
+        velocity_gain_n_s_per_m=2.0 * math.pi * drive.velocity_bandwidth_hz * (motor_mass + drive.table_mass_kg),
+        velocity_integral_time_s=drive.velocity_integral_time_s, velocity_feed_forward_ratio=ratio,
+        acceleration_feed_forward_ratio=drive.acceleration_feed_forward_ratio,
+        position_feedback=getattr(_core.PositionFeedback, drive.position_feedback),
+        backlash_m=drive.backlash_um * _UM,
+        force_limit_n=0.0 if drive.torque_limit_n_m is None else drive.torque_limit_n_m * rad_per_m,
+        table_friction=table_friction, motor_friction=_core.FrictionParameters(viscous_n_s_per_m=motor_viscous),
+        modes=modes,
+    )  # fmt: skip
 
 
 _WANTED = (
@@ -386,7 +349,6 @@ def plant_response(
 
 
 def _core_modes(modes: Sequence[AxisMode | _core.Mode]) -> list[_core.Mode]:
-    """The modes of one axis for the core."""
     if not isinstance(modes, Sequence) or not all(isinstance(mode, AxisMode | _core.Mode) for mode in modes):
         raise _core.ArgumentError(f"the modes of an axis are {str(modes)[:80]!r}: {_WANTED}")
     return [still_mode(mode, None) if isinstance(mode, AxisMode) else mode for mode in modes]

@@ -31,16 +31,13 @@ class SimulatedPrograms:
     def methods(self) -> tuple[str, ...]:
         """Published methods of the controller and the plant that simulate them; see `Result.methods`."""
         control, drives = self.machine.controller, [axis.drive for axis in self.machine.axes.as_tuple()]
+        look_ahead = control.kind == "fanuc" and control.motion == "look_ahead"
+        lugre = any(drive is not None and drive.friction_model == "lugre" for drive in drives)
         used = {
             "block overlap": control.kind == "fanuc" and control.motion == "after_interpolation",
             "junction deviation": control.kind == "grbl"
-            or (
-                control.kind == "fanuc"
-                and control.motion == "look_ahead"
-                and control.corner_rule == "junction_deviation"
-            ),
-            "LuGre friction": self.plant != "modal"
-            and any(drive is not None and drive.friction_model == "lugre" for drive in drives),
+            or (look_ahead and control.corner_rule == "junction_deviation"),
+            "LuGre friction": self.plant != "modal" and lugre,
         }
         return tuple(name for name, is_used in used.items() if is_used)
 
@@ -60,15 +57,11 @@ def stamp_of_machine(machine: Machine, *, version: str = "") -> Stamp:
         for axis, modes in zip("XYZ", axis_modes(machine), strict=True)
         for mode in modes
     ]
-    return Stamp(version, machine.name, tuple(modes), "", "", "", _own_filter(machine))
-
-
-def _own_filter(machine: Machine) -> str:
     controller = machine.controller
     time_s, bell_s = controller.shaped_time_constant_s, controller.shaped_bell_time_s
     exponential = " EXPONENTIAL" if controller.shaped_filter_shape == "exponential" and time_s else ""
     bell = f" BELL {bell_s * 1e3:g} MS" if bell_s else ""
-    return f"{time_s * 1e3:g} MS{exponential}{bell}"
+    return Stamp(version, machine.name, tuple(modes), "", "", "", f"{time_s * 1e3:g} MS{exponential}{bell}")
 
 
 def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]:
@@ -76,31 +69,23 @@ def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]
     stamp = program.stamp
     if stamp is None:
         return []
-    found = []
+    found = {}
     if (mark := text_mark(program.own_text)) != stamp.mark:
-        found.append(
-            (
-                "edited",
-                f"the program was changed since it was shaped (mark in its header: {stamp.mark}, computed: "
-                f"{mark}): the "
-                "verdict in its header does not hold for it; convert the original again",
-            )
+        found["edited"] = (
+            f"the program was changed since it was shaped (mark in its header: {stamp.mark}, computed: {mark}): the "
+            "verdict in its header does not hold for it; convert the original again"
         )
     if difference := stamp.difference(stamp_of_machine(machine)):
-        found.append(
-            ("other_machine", f"shaped for another machine ({difference}): it is no remedy for this one's vibration")
-        )
+        why = f"shaped for another machine ({difference}): it is no remedy for this one's vibration"
+        found["other_machine"] = why
     if why := _other_period(stamp, machine):
-        found.append(("other_period", why))
+        found["other_period"] = why
     if not program.shaped_regions:
-        found.append(
-            (
-                "unmarked",
-                "its header says that it is shaped, but no cut is marked (SHAPED): simulated as an ordinary program "
-                "(simulate --shaped simulates all of it as shaped blocks)",
-            )
+        found["unmarked"] = (
+            "its header says that it is shaped, but no cut is marked (SHAPED): simulated as an ordinary program "
+            "(simulate --shaped simulates all of it as shaped blocks)"
         )
-    return found
+    return list(found.items())
 
 
 def _other_period(stamp: Stamp, machine: Machine) -> str:

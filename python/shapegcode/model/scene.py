@@ -5,7 +5,7 @@ Memory does not grow with the length of a program: each piece is thinned as soon
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,36 +14,21 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
-from shapegcode.model.machine_model import MachineModel, fanuc_model
+from shapegcode.model.machine_model import fanuc_model
 from shapegcode.model.modes import axis_modes
 from shapegcode.model.stream import Chunk, cuts_of_lines, stream
 from shapegcode.program import Program
 from shapegcode.program.compensation import paired_regions
-from shapegcode.results.page.scene import (
-    PIXELS_HIGH,
-    PIXELS_WIDE,
-    AccelerationSpectrum,
-    Kept,
-    ModeLine,
-    Scene,
-    SceneSpectrum,
-    Thinner,
-    Variant,
-)
+from shapegcode.results.page import scene as page
+from shapegcode.results.page.scene import Kept, Scene, SceneSpectrum, Variant
 
-MOST_POINTS = 60_000
-"""Samples of a program that a page shows, at most."""
-
-
-_HALF_PIXEL = 0.5
-_LEAST_EXTENT_MM = 1e-3
+MOST_POINTS = 60_000  # samples of a program that a page shows, at most
+_HALF_PIXEL, _LEAST_EXTENT_MM = 0.5, 1e-3
 _FLAT = {"deviation": 1e-3, "vibration": 1e-3, "speed": 1e-3, "acceleration": 1e-6}  # a curve within so little is flat
 
 
 @dataclass
 class _Followed:
-    """Follows the cuts of a program along their paths, one after the other."""
-
     cuts: list[tuple[_core.Region, _core.Path]]  # each with the path that it shall follow, in the order of its lines
     _at: int = -1
     _follower: _core.PathFollower | None = field(default=None, repr=False)
@@ -74,7 +59,6 @@ def scene_of(
 ) -> Scene:
     """Simulate a program and its emitted program for a page."""
     programs = [original, *([emitted] if emitted is not None else [])]
-    period_s = MachineModel(machine).period_s
     variants, spectra, notes = [], [], []
     for rank, (program, label) in enumerate(zip(programs, labels, strict=False)):
         key = ("original", "emitted")[rank]
@@ -87,14 +71,19 @@ def scene_of(
         spectra += lines
         notes.append(
             f"{label}: {len(variant.sample)} of {variant.samples} samples, path within {kept.path_pixels:.1f} pixel of "
-            f"{PIXELS_WIDE}, curves within {kept.pixels / PIXELS_HIGH * 100.0:.1f} % of their range"
+            f"{page.PIXELS_WIDE}, curves within {kept.pixels / page.PIXELS_HIGH * 100.0:.1f} % of their range"
         )
+    of_mode = "mode of {}, {:g} Hz".format
     return Scene(
-        period_s=period_s,
+        period_s=machine.controller.interpolation_period_s,
         variants=tuple(variants),
         thinned=f"Thinned for display, extremes kept ({'; '.join(notes)}). The figures are not thinned.",
         spectra=tuple(spectra),
-        modes=tuple(_mode_lines(machine)),
+        modes=tuple(
+            page.ModeLine(axis, mode.frequency_hz, of_mode(axis.upper(), mode.frequency_hz))
+            for axis, modes in zip("xyz", axis_modes(machine), strict=True)
+            for mode in modes
+        ),
         link_lines=tuple(
             (made.first_line, made.last_line, own.first_line, own.last_line)
             for made, own in (() if emitted is None else paired_regions(emitted, original))
@@ -103,19 +92,14 @@ def scene_of(
 
 
 def _variant(
-    key: str,
-    label: str,
-    program: Program,
-    nominal: Program,
-    machine: Machine,
-    plant: str,
+    key: str, label: str, program: Program, nominal: Program, machine: Machine, plant: str,
     on_progress: Callable[[float], None],
-) -> tuple[Variant, list[SceneSpectrum], Kept]:
-    period_s = MachineModel(machine).period_s
+) -> tuple[Variant, list[SceneSpectrum], Kept]:  # fmt: skip
+    period_s = machine.controller.interpolation_period_s
     whole_s = _core.time_program(program.core, fanuc_model(machine)).total_s or period_s
     cuts = [(mine, other.path) for mine, other in paired_regions(program, nominal)]
     followed = _Followed(sorted(cuts, key=lambda cut: cut[0].first_line))
-    thinner, spectrum = Thinner(_scales(nominal), MOST_POINTS), AccelerationSpectrum(period_s)
+    thinner, spectrum = page.Thinner(_scales(nominal), MOST_POINTS), page.AccelerationSpectrum(period_s)
     blocks = _Blocks()
     velocity: FloatArray | None = None
     for chunk in stream(program, machine, plant=plant):
@@ -143,7 +127,9 @@ def _variant(
         key, label, program.source, text, kept.sample, line, block, kept.command_mm, kept.deviation_um, channels,
         thinner.samples, tuple((cut.first_line, cut.last_line) for cut, _ in cuts),
     )  # fmt: skip
-    return variant, spectrum.lines(key, most_hz=_most_hz(machine, period_s)), kept
+    # Up to twice the highest mode and at least 200 Hz, within half the sample rate.
+    highest = max((mode.frequency_hz for modes in axis_modes(machine) for mode in modes), default=0.0)
+    return variant, spectrum.lines(key, most_hz=min(max(2.0 * highest, 200.0), 0.5 / period_s)), kept
 
 
 class _Blocks:
@@ -175,16 +161,4 @@ def _scales(program: Program) -> dict[str, float]:
     """What half a pixel is, of the path in mm; of a curve the range below which it is flat."""
     corners = [corner for region in program.regions for corner in (region.path.polyline(),) if len(corner)]
     extent = float(np.ptp(np.concatenate(corners), axis=0).max()) if corners else 0.0
-    return {"path": max(extent, _LEAST_EXTENT_MM) * _HALF_PIXEL / PIXELS_WIDE} | _FLAT
-
-
-def _most_hz(machine: Machine, period_s: float) -> float:
-    """Highest frequency of a spectrum: twice the highest mode and at least 200 Hz, within half the sample rate."""
-    highest = max((mode.frequency_hz for modes in axis_modes(machine) for mode in modes), default=0.0)
-    return min(max(2.0 * highest, 200.0), 0.5 / period_s)
-
-
-def _mode_lines(machine: Machine) -> Iterator[ModeLine]:
-    for axis, modes in zip("xyz", axis_modes(machine), strict=True):
-        for mode in modes:
-            yield ModeLine(axis, mode.frequency_hz, f"mode of {axis.upper()}, {mode.frequency_hz:g} Hz")
+    return {"path": max(extent, _LEAST_EXTENT_MM) * _HALF_PIXEL / page.PIXELS_WIDE} | _FLAT

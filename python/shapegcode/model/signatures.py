@@ -6,15 +6,11 @@ import ast
 import functools
 import inspect
 import re
-from collections.abc import Callable
 from typing import Any, TypeVar
 
 from shapegcode import _core
 
 T = TypeVar("T")
-
-# What the core calls a number, and what a reader does.
-_NUMBERS = (("SupportsFloat | SupportsIndex", "float"), ("SupportsInt | SupportsIndex", "int"))
 
 
 def with_signature(value: T) -> T:
@@ -25,21 +21,17 @@ def with_signature(value: T) -> T:
             shown = found.replace(parameters=taken, return_annotation=inspect.Signature.empty)
             setattr(value, "__signature__", shown)  # noqa: B010
         return value
-    if inspect.isbuiltin(value) and (found := _signature(value.__doc__)):
-        called: Any = _called(value)
-        called.__signature__ = found
-        return called  # type: ignore[no-any-return]
-    return value
+    if not inspect.isbuiltin(value) or not (found := _signature(value.__doc__)):
+        return value
 
-
-def _called(function: Callable[..., Any]) -> Callable[..., Any]:
-    @functools.wraps(function)
+    @functools.wraps(value)
     def called(*args: Any, **kwargs: Any) -> Any:
-        return function(*args, **kwargs)
+        return value(*args, **kwargs)
 
     called.__module__ = "shapegcode"
-    called.__doc__ = (function.__doc__ or "").partition("\n\n")[2].strip()
-    return called
+    called.__doc__ = (value.__doc__ or "").partition("\n\n")[2].strip()
+    setattr(called, "__signature__", found)  # noqa: B010
+    return called  # type: ignore[return-value]
 
 
 def _signature(doc: str | None) -> inspect.Signature | None:
@@ -53,17 +45,12 @@ def _signature(doc: str | None) -> inspect.Signature | None:
     if not isinstance(found, ast.FunctionDef):
         return None
     free, named = found.args.args, found.args.kwonlyargs
+    defaults = [None] * (len(free) - len(found.args.defaults)) + list(found.args.defaults)
+    kinds = inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY
     parameters = [
         inspect.Parameter(each.arg, kind, default=_value(default), annotation=_words(each.annotation))
-        for kind, arguments, defaults in (
-            (
-                inspect.Parameter.POSITIONAL_OR_KEYWORD,
-                free,
-                [None] * (len(free) - len(found.args.defaults)) + list(found.args.defaults),
-            ),
-            (inspect.Parameter.KEYWORD_ONLY, named, found.args.kw_defaults),
-        )
-        for each, default in zip(arguments, defaults, strict=True)
+        for kind, arguments, given in ((kinds[0], free, defaults), (kinds[1], named, found.args.kw_defaults))
+        for each, default in zip(arguments, given, strict=True)
     ]
     return inspect.Signature(parameters, return_annotation=_words(found.returns))
 
@@ -97,6 +84,6 @@ def _words(annotation: ast.expr | None) -> Any:
     if annotation is None:
         return inspect.Parameter.empty
     text = ast.unparse(_Short().visit(annotation))
-    for core, word in _NUMBERS:
-        text = text.replace(core, word)
-    return text
+    # What the core calls a number, and what a reader does.
+    text = text.replace("SupportsFloat | SupportsIndex", "float")
+    return text.replace("SupportsInt | SupportsIndex", "int")

@@ -16,15 +16,11 @@ from shapegcode import _core
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, fanuc_model
-from shapegcode.model.modes import Offset
 from shapegcode.program import Program, given_program
 
+#: Names of what `Chunk.kind` numbers.
 KINDS = tuple(kind.name for kind in sorted(_core.BlockKind.__members__.values(), key=lambda kind: kind.value))
-"""Names of what `Chunk.kind` numbers."""
-
-REST_S = 0.25
-"""Duration for which the set-points rest after the end of a program."""
-
+REST_S = 0.25  # for which the set-points rest after the end of a program
 _CHUNK_SAMPLES = 65536
 _OF_EVERY_PLANT = ("line", "kind", "command_mm", "response_mm", "velocity_mm_per_s")
 _OF_DRIVES = ("motor_mm", "motor_force_n", "friction_force_n")
@@ -47,7 +43,6 @@ class Chunk:
     friction_force_n: FloatArray | None = None  # feed drives only: friction of the table, against its motion, (k, 3)
 
     def __len__(self) -> int:
-        """Rows."""
         return len(self.time_s)
 
     @property
@@ -126,18 +121,13 @@ def stream(
         where = "lines {}-{}".format(*lines)
         raise _core.ArgumentError(f"{where}: must lie within 1-{count} of {program.source}, first to last")
     model = MachineModel(machine)
-    offsets, known = _offsets(program, model)
-    options = model.options(plant=plant, offset=known)
+    of_regions = [model.offset(region) for region in program.regions]
+    x, y, z = (None if any(offset[axis] is None for offset in of_regions) else 0.0 for axis in range(3))
+    options = model.options(plant=plant, offset=(x, y, z))
     controller = fanuc_model(machine, shaped=shaped)
+    offsets = [np.array([value or 0.0 for value in offset]) for offset in of_regions]
     simulated = _core.SimulationStream.of_program(program.core, controller, options, offsets, REST_S)
     return _chunks(simulated, model.period_s, lines, chunk_samples)
-
-
-def _offsets(program: Program, model: MachineModel) -> tuple[list[FloatArray], Offset]:
-    """Of each region from program to machine positions, and None for axes where one of them is not known."""
-    found = [model.offset(region) for region in program.regions]
-    x, y, z = (None if any(offset[axis] is None for offset in found) else 0.0 for axis in range(3))
-    return [np.array([value or 0.0 for value in offset]) for offset in found], (x, y, z)
 
 
 def _chunks(

@@ -235,8 +235,7 @@ def read_test_cut(path: str | Path) -> TestCut:
 
 # --- edges: heights count from the wall of the measuring pass, outwards -----------------------------------------------
 
-_GRID_MM = 0.004
-_CHORD_MM = 1e-4
+_GRID_MM, _CHORD_MM = 0.004, 1e-4
 _MOVED = 9  # increments
 
 

@@ -17,36 +17,21 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.cutting.tool import Tool
 from shapegcode.errors import ArgumentError
+from shapegcode.identification.sweep_program import plain_name
 from shapegcode.io.data_file import write_text
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program.stamp import OVERRIDE
 from shapegcode.results.json import to_text
-from shapegcode.testcut.cut import (
-    FIGURES,
-    CornerDetails,
-    CuttingLaw,
-    CutTool,
-    DeeperStretch,
-    Deepest,
-    Edge,
-    IntervalDetails,
-    MeasuringPass,
-    TaperDetails,
-    TestCut,
-    offset_line,
-    on_increments,
-    reduced,
-    unrolled_edge,
-)
+from shapegcode.testcut import cut as cuts
+from shapegcode.testcut.cut import CornerDetails, CutTool, Edge, IntervalDetails, MeasuringPass, TaperDetails
 from shapegcode.testcut.forces import ForceLaw, engagement, straight_engagement
 from shapegcode.testcut.result import CutDesign
 
 _Sizes = tuple[float, float, float]  # of a corner: allowance, rough and finish radius
 _Block = tuple[float | None, float]  # X up to which a feed holds (None: the end of the pass), feed in mm/min
 
-_MIN_AIR_MM = 5.0
-_AIR_REVS = 20.0
+_MIN_AIR_MM, _AIR_REVS = 5.0, 20.0
 _MAX_DEPTH_RATIO = 0.95  # of the radius, up to which a radial depth is taken
 
 
@@ -89,12 +74,11 @@ class CutConditions:
 
     def _cut_tool(self) -> CutTool:
         """The tool as the side file holds it."""
-        mill, law = self.tool.tool, CuttingLaw.of(self.tool.coefficients())
+        mill, law = self.tool.tool, cuts.CuttingLaw.of(self.tool.coefficients())
         runout = tuple(0.001 * value for value in mill.runout_um or ())
         return CutTool(mill.diameter_mm, mill.flutes, mill.helix_deg, runout, law)
 
     def _check_feeds(self, feeds_mm_per_min: Sequence[float]) -> None:
-        """Refuse what the machine or the tool cannot do."""
         low, high = self.machine.controller.minimum_feed_mm_per_min, self.machine.axes.x.max_feed_mm_per_min
         for feed in feeds_mm_per_min:
             if not low <= feed <= high:
@@ -106,7 +90,6 @@ class CutConditions:
             raise ArgumentError("the tool turns counter-clockwise: test cuts are written for M03 only")
 
     def _check_depths(self, low_mm: float, high_mm: float) -> None:
-        """Refuse radial depths that the round tool cannot have on a straight pass."""
         limit = _MAX_DEPTH_RATIO * self.tool.radius_mm
         if not 0.0 < low_mm <= high_mm <= limit:
             raise ArgumentError(
@@ -130,8 +113,8 @@ class CornerShape:
 
     def _sizes_mm(self, diameter_mm: float) -> _Sizes:
         """The three values for a tool; of what is not given, case 1 of the paper."""
-        given = (self.allowance_mm, self.rough_radius_mm, self.finish_radius_mm)
         usual = (0.1 * diameter_mm, diameter_mm, diameter_mm)
+        given = (self.allowance_mm, self.rough_radius_mm, self.finish_radius_mm)
         allowance, rough, finish = (other if own is None else own for own, other in zip(given, usual, strict=True))
         return allowance, rough, finish
 
@@ -198,12 +181,12 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     straight = max(10.0, 3.0 * radius)
     s, depth = _corner_depth(given, sizes)
     stock = math.ceil(2.0 * straight + float(s[-1]) + radius)
-    wanted_edge = unrolled_edge(s, depth, radius, stock, straight)
+    wanted_edge = cuts.unrolled_edge(s, depth, radius, stock, straight)
     # What the round tool leaves is the edge that the passes meet: where the wanted one is hollow more sharply than
     # the tool is round, it stays higher.
     far = 3.0 * radius
-    path = offset_line(wanted_edge, radius, -far, stock + far)
-    edge = reduced(offset_line(path, radius, -radius, stock + radius, inwards=True), 1e-4)
+    path = cuts.offset_line(wanted_edge, radius, -far, stock + far)
+    edge = cuts.reduced(cuts.offset_line(path, radius, -radius, stock + radius, inwards=True), 1e-4)
     x = np.arange(0.0, stock - radius, _STATION_MM)
     probe = _measuring_pass(given, edge, stock, "probe", [constant])
     met = engagement(given._cut_tool(), probe, x, up=given.up).radial_depth_mm
@@ -213,8 +196,8 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     given._check_feeds([feed for _, feed in blocks])
     excess = met - np.interp(x, s + straight, depth)
     more = np.flatnonzero(excess > _FEW_UM)
-    deeper = DeeperStretch(float(x[more[0]]), float(x[more[-1]]), float(excess.max())) if more.size else None
-    deepest = Deepest(float(met.max()), float(x[int(np.argmax(met))]))
+    deeper = cuts.DeeperStretch(float(x[more[0]]), float(x[more[-1]]), float(excess.max())) if more.size else None
+    deepest = cuts.Deepest(float(met.max()), float(x[int(np.argmax(met))]))
     about = CornerDetails(*sizes, interval, straight, deepest, deeper)
     modified = [(begin, given.feed_mm_per_min), *blocks, constant]
     passes = [("CONSTANT FEED", [constant]), ("MODIFIED FEED", modified)]
@@ -262,16 +245,10 @@ def interval_cut(
 
 
 def _design(
-    given: CutConditions,
-    edge: Edge,
-    stock_mm: float,
-    passes: Sequence[tuple[str, Sequence[_Block]]],
-    about: TaperDetails | CornerDetails | IntervalDetails,
-    *,
-    met: Edge | None = None,
-) -> CutDesign:
-    """The design of measuring passes over one edge."""
-    kind = next(kind for kind, figures in FIGURES.items() if isinstance(about, figures))
+    given: CutConditions, edge: Edge, stock_mm: float, passes: Sequence[tuple[str, Sequence[_Block]]],
+    about: TaperDetails | CornerDetails | IntervalDetails, *, met: Edge | None = None,
+) -> CutDesign:  # fmt: skip
+    kind = next(kind for kind, figures in cuts.FIGURES.items() if isinstance(about, figures))
     warnings = []
     if isinstance(about, CornerDetails) and about.deeper_than_corner is not None:
         deeper = about.deeper_than_corner
@@ -279,24 +256,17 @@ def _design(
             f"X {deeper.from_mm:.2f} to {deeper.to_mm:.2f} mm: the passes meet up to {deeper.most_mm:.3f} mm more than "
             "the corner: there its edge is hollow more sharply than the tool is round; the side file has what is met"
         )
-    cut = TestCut(
-        kind=kind,
-        program="",
-        machine=given.machine.name,
-        tool=given._cut_tool(),
-        spindle_rev_per_min=given.spindle,
-        axial_depth_mm=given.axial_depth_mm,
-        milling="up" if given.up else "down",
-        passes=tuple(_measuring_pass(given, met or edge, stock_mm, name, blocks) for name, blocks in passes),
-        about=about,
-    )
+    cut = cuts.TestCut(
+        kind, "", given.machine.name, given._cut_tool(), given.spindle, given.axial_depth_mm,
+        "up" if given.up else "down",
+        tuple(_measuring_pass(given, met or edge, stock_mm, name, blocks) for name, blocks in passes), about,
+    )  # fmt: skip
     return CutDesign(cut, (), tuple(warnings), edge, stock_mm, given.machine)
 
 
 def _measuring_pass(
     given: CutConditions, edge: Edge, stock_mm: float, name: str, blocks: Sequence[_Block]
 ) -> MeasuringPass:
-    """One pass over an edge, from air to air."""
     inside = (edge.x_mm > 0.0) & (edge.x_mm < stock_mm)
     x = np.concatenate([[0.0], edge.x_mm[inside], [stock_mm]])
     # How far the pass goes through the air at both ends, by its largest feed.
@@ -349,8 +319,7 @@ def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[FloatArray, Floa
 _SKIM_MM = 0.2
 _ROUGH_SHARE = 0.1  # of the diameter: largest radial depth of the cuts that mill the edge
 _RAW_MM = 0.5  # by which the raw edge may stand out
-_CLEAR_Z_MM = 10.0
-_NEAR_Z_MM = 2.0
+_CLEAR_Z_MM, _NEAR_Z_MM = 10.0, 2.0
 _BLOCKS_OF_EDGE = 3.0  # times the block time that a block of the edge lasts at least
 _SAMPLES_PER_TOOTH = 12.3  # no whole number: samples should not fall on the same angles over and over
 _TITLES = {"taper": "TAPER TEST CUT", "corner": "CORNER ON A STRAIGHT LINE", "interval": "FEED INTERVAL TEST"}
@@ -380,12 +349,11 @@ def write_test_cut(design: CutDesign, file: str | Path, number: int = 7101) -> C
     side = output.with_suffix(".json")
     named = replace(design, cut=replace(design.cut, program=output.name), files=(str(output), str(side)))
     write_text(side, to_text(named.cut.data()))
-    write_text(output, program_text(named, number))
+    write_text(output, _program_text(named, number))
     return named
 
 
-def program_text(design: CutDesign, number: int = 7101) -> str:
-    """The program of a test cut."""
+def _program_text(design: CutDesign, number: int) -> str:
     writer = _Writer(design)
     lines = ["%", f"O{number:04d}({_TITLES[design.cut.kind]})", *(f"({line})" for line in writer.head())]
     lines += ["G21 G17 G90 G94 G64 G40 G49 G80", "G54"]
@@ -406,7 +374,7 @@ class _Writer:
         self.design, self.cut, self.controller = design, design.cut, design.machine.controller
         self.decimals = max(1, round(-math.log10(self.controller.least_increment_mm)))
         self.radius = self.cut.tool.radius_mm
-        self.side = -1.0 if not self.cut.up else 1.0  # of the material, along Y: what lies within the raw edge
+        self.side = 1.0 if self.cut.up else -1.0  # of the material, along Y: what lies within the raw edge
         # How far each wall lies within the raw edge.
         self.walls = list(accumulate(round(max(each.edge_height_mm) + _SKIM_MM, 3) for each in self.cut.passes))
 
@@ -418,7 +386,7 @@ class _Writer:
         text = (resources.files("shapegcode") / "data" / "testcut_head.txt").read_text(encoding="ascii")
         yield from _PURPOSES[cut.kind]
         yield from text.format(
-            cut=cut, machine=_plain(cut.machine), stock_mm=self.design.stock_mm, rate=rate, clear_z_mm=_CLEAR_Z_MM,
+            cut=cut, machine=plain_name(cut.machine), stock_mm=self.design.stock_mm, rate=rate, clear_z_mm=_CLEAR_Z_MM,
             edge="REAR EDGE" if self.side < 0.0 else "FRONT EDGE", near=min(ends), far=max(ends),
             wide=math.ceil(self.walls[-1] + 5.0), deep=math.ceil(cut.axial_depth_mm + 2.0), override=OVERRIDE.comment,
             left=min(each.start_mm for each in cut.passes), right=max(each.end_mm for each in cut.passes),
@@ -430,18 +398,15 @@ class _Writer:
 
     def passes(self, k: int) -> Iterator[str]:
         """The edge of a pass, a stop, and the pass."""
-        each = self.cut.passes[k]
-        wall = self.walls[k]
-        before = self.walls[k - 1] if k else -_RAW_MM
-        path = offset_line(self.design.edge, self.radius, each.start_mm, each.end_mm)
-        path = on_increments(path, self.controller.least_increment_mm)
+        each, wall = self.cut.passes[k], self.walls[k]
+        path = cuts.offset_line(self.design.edge, self.radius, each.start_mm, each.end_mm)
+        path = cuts.on_increments(path, self.controller.least_increment_mm)
         yield f"(PASS {k + 1}: MILL THE EDGE)"
-        for offset in _offsets(self.design.edge, before, wall, self.design.stock_mm, self.cut.tool.diameter_mm):
+        for offset in self._offsets(self.walls[k - 1] if k else -_RAW_MM, wall):
             yield from self._edge(path, wall, offset, min(feed for _, feed in each.feeds))
         yield f"G00 Z{_text(_CLEAR_Z_MM)}"
         yield f"M00 (START RECORD {k + 1}: {each.name})"
-        # The control may have stopped the spindle.
-        yield f"S{self.cut.spindle_rev_per_min:g} M03"
+        yield f"S{self.cut.spindle_rev_per_min:g} M03"  # The control may have stopped the spindle
         yield "G04 P3000"
         yield from self._begin(each.start_mm, self.side * (wall - self.radius), each.feed_mm_per_min)
         for end, feed in each.feeds:
@@ -468,16 +433,12 @@ class _Writer:
             first = ""
         yield f"G00 Z{_text(_NEAR_Z_MM)}"
 
-
-def _offsets(edge: Edge, before: float, wall: float, stock: float, diameter: float) -> list[float]:
-    """How far outside of the edge each cut runs: none takes off much, the last one little, so that it bends little."""
-    x = np.linspace(0.0, stock, 200)
-    most = float(np.max(wall - edge.at(x) - before))
-    if most <= _SKIM_MM:
-        return [0.0]
-    rough = math.ceil((most - _SKIM_MM) / (_ROUGH_SHARE * diameter))
-    return [round(_SKIM_MM + (most - _SKIM_MM) * k / rough, 3) for k in range(rough - 1, -1, -1)] + [0.0]
-
-
-def _plain(name: str) -> str:
-    return "".join(sign for sign in name.upper() if sign.isalnum() or sign in " -.")[:30]
+    def _offsets(self, before: float, wall: float) -> list[float]:
+        """How far outside of the edge each cut runs: none takes off much, the last one little: it bends little."""
+        more = (
+            float(np.max(wall - self.design.edge.at(np.linspace(0.0, self.design.stock_mm, 200)) - before)) - _SKIM_MM
+        )
+        if more <= 0.0:
+            return [0.0]
+        rough = math.ceil(more / (_ROUGH_SHARE * self.cut.tool.diameter_mm))
+        return [round(_SKIM_MM + more * k / rough, 3) for k in range(rough - 1, -1, -1)] + [0.0]

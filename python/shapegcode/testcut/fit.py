@@ -1,5 +1,4 @@
-"""Evaluate the records of a test cut: coefficients of a taper, resultant in a corner, interval that the control
-follows."""
+"""Evaluate the records of a test cut: coefficients of a taper, resultant in a corner, interval that is followed."""
 
 from __future__ import annotations
 
@@ -14,19 +13,9 @@ from scipy.special import lambertw
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.units import FloatArray
+from shapegcode.testcut import forces, result
 from shapegcode.testcut.cut import CuttingLaw, IntervalDetails, MeasuringPass, TestCut, read_test_cut
-from shapegcode.testcut.forces import (
-    CoefficientFit,
-    Engagement,
-    ForceLaw,
-    MeanForces,
-    Thickness,
-    engagement,
-    expected,
-    fit_coefficients,
-    fully_engaged,
-    straight_engagement,
-)
+from shapegcode.testcut.forces import Engagement, ForceLaw, MeanForces, Thickness, engagement, expected, fully_engaged
 from shapegcode.testcut.record import (
     MIN_SAMPLES,
     ForceRecord,
@@ -37,19 +26,7 @@ from shapegcode.testcut.record import (
     revolutions,
     turned,
 )
-from shapegcode.testcut.result import (
-    EXPONENT_LIMIT,
-    FACTOR_LIMIT,
-    ChipRange,
-    CornerPass,
-    CornerResult,
-    FollowedPass,
-    ForceRatio,
-    IntervalResult,
-    LeftOut,
-    TaperPass,
-    TaperResult,
-)
+from shapegcode.testcut.result import CornerResult, IntervalResult, TaperResult
 
 _Record = str | Path | ForceRecord
 
@@ -95,9 +72,7 @@ def fit_test_cut(
     return _fit_corner(known, measured) if known.kind == "corner" else _fit_interval(known, measured)
 
 
-_BINS_PER_PASS = 60
-_MIN_TURNS = 4
-_ROUNDS = 2
+_BINS_PER_PASS, _MIN_TURNS, _ROUNDS = 60, 4, 2
 _ONE_FILE = np.zeros(0, dtype=np.intp)  # its number is given where files are joined
 _PLACE = 0.25  # Standard error of the place of the tool, found from entry and exit, in feeds per revolution
 _PER_MINUTE = 60.0
@@ -110,42 +85,29 @@ def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: 
         # Where entry and exit lie in the record depends a little on the law.
         rows, passes, left_out, warnings = _reduced(cut, measured, law)
         data = _joined(rows)
-        fit = fit_coefficients(data, cut.tool, cut.axial_depth_mm, thickness=thickness, edge=edge)
+        fit = forces.fit_coefficients(data, cut.tool, cut.axial_depth_mm, thickness=thickness, edge=edge)
         law = fit.law
     if fit.outlier.any():
         warnings.append(f"{fit.outlier.sum()} of {len(fit.outlier)} mean forces do not fit the others: left out")
+    low, high = float(fit.chip_mm.min()), float(fit.chip_mm.max())
     return TaperResult(
-        program=cut.program,
-        machine=cut.machine,
-        cutting=fit.law,
-        coefficients=fit.coefficients,
-        at_chip=fit.at_chip,
-        chip_mm=ChipRange(float(fit.chip_mm.min()), float(fit.chip_mm.max()), fit.middle_chip_mm),
-        mean_forces=len(fit.chip_mm),
-        outliers=int(fit.outlier.sum()),
-        rms_n=(float(fit.rms_n[0]), float(fit.rms_n[1])),
-        rms_percent=fit.rms_percent,
-        neighbour_correlation=fit.correlation,
-        passes=tuple(passes),
-        left_out=tuple(left_out),
-        poor=tuple(_poor(fit)),
-        warnings=tuple(warnings),
-        cut=cut,
-        fit=fit,
-        data=data,
-    )
+        cut.program, cut.machine, fit.law, fit.coefficients, fit.at_chip,
+        result.ChipRange(low, high, fit.middle_chip_mm), len(fit.chip_mm), int(fit.outlier.sum()),
+        (float(fit.rms_n[0]), float(fit.rms_n[1])), fit.rms_percent, fit.correlation, passes=tuple(passes),
+        left_out=tuple(left_out), poor=tuple(_poor(fit)), warnings=tuple(warnings), cut=cut, fit=fit, data=data,
+    )  # fmt: skip
 
 
-def _poor(fit: CoefficientFit) -> Iterator[str]:
+def _poor(fit: forces.CoefficientFit) -> Iterator[str]:
     """Coefficients of the power laws that are not known well, in words."""
     for each in fit.coefficients[:4]:
         half = 0.5 * (each.high - each.low)
         if each.name.endswith("exponent"):
-            if half > EXPONENT_LIMIT:
-                yield f"{each.name} is known to +-{half:.3f} only (wanted: +-{EXPONENT_LIMIT:g})"
-        elif half > FACTOR_LIMIT * each.value:
+            if half > result.EXPONENT_LIMIT:
+                yield f"{each.name} is known to +-{half:.3f} only (wanted: +-{result.EXPONENT_LIMIT:g})"
+        elif half > result.FACTOR_LIMIT * each.value:
             share = 100.0 * half / each.value
-            yield f"{each.name} is known to +-{share:.0f} % only (wanted: +-{100 * FACTOR_LIMIT:g} %)"
+            yield f"{each.name} is known to +-{share:.0f} % only (wanted: +-{100 * result.FACTOR_LIMIT:g} %)"
 
 
 def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
@@ -162,12 +124,11 @@ def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
 
 def _reduced(
     cut: TestCut, measured: Mapping[int, ForceRecord], law: CuttingLaw
-) -> tuple[list[MeanForces], list[TaperPass], list[LeftOut], list[str]]:
-    """Reduce the records to mean forces (as recorded, or of the revolutions in full engagement without chatter); and
-    warnings."""
+) -> tuple[list[MeanForces], list[result.TaperPass], list[result.LeftOut], list[str]]:
+    """Reduce the records to mean forces, as recorded or of revolutions in full engagement without chatter."""
     rows: list[MeanForces] = []
-    passes: list[TaperPass] = []
-    left_out: list[LeftOut] = []
+    passes: list[result.TaperPass] = []
+    left_out: list[result.LeftOut] = []
     warnings: list[str] = []
     for number, record in measured.items():
         measuring = cut.passes[number - 1]
@@ -177,13 +138,13 @@ def _reduced(
         found = revolutions(place_samples(record, cut, measuring, expected(cut, measuring, law)))
         shown = found.record
         offset, drift = ((float(along), float(left)) for along, left in (shown.offset_n, shown.drift_n))
-        passes.append(TaperPass(shown.file, found.feed_mm_per_min, shown.spindle_rev_per_min, offset, drift))
+        passes.append(result.TaperPass(shown.file, found.feed_mm_per_min, shown.spindle_rev_per_min, offset, drift))
         warnings += shown.notes
         rows.append(_of_revolutions(cut, measuring, found))
         marks = np.flatnonzero(np.diff(np.concatenate([[0], found.chatter.astype(int), [0]])))
         for first, behind in zip(marks[::2], marks[1::2], strict=True):
             low, high = float(found.x_mm[first]), float(found.x_mm[behind - 1])
-            left_out.append(LeftOut(number, low, high))
+            left_out.append(result.LeftOut(number, low, high))
             warnings.append(
                 f"{shown.file}: X {low:.1f} to {high:.1f} mm left out: the force oscillates far more there than in the "
                 "rest of the pass (chatter?)"
@@ -202,7 +163,7 @@ def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> Me
                 f"{cut.tool.diameter_mm:g} mm"
             )
         row = np.ones(len(depth), dtype=bool)
-        met = straight_engagement(cut.tool, depth, up=cut.up)
+        met = forces.straight_engagement(cut.tool, depth, up=cut.up)
     else:
         if record.position_mm is None:
             raise ArgumentError(
@@ -244,16 +205,11 @@ def _joined(rows: Sequence[MeanForces]) -> MeanForces:
 
     # A torque that only some of the files have does not help the others.
     torques = [each.torque_nm for each in rows if each.torque_nm is not None]
-    return MeanForces(
-        Engagement.joined([each.met for each in rows]),
-        column("feed_mm_per_min"),
-        column("spindle_rev_per_min"),
-        column("force_n"),
-        column("revolutions"),
-        np.repeat(np.arange(len(rows)), [len(each.force_n) for each in rows]),
-        Engagement.joined([each.displaced or each.met for each in rows]),
-        np.concatenate(torques) if len(torques) == len(rows) else None,
-    )
+    torque = np.concatenate(torques) if len(torques) == len(rows) else None
+    met, displaced = ([each.met for each in rows], [each.displaced or each.met for each in rows])
+    group = np.repeat(np.arange(len(rows)), [len(each.force_n) for each in rows])
+    feed, speed, force, turns = map(column, ("feed_mm_per_min", "spindle_rev_per_min", "force_n", "revolutions"))
+    return MeanForces(Engagement.joined(met), feed, speed, force, turns, group, Engagement.joined(displaced), torque)
 
 
 # --- corner: measured against expected resultant (paper 001, figure 7) ------------------------------------------------
@@ -262,16 +218,24 @@ _MARGIN_REVS = 4.0
 
 
 def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResult:
-    passes = {number: _pass(cut, number, record) for number, record in measured.items()}
+    passes = {}
+    for number, record in measured.items():
+        measuring = cut.passes[number - 1]
+        forecast = expected(cut, measuring)
+        found = revolutions(place_samples(record, cut, measuring, forecast))
+        seen = _inside(cut, number, found.x_mm) & ~found.chatter
+        far = _inside(cut, number, forecast.x_mm)
+        recorded = float(found.resultant_n[seen].max()), float(found.peak_n[seen].max())
+        wanted = float(forecast.mean_resultant_n[far].max()), float(forecast.peak_resultant_n[far].max())
+        passes[number] = result.CornerPass(number, *recorded, *wanted, found, forecast)
     first = passes[min(passes)]
     seen = _inside(cut, first.number, first.record.x_mm) & ~first.record.chatter
     there = np.interp(first.record.x_mm[seen], first.forecast.x_mm, first.forecast.mean_resultant_n)
     ratio = None
     if {1, 2} <= set(passes):
         before, after = passes[1], passes[2]
-        ratio = ForceRatio(
-            after.measured_mean_n / before.measured_mean_n, after.expected_mean_n / before.expected_mean_n
-        )
+        of_mean = after.measured_mean_n / before.measured_mean_n
+        ratio = result.ForceRatio(of_mean, after.expected_mean_n / before.expected_mean_n)
     return CornerResult(
         program=cut.program,
         machine=cut.machine,
@@ -279,23 +243,6 @@ def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResu
         ratio=ratio,
         scale=float(there @ first.record.resultant_n[seen] / (there @ there)),
         warnings=tuple(note for each in passes.values() for note in each.record.record.notes),
-    )
-
-
-def _pass(cut: TestCut, number: int, record: ForceRecord) -> CornerPass:
-    measuring = cut.passes[number - 1]
-    forecast = expected(cut, measuring)
-    found = revolutions(place_samples(record, cut, measuring, forecast))
-    seen = _inside(cut, number, found.x_mm) & ~found.chatter
-    far = _inside(cut, number, forecast.x_mm)
-    return CornerPass(
-        number=number,
-        measured_mean_n=float(found.resultant_n[seen].max()),
-        measured_peak_n=float(found.peak_n[seen].max()),
-        expected_mean_n=float(forecast.mean_resultant_n[far].max()),
-        expected_peak_n=float(forecast.peak_resultant_n[far].max()),
-        record=found,
-        forecast=forecast,
     )
 
 
@@ -307,17 +254,14 @@ def _inside(cut: TestCut, number: int, x_mm: FloatArray) -> npt.NDArray[np.bool_
 
 # --- interval test: at which interval the controller follows the commanded feeds --------------------------------------
 
-_DEVIATION_LIMIT = 0.05
-_NOISE_SHARE = 2.0
+_DEVIATION_LIMIT, _NOISE_SHARE = 0.05, 2.0
 _LAGS_S = np.concatenate([[0.0], np.geomspace(2e-3, 0.5, 49)])
 _FEEDS = 40
 
 
 def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> IntervalResult:
-    records = {}
-    for number, record in measured.items():
-        measuring = cut.passes[number - 1]
-        records[number] = place_samples(record, cut, measuring, expected(cut, measuring))
+    passes = [(number, cut.passes[number - 1], record) for number, record in measured.items()]
+    records = {number: place_samples(each, cut, at, expected(cut, at)) for number, at, each in passes}
     found = sorted((_followed(cut, number, record) for number, record in records.items()), key=lambda p: p.interval_mm)
     good = [each.interval_mm for each in takewhile(lambda each: each.ok, reversed(found))]
     fastest = max(feed for each in cut.passes for _, feed in each.feeds)
@@ -332,7 +276,7 @@ def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> Interval
     )
 
 
-def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
+def _followed(cut: TestCut, number: int, record: PlacedRecord) -> result.FollowedPass:
     assert isinstance(cut.about, IntervalDetails)
     measuring, interval = cut.passes[number - 1], cut.about.intervals_mm[number - 1]
     first, last = measuring.feeds[0][0], measuring.feeds[-2][0]
@@ -364,19 +308,9 @@ def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
     off = np.abs(seen - wanted) / wanted
     noise = _noise(record.x_mm[straight], force[straight], 0.5 * interval)
     worst = int(np.argmax(off))
-    return FollowedPass(
-        number=number,
-        interval_mm=interval,
-        deviation=float(off[worst]),
-        at_mm=float(ends[worst]),
-        noise=noise,
-        lag_s=lag,
-        ok=bool(off[worst] <= _DEVIATION_LIMIT + _NOISE_SHARE * noise),
-        time_s=time,
-        force_n=size,
-        immediate_n=immediate,
-        lagging_n=course(lag),
-    )
+    ok = bool(off[worst] <= _DEVIATION_LIMIT + _NOISE_SHARE * noise)
+    told = number, interval, float(off[worst]), float(ends[worst]), noise, lag, ok
+    return result.FollowedPass(*told, time, size, immediate, course(lag))
 
 
 def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> tuple[FloatArray, FloatArray]:
@@ -385,7 +319,7 @@ def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> t
     low, high = np.linspace(0.2, 0.98, _FEEDS) * min(commanded), np.linspace(0.5, 1.1, _FEEDS) * max(commanded)
     feeds = np.sort(np.concatenate([low, high]))
     law = ForceLaw(cut.tool, cut.tool.cutting, cut.spindle_rev_per_min, cut.axial_depth_mm)
-    met = straight_engagement(cut.tool, np.full(len(feeds), radial_depth_mm), up=cut.up)
+    met = forces.straight_engagement(cut.tool, np.full(len(feeds), radial_depth_mm), up=cut.up)
     return feeds, np.linalg.norm(law.forces(met, feeds).mean_n, axis=1)
 
 

@@ -51,12 +51,8 @@ def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: FloatArray, *, up:
 
 def _crossing(x: FloatArray, begin: FloatArray, edge_x: FloatArray, edge_y: FloatArray, radius: float) -> FloatArray:
     """How far before the axis the front of the tool first comes out of the edge; `begin` where it is not in it."""
-    found = np.full(len(x), radius)
-    open_ = np.ones(len(x), dtype=bool)
-    at_begin = np.interp(x + begin, edge_x, edge_y)
-    outside = at_begin <= radius - np.sqrt(np.maximum(radius**2 - begin**2, 0.0))
-    found[outside] = begin[outside]
-    open_ &= ~outside
+    open_ = np.interp(x + begin, edge_x, edge_y) > radius - np.sqrt(np.maximum(radius**2 - begin**2, 0.0))
+    found = np.where(open_, radius, begin)
     slopes = np.diff(edge_y) / np.diff(edge_x)
     first = np.clip(np.searchsorted(edge_x, x + begin, side="right") - 1, 0, len(slopes) - 1)
     for step in range(len(slopes)):
@@ -112,7 +108,6 @@ class ForceLaw:
     """A tool with coefficients at a spindle speed and an axial depth."""
 
     def __init__(self, tool: CutTool, law: CuttingLaw, spindle_rev_per_min: float, axial_depth_mm: float) -> None:
-        """Make the tables of the core."""
         mill = _core.EndMill(tool.diameter_mm, tool.flutes, math.radians(tool.helix_deg), list(tool.runout_mm))
         self._force = _core.MillingForce(mill, law.core(), spindle_rev_per_min)
         self._depth = axial_depth_mm
@@ -177,14 +172,6 @@ class MeanForces:
     torque_nm: FloatArray | None = None  # (n,) mean torque of the spindle; None: not measured
 
 
-def chips_mm(tool: CutTool, depth: float, data: MeanForces) -> FloatArray:
-    """(n,) mean chip thickness of each row."""
-    found = np.zeros(len(data.feed_mm_per_min))
-    for speed, at, met in _by_speed(data):
-        found[at] = mean_chip_mm(tool, speed, depth, met, data.feed_mm_per_min[at])
-    return found
-
-
 def _by_speed(data: MeanForces) -> Iterator[tuple[float, npt.NDArray[np.intp], Engagement]]:
     """Each spindle speed with the rows and engagements at it."""
     for speed in np.unique(data.spindle_rev_per_min):
@@ -227,13 +214,8 @@ class ForceModel:
 
 MIN_CHIP_RATIO = 1.5  # The thickest mean chip over the thinnest; below it exponents are not distinguished from factors
 MIN_FEED_RATIO = 1.3  # The same of the feeds, for edge forces
-_ROUNDS = 6
-_HUBER = 2.5
-_OUTLIER = 4.0
-_MIN_OUTLIER = 0.02
-_LARGEST_SHARE_OUT = 0.25
-_SETTLED = 1e-4
-_MAX_STEPS = 40
+_ROUNDS, _MAX_STEPS, _SETTLED = 6, 40, 1e-4
+_HUBER, _OUTLIER, _MIN_OUTLIER, _LARGEST_SHARE_OUT = 2.5, 4.0, 0.02, 0.25
 # Of ln k1, its exponent, ln k2, the exponent of k1 k2, and the edge forces.
 _LOWEST, _HIGHEST = np.array([-50.0, -0.9, -50.0, -0.95, 0.0, 0.0]), np.array([50.0, 5.0, 50.0, 5.0, 1e6, 1e6])
 
@@ -278,7 +260,9 @@ def fit_coefficients(
 ) -> CoefficientFit:
     """Fit k1(t) and k2(t), and if asked the edge forces."""
     count = 6 if edge else 4
-    chip = chips_mm(tool, axial_depth_mm, data)
+    chip = np.zeros(len(data.feed_mm_per_min))
+    for speed, at, met in _by_speed(data):
+        chip[at] = mean_chip_mm(tool, speed, axial_depth_mm, met, data.feed_mm_per_min[at])
     _check(data, chip, count, edge)
     middle = math.exp(float(np.mean(np.log(chip))))
     model = ForceModel(tool, axial_depth_mm, data, thickness, middle)
@@ -303,9 +287,8 @@ def fit_coefficients(
     free = int((weights > 0.0).sum()) - count
     factors, at_chip = (_with_intervals(model, parameters, covariance, free, each) for each in (1.0, model.reference))
     rms_n, percent = np.sqrt(np.mean(kept**2, axis=0)), 100.0 * float(np.sqrt(np.sum(kept**2) / np.sum(size**2)))
-    return CoefficientFit(
-        factors, thickness, model.reference, at_chip[:4:2], chip, predicted, outlier, rms_n, percent, correlation
-    )
+    left_by_fit = outlier, rms_n, percent, correlation
+    return CoefficientFit(factors, thickness, model.reference, at_chip[:4:2], chip, predicted, *left_by_fit)
 
 
 def _outliers(measured: FloatArray, left: FloatArray, noise: FloatArray) -> npt.NDArray[np.bool_]:
@@ -417,9 +400,7 @@ def _with_intervals(
     distance = math.log(chip_mm / model.reference)
     found = []
     for k, (name, unit) in enumerate(zip(COEFFICIENTS[: len(parameters)], _UNITS, strict=False)):
-        factor = k in (0, 2)
-        direction = np.zeros(len(parameters))
-        direction[k] = 1.0
+        factor, direction = k in (0, 2), np.eye(len(parameters))[k]
         if factor:
             direction[k + 1] = distance
         value = float(direction @ parameters)
@@ -430,8 +411,7 @@ def _with_intervals(
     return tuple(found)
 
 
-_MEDIAN = 0.4549
-_LARGEST_CORRELATION = 0.95
+_MEDIAN, _LARGEST_CORRELATION = 0.4549, 0.95
 
 
 def noise_of(left: FloatArray, predicted: FloatArray, revolutions: FloatArray, robust: FloatArray) -> FloatArray:

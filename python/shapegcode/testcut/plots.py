@@ -31,7 +31,6 @@ def plots_of(result: TaperResult | CornerResult | IntervalResult) -> Mapping[str
 
 
 def _column(ax: Axes | None, rows: int, height: float, title: str, width: float = 8.0) -> list[Axes]:
-    """Panels above each other that share their X axis."""
     panels = plot.column(ax, rows, size_inch=(width, height), title=title)
     for panel in panels:
         panel.margins(x=0.01)

@@ -96,29 +96,25 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
         except UnevenTimeError as error:
             raise ArgumentError(f"{path}:{table.line_of(error.row)}: {error}") from error
         time = time[0] + period * np.arange(len(time))
-    position = values.get("position")
-    if position is not None and "radial_depth" not in values and np.any(np.diff(position) < 0.0):
+    torque, position, depth, feed = map(values.get, ("torque", "position", "radial_depth", "feed"))
+    if position is not None and depth is None and np.any(np.diff(position) < 0.0):
         row = int(np.argmax(np.diff(position) < 0.0)) + 1
         raise ArgumentError(f"{path}:{table.line_of(row)}: the position goes back: one pass per file, along +X")
     force = sign * np.column_stack([values["fx"], values["fy"]])
-    depth, feed = values.get("radial_depth"), values.get("feed")
-    return ForceRecord(str(path), force, values.get("torque"), time, position, depth, feed)
+    return ForceRecord(str(path), force, torque, time, position, depth, feed)
 
 
 # --- the position of each sample --------------------------------------------------------------------------------------
 
 _PER_MINUTE = 60.0
 MIN_SAMPLES = 6.0  # Samples per revolution from which on a file is a record and not a table of means
-_MIN_AIR_REVS = 5
+_MIN_AIR_REVS, _GUARD_REVS = 5, 2
 _FEW_PER_TOOTH, _IN_STEP = 16.0, 0.01
 _TELL_SPEED, _TELL_FEED = 0.002, 0.005
-_GUARD_REVS = 2
 _ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04  # Of the noise in the air, and of the largest force: what is more is a cut
-_SPEED_RANGE = 0.05
+_SPEED_RANGE, _MIN_FOR_SPEED = 0.05, 20.0
 _CLEAR_LINE = 8.0  # times the median of the spectrum around it
-_MIN_FOR_SPEED = 20.0
-_MAX_SHIFT_MM = 1.0
-_SHIFT_STEPS = 81
+_MAX_SHIFT_MM, _SHIFT_STEPS = 1.0, 81
 #: The cut may last so much longer or shorter: at another feed override; where the place or the feeds are stated.
 _OTHER_FEED, _OTHER_LENGTH = 0.6, 0.03
 
@@ -171,8 +167,8 @@ def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, f
     size = np.linalg.norm(turned(force, samples), axis=1)
     x = _positions(record, measuring, forecast, size, time, moved, (begin, end), notes)
     named = tuple(f"{record.file}: {note}" for note in notes)
-    found = time, x, force, torque, samples, speed, offset, drift
-    return PlacedRecord(record.file, cut, measuring, *found, record.position_mm is None, named)
+    file, by_time = record.file, record.position_mm is None
+    return PlacedRecord(file, cut, measuring, time, x, force, torque, samples, speed, offset, drift, by_time, named)
 
 
 def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[FloatArray, FloatArray]:
@@ -265,48 +261,36 @@ def _without_offset(force: FloatArray, begin: int, end: int, guard: int) -> tupl
 
 
 def _positions(
-    record: ForceRecord,
-    measuring: MeasuringPass,
-    forecast: Expected,
-    size: FloatArray,
-    time: FloatArray,
-    moved: FloatArray,
-    contact: tuple[int, int],
-    notes: list[str],
-) -> FloatArray:
+    record: ForceRecord, measuring: MeasuringPass, forecast: Expected, size: FloatArray, time: FloatArray,
+    moved: FloatArray, contact: tuple[int, int], notes: list[str],
+) -> FloatArray:  # fmt: skip
     """X of the axis at each sample: entry and exit of the record laid over those that are expected."""
     seen = np.flatnonzero(forecast.mean_n > _ABOVE_SHARE * forecast.mean_n.max())
-    wanted = forecast.x_mm[seen[0]], forecast.x_mm[seen[-1]]
+    wanted, first = (forecast.x_mm[seen[0]], forecast.x_mm[seen[-1]]), contact[0]
     if record.position_mm is None and not measuring.constant_feed:
         # The travel over time is that of the blocks; only where it begins is looked for.
-        moved = _travel_of_blocks(measuring, time - time[contact[0]], wanted[0])
-    scale = (wanted[1] - wanted[0]) / (moved[contact[1]] - moved[contact[0]])
+        ends_mm = np.array([measuring.start_mm, *(end for end, _ in measuring.feeds)])
+        pace = _PER_MINUTE / np.array([feed for _, feed in measuring.feeds])
+        at = np.concatenate([[0.0], np.cumsum(np.diff(ends_mm) * pace)])
+        moved = np.interp(time - time[first] + np.interp(wanted[0], ends_mm, at), at, ends_mm)
+    length, wanted_length = moved[contact[1]] - moved[first], wanted[1] - wanted[0]
     free = record.position_mm is None and measuring.constant_feed
-    if abs(scale - 1.0) > (_OTHER_FEED if free else _OTHER_LENGTH):
+    if abs(wanted_length / length - 1.0) > (_OTHER_FEED if free else _OTHER_LENGTH):
         raise ArgumentError(
-            f"{record.file}: the cut is {moved[contact[1]] - moved[contact[0]]:.2f} mm long, it should be "
-            f"{wanted[1] - wanted[0]:.2f} mm: is it the right pass, and was the feed override 100 %?"
+            f"{record.file}: the cut is {length:.2f} mm long, it should be {wanted_length:.2f} mm: is it the right "
+            "pass, and was the feed override 100 %?"
         )
-    x = wanted[0] + (moved - moved[contact[0]]) * (scale if free else 1.0)
+    x = wanted[0] + (moved - moved[first]) * (wanted_length / length if free else 1.0)
     ends = [_shift(forecast, x, size, side) for side in wanted]
-    if free:
-        # Both ends: offset and rate.
-        share = (x - wanted[0]) / (wanted[1] - wanted[0])
-        x = x + ends[0] * (1.0 - share) + ends[1] * share
-        rate = float(np.polyfit(time, x, 1)[0]) * _PER_MINUTE
-        if abs(rate / measuring.feed_mm_per_min - 1.0) > _TELL_FEED:
-            notes.append(f"the feed was {rate:.1f} mm/min, {measuring.feed_mm_per_min:g} were commanded")
-    else:
-        x = x + ends[0]
+    if not free:
+        return np.asarray(x + ends[0])
+    # Both ends: offset and rate.
+    share = (x - wanted[0]) / wanted_length
+    x = x + ends[0] * (1.0 - share) + ends[1] * share
+    rate = float(np.polyfit(time, x, 1)[0]) * _PER_MINUTE
+    if abs(rate / measuring.feed_mm_per_min - 1.0) > _TELL_FEED:
+        notes.append(f"the feed was {rate:.1f} mm/min, {measuring.feed_mm_per_min:g} were commanded")
     return np.asarray(x)
-
-
-def _travel_of_blocks(measuring: MeasuringPass, time_s: FloatArray, entry_mm: float) -> FloatArray:
-    """X over time at the commanded feeds, at `entry_mm` at time 0."""
-    ends = np.array([measuring.start_mm, *(end for end, _ in measuring.feeds)])
-    pace = _PER_MINUTE / np.array([feed for _, feed in measuring.feeds])
-    at = np.concatenate([[0.0], np.cumsum(np.diff(ends) * pace)])
-    return np.asarray(np.interp(time_s + np.interp(entry_mm, ends, at), at, ends))
 
 
 def _shift(forecast: Expected, x: FloatArray, size: FloatArray, side: float) -> float:
@@ -362,9 +346,9 @@ def revolutions(record: PlacedRecord) -> Revolutions:
     inside = np.flatnonzero((x >= measuring.start_mm) & (x <= measuring.end_mm))
     turns = int((inside[-1] - inside[0]) / record.samples)
     edges = inside[0] + np.arange(turns + 1) * record.samples
-    size = np.linalg.norm(record.force_n, axis=1)
-    torque_nm = [] if record.torque_nm is None else [record.torque_nm]
-    table = np.hstack([record.force_n, size[:, None], size[:, None] ** 2, x[:, None], *torque_nm])
+    size, torque = np.linalg.norm(record.force_n, axis=1), record.torque_nm
+    recorded = [] if torque is None else [torque]
+    table = np.hstack([record.force_n, size[:, None], size[:, None] ** 2, x[:, None], *recorded])
     means = _sums(table, edges[:-1], edges[1:]) / record.samples
     peaks = np.maximum.reduceat(size[: int(edges[-1])], edges[:-1].astype(np.intp))
     middle = means[:, 4]

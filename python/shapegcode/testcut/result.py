@@ -217,8 +217,8 @@ class TaperResult(Result):
             f"# holds for chips {self.chip_mm.min:.4f} to {self.chip_mm.max:.4f} mm thick on average",
         ]
         for each in self.coefficients:
-            unit = f" {each.unit}" if each.unit else ""
-            lines.append(f"{each.name} = {each.value:.6g}  # 95 %: {each.low:.5g} to {each.high:.5g}{unit}")
+            interval = f"95 %: {each.low:.5g} to {each.high:.5g} {each.unit}".rstrip()
+            lines.append(f"{each.name} = {each.value:.6g}  # {interval}")
         return "\n".join([*lines, f'chip_thickness = "{self.cutting.chip_thickness}"']) + "\n"
 
 
@@ -277,10 +277,8 @@ class CornerResult(Result):
         sentence = f"the measured resultant is {self.scale:.2f} times the expected one where the feed is constant"
         if self.ratio is None:
             return sentence
-        return (
-            f"{sentence}; largest mean resultant after over before: measured {self.ratio.measured:.2f}, expected "
-            f"{self.ratio.expected:.2f}"
-        )
+        ratios = f"measured {self.ratio.measured:.2f}, expected {self.ratio.expected:.2f}"
+        return f"{sentence}; largest mean resultant after over before: {ratios}"
 
     @property
     def next_step(self) -> str:
@@ -355,10 +353,8 @@ class IntervalResult(Result):
     def answer(self) -> str:
         """The interval, or how long a step needs."""
         if self.interval_mm is None:
-            return (
-                "no measured interval is followed; 90 % of a step need about "
-                f"{self.lag_interval_mm:.2f} mm at the largest feed"
-            )
+            needed = f"90 % of a step need about {self.lag_interval_mm:.2f} mm at the largest feed"
+            return f"no measured interval is followed; {needed}"
         return f"the controller follows from {self.interval_mm:g} mm on"
 
     @property

@@ -9,19 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from shapegcode.errors import ArgumentError
-from shapegcode.identification.servo.models import (
-    SETTLE_S,
-    DriveFit,
-    LoopFit,
-    Masks,
-    counted,
-    fit_drive,
-    fit_lag,
-    lag_estimates,
-    range_of_three,
-    rms,
-    torque_friction,
-)
+from shapegcode.identification.servo import models
+from shapegcode.identification.servo.models import DriveFit, LoopFit, Masks, counted, rms
 from shapegcode.identification.servo.record import ServoRecord, ServoTrace, read_servo_record
 from shapegcode.identification.servo.result import ServoAxis, ServoCurves, ServoEstimate, ServoFit, ServoModel
 from shapegcode.io.units import FloatArray
@@ -83,16 +72,9 @@ def fit_servo(
         warnings.append(f"of {samples} samples those {_MAX_SAMPLES} were taken where an axis changes its speed most")
     fitted, written, unknown = (None, {}, []) if machine is None else _machine_with(machine, found, places)
     warnings += unknown
-    duration = sum(each[-1] - each[0] for each in record.axes[0].time_s)
-    return ServoFit(
-        source=record.source,
-        duration_s=float(duration),
-        axes=tuple(found),
-        machine="" if machine is None else machine.name,
-        written=written,
-        warnings=tuple(warnings),
-        fitted=fitted,
-    )
+    duration = float(sum(each[-1] - each[0] for each in record.axes[0].time_s))
+    name = "" if machine is None else machine.name
+    return ServoFit(record.source, duration, tuple(found), name, written, tuple(warnings), fitted)
 
 
 # --- one axis ---------------------------------------------------------------------------------------------------------
@@ -116,34 +98,35 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
         return replace(base, parameters=(steady,), note="never changes its speed")
     if two := _two_lags(trace, speeds, top):
         return replace(base, note=two)
-    early, use = _halves(speeds, period_s)
+    # Which samples lie in the half of all changes of speed that comes first; and which count.
+    changes = [np.abs(np.diff(each, prepend=each[:1])) for each in speeds]
+    done = np.cumsum(np.concatenate(changes))
+    early = tuple(np.split(done < done[-1] / 2.0, np.cumsum([len(each) for each in speeds])[:-1]))
+    settle = round(models.SETTLE_S / period_s)  # what the axis did before a stretch is not known
+    use = tuple(np.arange(len(each)) >= settle for each in speeds)
     uses = (use, *(tuple(c & (e == which) for e, c in zip(early, use, strict=True)) for which in (True, False)))
     compared = _compare_models(trace, early, uses, period_s, with_drive, tell)
-    rests = [rms(counted(each.rest, use)) for each in compared]
     own = rms(counted(trace.deviation, use)) if trace.deviation is not None else None
-    models = tuple(
-        ServoModel(
-            each.name, rest, rms(counted(each.rest_fitted, use)), 100.0 * (1.0 - (rest / own) ** 2) if own else None
-        )
-        for each, rest in zip(compared, rests, strict=True)
-    )
+    judged = []
+    for each in compared:
+        rest, fitted = (rms(counted(left, use)) for left in (each.rest, each.rest_fitted))
+        judged.append(ServoModel(each.name, rest, fitted, 100.0 * (1.0 - (rest / own) ** 2) if own else None))
     whole, *halves = compared[1].fits
-    parameters = lag_estimates(whole, halves, trace, use, period_s)
-    parameters += torque_friction(trace, whole.lag_s, uses, period_s)
+    parameters = models.lag_estimates(whole, halves, trace, use, period_s)
+    parameters += models.torque_friction(trace, whole.lag_s, uses, period_s)
     for each in compared[2:]:
         parameters += _drive_estimates([fit for fit in each.fits if isinstance(fit, DriveFit)], trace.unit)
-    best = compared[int(np.argmin(rests))]
+    best = compared[int(np.argmin([model.rest for model in judged]))]
     curves = ServoCurves(trace.time_s, speeds, trace.lag, trace.deviation, best.rest)
-    return replace(base, models=models, parameters=parameters, curves=curves)
+    return replace(base, models=tuple(judged), parameters=parameters, curves=curves)
 
 
 def _unlike(trace: ServoTrace) -> str:
-    """Raise an error if the actual position does not follow the command: other units, another axis, another sign."""
+    """Why the actual position is not that of the command; empty where it follows it."""
     way = [r - r.mean() for r in trace.command]
     power = sum(float(r @ r) for r in way)
     slope = sum(float(r @ (x - x.mean())) for r, x in zip(way, trace.actual, strict=True)) / power
-    low, high = _SLOPE
-    if low <= slope <= high:
+    if _SLOPE[0] <= slope <= _SLOPE[1]:
         return ""
     return f"the actual position moves {slope:.3g} times as far as the command: not the same unit, sign or axis"
 
@@ -159,31 +142,18 @@ def _two_lags(trace: ServoTrace, speeds: Sequence[FloatArray], top: float) -> st
             if abs(mean) > _MIN_SPEED * top and float(np.ptp(part)) < 1e-3 * abs(mean):
                 late = lag[start + count : start + 2 * count]
                 found.append((float(np.mean(late)) / mean, mean, float(time[start])))
-    if not found:
+    if not found or max(found)[0] - min(found)[0] <= _LAG_SPREAD * abs(max(found)[0]):
         return ""
-    least, most = min(found), max(found)
-    if most[0] - least[0] <= _LAG_SPREAD * abs(most[0]):
-        return ""
-    return (
-        f"the lag at constant speed is {1e3 * least[0]:.3f} ms at {least[1]:.5g} {trace.unit}/s ({least[2]:.2f} s) and "
-        f"{1e3 * most[0]:.3f} ms at {most[1]:.5g} {trace.unit}/s ({most[2]:.2f} s): the control changed its loop "
-        "there, and no one model follows"
+    least, most = (
+        f"{1e3 * lag:.3f} ms at {speed:.5g} {trace.unit}/s ({time_s:.2f} s)"
+        for lag, speed, time_s in (min(found), max(found))
     )
-
-
-def _halves(speeds: Sequence[FloatArray], period_s: float) -> tuple[Masks, Masks]:
-    """Which samples lie in the half of all changes of speed that comes first; and which count."""
-    changes = [np.abs(np.diff(each, prepend=each[:1])) for each in speeds]
-    done = np.cumsum(np.concatenate(changes))
-    early = np.split(done < done[-1] / 2.0, np.cumsum([len(each) for each in speeds])[:-1])
-    settle = round(SETTLE_S / period_s)  # what the axis did before a stretch is not known
-    return tuple(early), tuple(np.arange(len(each)) >= settle for each in speeds)
+    changed = "the control changed its loop there, and no one model follows"
+    return f"the lag at constant speed is {least} and {most}: {changed}"
 
 
 @dataclass(frozen=True, eq=False)
 class _ComparedModel:
-    """A model with what it leaves in every sample."""
-
     name: str
     fits: tuple[LoopFit, ...]  # to all samples, to the first half, to the second
     rest: tuple[FloatArray, ...]  # each sample by the fit to the other half
@@ -191,13 +161,9 @@ class _ComparedModel:
 
 
 def _compare_models(
-    trace: ServoTrace,
-    early: Masks,
-    uses: Sequence[Masks],
-    period_s: float,
-    with_drive: bool,
+    trace: ServoTrace, early: Masks, uses: Sequence[Masks], period_s: float, with_drive: bool,
     tell: Callable[[float], None],
-) -> list[_ComparedModel]:
+) -> list[_ComparedModel]:  # fmt: skip
     """The models, fitted to all, the first half and the second."""
 
     def judge(name: str, fits: Sequence[LoopFit]) -> _ComparedModel:
@@ -209,16 +175,15 @@ def _compare_models(
         fitted = tuple(lag - model for lag, model in zip(trace.lag, whole.error, strict=True))
         return _ComparedModel(name, tuple(fits), rest, fitted)
 
-    found = [judge("servo lag", [fit_lag(trace, use, period_s, dead_time=False) for use in uses])]
+    found = [judge("servo lag", [models.fit_lag(trace, use, period_s, dead_time=False) for use in uses])]
     tell(0.1)
-    lags = [fit_lag(trace, use, period_s, dead_time=True) for use in uses]
+    lags = [models.fit_lag(trace, use, period_s, dead_time=True) for use in uses]
     found.append(judge("dead time and servo lag", lags))
     tell(0.2)
     if with_drive:
         steps = iter(np.linspace(0.2, 1.0, 7)[1:].tolist())
-        drives = [
-            fit_drive(trace, use, period_s, lag, lambda: tell(next(steps))) for use, lag in zip(uses, lags, strict=True)
-        ]
+        pairs = zip(uses, lags, strict=True)
+        drives = [models.fit_drive(trace, use, period_s, lag, lambda: tell(next(steps))) for use, lag in pairs]
         found.append(judge("drive", drives))
     return found
 
@@ -232,14 +197,13 @@ def _drive_estimates(fits: Sequence[DriveFit], unit: str) -> tuple[ServoEstimate
         ("integral time", [fit.integral_time_s for fit in fits], "s"),
         ("friction over mass", [fit.coulomb for fit in fits], f"{unit}/s²"),
     )
-    return tuple(range_of_three(f"drive: {name}", values, of) for name, values, of in rows)
+    return tuple(models.range_of_three(f"drive: {name}", values, of) for name, values, of in rows)
 
 
 # --- the machine file -------------------------------------------------------------------------------------------------
 
 
 def _machine_axes(record: ServoRecord, axes: str | Mapping[str, str] | None) -> dict[str, int]:
-    """Which axes of a log are X, Y and Z of the machine."""
     if axes is None:
         named = {each.name.partition("(")[2].rstrip(")") or each.name: rank for rank, each in enumerate(record.axes)}
         found = {
@@ -253,12 +217,10 @@ def _machine_axes(record: ServoRecord, axes: str | Mapping[str, str] | None) -> 
         if any(not equals for _, equals, _ in pairs):
             raise ArgumentError(f"--axes {','.join(axes)}: must be for example X=1,Y=6,Z=2")
     found = {}
+    labels = [each.name.lower() for each in record.axes]
+    words = [(label, *label.replace("(", "").replace(")", "").split()) for label in labels]
     for letter, name in axes.items():
-        ranks = [
-            rank
-            for rank, each in enumerate(record.axes)
-            if str(name).lower() in (each.name.lower(), *each.name.lower().replace("(", "").replace(")", "").split())
-        ]
+        ranks = [rank for rank, known in enumerate(words) if str(name).lower() in known]
         if letter.lower() not in ("x", "y", "z") or len(ranks) != 1:
             held = ", ".join(each.name for each in record.axes)
             raise ArgumentError(f"--axes {letter}={name}: must be X, Y or Z and an axis of the log, which has {held}")
@@ -278,14 +240,15 @@ def _machine_with(
         if axis.unit != "mm":
             warnings.append(f"axis {axis.name} turns: it is no {letter.upper()} of a machine file")
             continue
-        estimates = {key: axis.parameter(name) for key, name in _KEYS.items()}
-        if any(each is None or each.value is None for each in estimates.values()):
+        estimates = {key: each for key, name in _KEYS.items() if (each := axis.parameter(name)) is not None}
+        known = {key: each.value for key, each in estimates.items() if each.value is not None}
+        if len(known) < len(_KEYS):
             warnings.append(f"axis {axis.name}: gain and feed-forward do not follow: {letter.upper()} keeps its values")
             continue
-        for key, each in estimates.items():
-            assert each is not None
-            written[f"{key}.{letter}"] = round(float(each.value or 0.0), 6)
-            remarks.setdefault(key, []).append(f"{letter} {each.low:.6g} ... {each.high:.6g}")
+        for key, value in known.items():
+            written[f"{key}.{letter}"] = round(float(value), 6)
+            interval = f"{letter} {estimates[key].low:.6g} ... {estimates[key].high:.6g}"
+            remarks.setdefault(key, []).append(interval)
     if not written:
         return machine, written, warnings
     said = {key: f"measured (log, behind a dead time): {', '.join(each)}" for key, each in remarks.items()}

@@ -124,7 +124,9 @@ def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) 
         around = gains[max(rank - 1, 0)], gains[min(rank + 1, len(gains) - 1)]
         found = minimize_scalar(lambda gain: square(np.array([gain])), bounds=around, method="bounded")
         return solve(0.0, math.exp(min(max(float(found.x), low), high)))[1]
-    lag = _steady_lag(trace, use, period_s)
+    speed = counted([np.gradient(way, period_s) for way in trace.command], use)
+    power = float(speed @ speed)
+    lag = min(max(float(speed @ counted(trace.lag, use)) / power, 0.0), _LONGEST_DEAD_S) if power > 0.0 else 0.0
     starts = [(1e3 * share * lag, math.log(gain)) for share in (0.6, 0.9, 0.99) for gain in (20.0, 60.0)]
     # Two valleys are followed to their ends: from the other starts others only come later to the same one.
     tried = [
@@ -134,14 +136,6 @@ def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) 
     best = min(tried, key=lambda each: float(each.fun)).x
     dead = min(max(float(best[0]) * 1e-3, 0.0), _LONGEST_DEAD_S)
     return solve(dead, math.exp(min(max(float(best[1]), low), high)))[1]
-
-
-def _steady_lag(trace: ServoTrace, use: Masks, period_s: float) -> float:
-    """Lag over speed, by least squares."""
-    speed = counted([np.gradient(way, period_s) for way in trace.command], use)
-    power = float(speed @ speed)
-    error = counted(trace.lag, use)
-    return min(max(float(speed @ error) / power, 0.0), _LONGEST_DEAD_S) if power > 0.0 else 0.0
 
 
 def lag_estimates(
@@ -175,9 +169,8 @@ def lag_estimates(
 
     gain, rest = fit.gain_per_s, fit.rest
     lag = half("lag_s", 1.0, -rest / gain**2, 1.0 / gain, 0.0)
-    dead, gains, forward = (
-        half(name, *row) for name, row in zip(("dead_s", "gain_per_s", "rest"), np.eye(4), strict=False)
-    )
+    names = "dead_s", "gain_per_s", "rest"
+    dead, gains, forward = (half(name, *row) for name, row in zip(names, np.eye(4), strict=False))
     ends = max(0.0, 1.0 - rest - forward), min(1.0, 1.0 - rest + forward)
     why = "the feed-forward leaves no lag that determines it"
     loop = (
@@ -209,8 +202,7 @@ def _correlated_samples(left: FloatArray) -> float:
 
 # --- feed drive -------------------------------------------------------------------------------------------------------
 
-_RUN_UP_S = 0.4
-_MM = 1e-3
+_RUN_UP_S, _MM = 0.4, 1e-3
 _STIFFNESS_N_PER_M, _DAMPING_N_S_PER_M = 4e6, 400.0  # of 1 kg: 640 Hz, far above the speed loop
 # Dead time in ms; position gain, bandwidth in Hz, integral time, Coulomb friction as logarithms.
 _LOW = (0.0, math.log(2.0), 0.0, math.log(5.0), math.log(1e-3), math.log(1e-7))
@@ -240,9 +232,8 @@ def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, te
         friction = max(0.02 * acceleration * _MM, 1e-6)
         logarithms = [math.log(each) for each in (bandwidth, integral, friction)]
         begin = (max(1e3 * start.lag_s - 1.0, 0.1), math.log(gain), rest, *logarithms)
-        tried.append(
-            least_squares(residual, begin, bounds=(_LOW, _HIGH), x_scale=_SCALE, diff_step=[1e-3] * 6, max_nfev=20)
-        )
+        steps, ends = [1e-3] * 6, (_LOW, _HIGH)
+        tried.append(least_squares(residual, begin, bounds=ends, x_scale=_SCALE, diff_step=steps, max_nfev=20))
         tell()
     best = np.asarray(min(tried, key=lambda each: float(each.cost)).x)
     ways, left = simulated(best)
@@ -260,24 +251,16 @@ def _drive_ways(trace: ServoTrace, values: FloatArray, period_s: float, top_spee
     dead_ms, gain, rest, bandwidth, integral, coulomb = values
     friction, smoothing = math.exp(coulomb), _SIGN_RATIO * top_speed * _MM
     parameters = _core.FeedDriveParameters(
-        motor_mass_kg=0.5,
-        table_mass_kg=0.5,
-        stiffness_n_per_m=_STIFFNESS_N_PER_M,
-        damping_n_s_per_m=_DAMPING_N_S_PER_M,
-        position_gain_per_s=math.exp(gain),
-        velocity_gain_n_s_per_m=2.0 * math.pi * math.exp(bandwidth),
-        velocity_integral_time_s=math.exp(integral),
+        motor_mass_kg=0.5, table_mass_kg=0.5, stiffness_n_per_m=_STIFFNESS_N_PER_M,
+        damping_n_s_per_m=_DAMPING_N_S_PER_M, position_gain_per_s=math.exp(gain),
+        velocity_gain_n_s_per_m=2.0 * math.pi * math.exp(bandwidth), velocity_integral_time_s=math.exp(integral),
         velocity_feed_forward_ratio=1.0 - rest,
         table_friction=_core.FrictionParameters(
-            _core.FrictionModel.stribeck,
-            coulomb_n=friction,
-            static_n=friction,
-            stribeck_velocity_m_per_s=smoothing,
-            smoothing_velocity_m_per_s=smoothing,
+            _core.FrictionModel.stribeck, coulomb_n=friction, static_n=friction,
+            stribeck_velocity_m_per_s=smoothing, smoothing_velocity_m_per_s=smoothing,
         ),
-    )
-    found = []
-    count = round(_RUN_UP_S / period_s)
+    )  # fmt: skip
+    found, count = [], round(_RUN_UP_S / period_s)
     for way in trace.command:
         late = delayed(way, dead_ms * 1e-3 / period_s)
         run_up = late[0] + np.arange(-count, 0) * (late[1] - late[0])

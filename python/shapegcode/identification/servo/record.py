@@ -19,8 +19,7 @@ from shapegcode.io.servo_log import parse_units, read_log
 from shapegcode.io.units import FloatArray
 
 _GAP = 1.5  # of the usual step
-_FEWEST = 100
-_WINDOW = 2500
+_FEWEST, _WINDOW = 100, 2500
 _LARGEST_ACCELERATION = 5e5  # mm/s² or degrees/s²; a command beyond it is no motion
 
 
@@ -71,15 +70,14 @@ class ServoTrace:
         for rank, way in enumerate(self.command):
             changes = np.abs(np.diff(way, 2, prepend=way[:1], append=way[-1:]))
             windows += [(float(changes[at : at + _WINDOW].sum()), rank, at) for at in range(0, len(way), _WINDOW)]
-        kept: list[tuple[int, int, int]] = []  # stretch, start, end
+        kept: list[tuple[int, slice]] = []  # stretch, and samples of it
         for _, rank, at in sorted(sorted(windows, reverse=True)[: max(1, most // _WINDOW)], key=lambda each: each[1:]):
             end = min(at + _WINDOW, len(self.command[rank]))
-            if kept and kept[-1][0] == rank and kept[-1][2] == at:
-                kept[-1] = (rank, kept[-1][1], end)
+            if kept and kept[-1][0] == rank and kept[-1][1].stop == at:
+                kept[-1] = (rank, slice(kept[-1][1].start, end))
             elif end - at >= _FEWEST:
-                kept.append((rank, at, end))
-
-        return self._parts([(rank, slice(start, end)) for rank, start, end in kept])
+                kept.append((rank, slice(at, end)))
+        return self._parts(kept)
 
     def _parts(self, kept: Sequence[tuple[int, slice]]) -> ServoTrace:
         """Parts of sections, as separate sections."""
@@ -154,11 +152,10 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
             continue
 
         others = [capture.columns.get(f"{signal}|{axis.number}") for signal in ("CONT_DEV", "TORQUE")]
-        deviation, torque = (None if each is None or not np.isfinite(each).all() else (each,) for each in others)
+        measured = [None if each is None or not np.isfinite(each).all() else (each,) for each in others]
         turns = capture.is_rotary(axis.number) or axis.name[:1].upper() in ("A", "B", "C")
-        unit = "deg" if turns else "mm"
         name = f"{axis.number} ({axis.name})" if axis.name != str(axis.number) else axis.name
-        whole = ServoTrace(name, unit, (capture.time_s,), (command,), (actual,), deviation, torque)
+        whole = ServoTrace(name, "deg" if turns else "mm", (capture.time_s,), (command,), (actual,), *measured)
         axes.append(whole._parts([(0, each) for each in ranges]))
     return _checked(ServoRecord(capture.source, capture.cycle_s, tuple(axes), tuple(notes)))
 

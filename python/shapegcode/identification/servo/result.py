@@ -146,12 +146,12 @@ class ServoFit(Result):
         fitted = [axis for axis in self.axes if axis.models]
         if not fitted:
             return f"{self.source}: no axis changes its speed: nothing follows but the lag at constant speed"
-        said = ", ".join(
-            f"{axis.name} {1e3 * axis.lag_rms:.4g} to {1e3 * best.rest:.3g} {axis.small_unit}"
+        said = (
+            f"{axis.name} {1e3 * axis.lag_rms:.4g} to {1e3 * min(each.rest for each in axis.models):.3g} "
+            f"{axis.small_unit}"
             for axis in fitted
-            if (best := axis.best) is not None
         )
-        return f"following error, rms, and the model's residual in data to which it was not fitted: {said}"
+        return f"following error, rms, and the model's residual in data to which it was not fitted: {', '.join(said)}"
 
     def to_toml(self) -> str:
         """The machine file with the gain and feed-forward that are known, each with a remark.
