@@ -127,7 +127,6 @@ def positions_mm(start_mm: Vector, blocks: Sequence[LinearBlock], times_s: Vecto
 
 
 def _on(start: Vector, block: LinearBlock, shares: Vector) -> Vector:
-    """Points of a block at shares of its length."""
     points = start + np.outer(shares, block.end_mm - start)
     if block.sweep_rad == 0.0:
         return points
@@ -223,7 +222,6 @@ class _JoinedBlocks:
         self._shape = lru_cache(maxsize=512)(self._shape_between)
 
     def blocks(self) -> Iterator[LinearBlock]:
-        """From the begin to the end."""
         at, speed, late_s, count = 0, 0.0, 0.0, len(self._segments)
         while at < count:
             block, late = self._longest(at, speed, late_s) if speed > 0.0 else (None, 0.0)
@@ -239,15 +237,12 @@ class _JoinedBlocks:
                 speed, late_s = 0.0, 0.0  # other lines stand here, or somebody may begin here
 
     def ends(self, blocks: Sequence[LinearBlock]) -> list[int]:
-        """Periods at whose ends blocks end."""
         return [self._knots[block.last + 1] for block in blocks]
 
     def _time_s(self, at: int, end: int) -> float:
-        """Of the blocks from one to the one before another."""
         return (self._knots[end] - self._knots[at]) * self._period
 
     def _speed_at(self, knot: int) -> float:
-        """Of the command, from the periods beside."""
         m = self._knots[knot]
         before, behind = max(m - 1, 0), min(m + 1, len(self.points) - 1)
         step = self.points[behind] - self.points[before]
@@ -312,7 +307,6 @@ class _JoinedBlocks:
         return found
 
     def _longest(self, at: int, speed: float | None, late_s: float) -> tuple[LinearBlock | None, float]:
-        """The longest block from a speed; None: from that of the command."""
         found: tuple[LinearBlock | None, float] = (None, 0.0)
         misses = 0
         for end in range(at + 1, min(at + _LONGEST, len(self._segments)) + 1):
@@ -365,7 +359,6 @@ class _JoinedBlocks:
         return self._arc(points, length, self._segments[at].normal)
 
     def _arc(self, points: Vector, chord_mm: float, normal: int) -> _Shape | None:
-        """The arc through both ends and the middle, in the plane of the blocks."""
         first, second = (normal + 1) % 3, (normal + 2) % 3
         if np.ptp(points[:, normal]) > 0.0 or chord_mm < 0.02:
             return None

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.operating import ControlNote, control_table, restart_table
 from shapegcode.conversion.plan import ToleranceCurve, curve_table
-from shapegcode.conversion.recommendation import FilterAdvice, Grade
 from shapegcode.conversion.restart import RestartPoint
 from shapegcode.conversion.tables import (
     BeforeAfter,
@@ -40,6 +39,16 @@ _LEAST_SHOWN_UM = 0.05
 _DEVIATIONS = {"max": "largest", "rms": "RMS", "gouge": "gouge", "excess": "excess"}
 
 
+Grade = Literal[
+    "worth running",
+    "better, tolerance not met",
+    "already within tolerance: shaping is optional",
+    "no benefit: run the original",
+    "do not run",
+]
+"""From the best down; the first that applies from the end is the answer."""
+
+
 @dataclass(frozen=True)
 class ChangeProof:
     """What is unchanged in an emitted program."""
@@ -66,6 +75,26 @@ class DialectNotes:
         return f"written for {self.control} (emission.dialect = {self.name}){assumed}"
 
 
+@dataclass(frozen=True)
+class FilterAdvice:
+    """A contour error caused by the control's own filter, and its remedy without shaping."""
+
+    key: str  # of the machine file, the filter's time constant
+    now_s: float  # its value
+    enough_s: float  # at which every cut of the original keeps its limits, simulated
+    rounding_um: float  # contour error of the command, which the filter makes
+    lines: tuple[int, int]  # of the cut in which it is largest
+
+    def __str__(self) -> str:
+        lower = f"lowered to {self.enough_s * 1e3:.3g} ms" if self.enough_s > 0.0 else "switched off"
+        return (
+            f"the control's {self.now_s * 1e3:.3g} ms filter rounds the path by {self.rounding_um:.0f} µm "
+            "(lines {} to {})".format(*self.lines)
+            + f": {lower} ({self.key}), or with contour control, the original "
+            "keeps every limit without shaping"
+        )
+
+
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class Conversion(ProgramFigures, Result):
     """A program, shaped: the emitted program, and what simulating it beside the original showed.
@@ -73,7 +102,7 @@ class Conversion(ProgramFigures, Result):
     Attributes:
         program: name of the original.
         machine: name of the machine.
-        recommendation: what to do with it: one of the five grades of `recommendation.GRADES`.
+        recommendation: what to do with it: one of the five values of `Grade`.
         reason: of the recommendation, in words.
         cuts: every cut, shaped or left unchanged, with its gain and its price.
         tolerance_curve: what other contour tolerances cost in time; null: not worked out, or nothing can be shaped.
@@ -246,7 +275,6 @@ class Conversion(ProgramFigures, Result):
             yield "lines {} to {}: ".format(*cut.lines) + f"{cut.misses[0]}; {how}{remedy}{more}"
 
     def _cost_of(self, cut: CutOutcome) -> str:
-        """Why a shaped cut does not keep its tolerance, as far as its price is the reason."""
         if cut.tolerance_um > self.limits.contour_um:
             asked = self.tolerance_curve.points[0] if self.tolerance_curve is not None else None
             cost = f", {asked.tolerance_um:.3g} µm would cost {asked.time_increase_percent:+.3g} %" if asked else ""
@@ -255,7 +283,6 @@ class Conversion(ProgramFigures, Result):
 
     @property
     def _share(self) -> str:
-        """Of which cuts some are left unchanged."""
         shaped = len(self.regions)
         return f" ({shaped} of {len(self.cuts)} cuts shaped, the others unchanged)" if shaped < len(self.cuts) else ""
 
@@ -384,7 +411,6 @@ class Conversion(ProgramFigures, Result):
         return [BeforeAfter("speed above the programmed feed", "%", None, above, limit=limit)]
 
     def _sizes(self) -> list[BeforeAfter]:
-        """Figures of the emitted program and its shaper."""
         rows = [
             BeforeAfter("blocks", "", self.blocks.read, self.blocks.emitted, 0),
             BeforeAfter("size of the program", "bytes", self.bytes_read, self.bytes_emitted, 0),

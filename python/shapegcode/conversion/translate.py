@@ -154,8 +154,6 @@ def translated(conversion: Conversion) -> Translation | None:
 
 @dataclass
 class _State:
-    """What is in force behind a line, as far as the writing depends on it."""
-
     motion: int
     unit: str
     incremental: bool = False
@@ -172,8 +170,6 @@ class _State:
 
 
 class _Translator:
-    """Writes the program for another control line by line."""
-
     def __init__(
         self,
         dialect: Dialect,
@@ -309,7 +305,6 @@ class _Translator:
         return [*comments, *dialect.opening, *self._block(0, "", words, ()), *self._block(0, "", start, ())]
 
     def _move(self, number: int, line: str, move: re.Match[str]) -> list[str]:
-        """A line of nothing but motion, with a point in every number."""
         if move[2] is not None:
             self.state.motion, self.state.cycle = int(move[2]), False
         dialect = self._dialect
@@ -322,7 +317,6 @@ class _Translator:
         return [line]
 
     def _frame(self, body: str, comments: Sequence[str], line: str) -> list[str]:
-        """`%`, the program's number or name, comments."""
         dialect = self._dialect
         if _MARK_LINE.fullmatch(line.strip()):
             return ["(TEXT 00000000)"] if dialect.comment == "(" else []
@@ -339,12 +333,10 @@ class _Translator:
         return shown or [""]
 
     def name(self) -> str:
-        """Of the program, where the control wants one."""
         found = re.search(rb"(?m)^[O:](\d+)", self._program.core.slice(0, min(self._program.core.size, 4096)))
         return f"O{found[1].decode()}" if found else "SHAPED"
 
     def _block(self, number: int, skip: str, words: Sequence[tuple[str, str]], comments: Sequence[str]) -> list[str]:
-        """A block of words."""
         codes = [code_name(letter + value) for letter, value in words if letter in "GM"]
         before, behind, out = [], [], []
         for code in codes:
@@ -416,7 +408,6 @@ class _Translator:
         return any(not CODE.fullmatch(text) for text in own)
 
     def _note(self, code: str) -> None:
-        """Keep what a code puts into force."""
         state = self.state
         if code in _MOTION:
             state.motion, state.cycle = int(code[1:]), False
@@ -521,7 +512,6 @@ class _Translator:
     def _split(
         self, number: int, codes: Sequence[str], words: Sequence[tuple[str, str]], out: Sequence[str]
     ) -> list[str]:
-        """A line for each code, and the move with its own G."""
         named, state = dict(words), self.state
         lines, late, move = list[str](), list[str](), list[str]()
         for (letter, value), text in zip(words, out, strict=True):
@@ -545,7 +535,6 @@ class _Translator:
         return [*lines, " ".join(filter(None, [f"G{state.motion}", *move, feed])), *late]
 
     def _chords(self, number: int, words: Sequence[tuple[str, str]], feed: str) -> list[str]:
-        """An arc as lines from one of its points to the next."""
         arc, named = self._arcs.get(number), dict(words)
         if arc is None:
             raise self._error(number, "an arc whose start is not known cannot be written as chords")
@@ -570,7 +559,6 @@ class _Translator:
         return "{}:{}".format(*self._place(number))
 
     def _place(self, number: int) -> tuple[str, int]:
-        """File and line of the original from which a line comes."""
         shift = 0
         for _, lines, original in self._shaped:
             if number <= lines[1]:
@@ -597,7 +585,6 @@ _CURE = ": delete it in the program, or state a replacement (emission.words)"
 
 
 def _arcs(program: Program) -> Iterator[tuple[int, _core.Segment]]:
-    """Arcs by their lines."""
     for region in program.regions:
         for number, line in enumerate(region.path.segment_lines):
             if (segment := region.path[number]).kind == _core.SegmentKind.arc:

@@ -98,7 +98,6 @@ class LimitCheck:
         return self.value_um > self.limit_um * (1.0 + 1e-9)
 
     def __str__(self) -> str:
-        """For people, with both values."""
         return f"{self.figure} {self.value_um:.{self.decimals}f} um, limit {self.limit_um:.{self.decimals}f} um"
 
 
@@ -230,7 +229,6 @@ def _micrometres(value: float | None) -> str:
 
 
 def _share(share: float | None) -> str:
-    """Of the limit in percent; a limit of zero leaves no share."""
     return "no limit but 0" if share is None else f"{share * 100:.0f} %"
 
 
@@ -291,7 +289,6 @@ class CaseSimulation:
         return case.override != 1.0 and case.mode is None and self.model.bounds_deviations
 
     def _whole(self, case: Case) -> bool:
-        """Whether a case needs a simulation of the whole region for itself."""
         if self.model.always_plans and case.override != 1.0:
             return True
         # Behind feed drives each would take a quarter of a conversion: what is only shown makes do with the residual.
@@ -323,7 +320,6 @@ class CaseSimulation:
         return simulated
 
     def _cut_s(self, override: float) -> float:
-        """How long all blocks take at a feed override, before any filter."""
         return _core.simulated_duration_s(self.blocks, self.model.period_s, self.model.own_rule, override)
 
     @cached_property

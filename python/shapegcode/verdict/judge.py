@@ -77,6 +77,22 @@ class RegionFigures:
         """Until the set-points rest, the slower of both rules."""
         return max(run.duration_s for run in self.emitted)
 
+    @property
+    def gain_um(self) -> float:
+        """What shaping gained: the larger fall of the two figures, the emitted one in the worse rule."""
+        after = np.max([_figures_um(run) for run in self.emitted], axis=0)
+        return max(0.0, float(np.max(np.asarray(_figures_um(self.original)) - after)))
+
+
+def _figures_um(simulated: _core.SimulationFigures) -> tuple[float, float]:
+    """Residual vibration of the worst axis, contour error of the machine table."""
+    return float(np.max(simulated.residual_mm)) * 1e3, simulated.response.max_abs_mm * 1e3
+
+
+def most_to_gain_um(original: _core.SimulationFigures) -> float:
+    """The most that shaping can gain: what is there."""
+    return max(_figures_um(original))
+
 
 @dataclass(frozen=True)
 class PendingSimulations:
@@ -229,12 +245,10 @@ class Judge:
         )
 
     def _at_override(self, ratio: float) -> list[Case]:
-        """The conditions at a feed override; the nominal ones where it is locked."""
         turned = [case for case in self.cases if case.override == ratio and case.mode is None]
         return turned or [case for case in self.cases if case.nominal]
 
     def _residual_um(self, figures: Sequence[RegionFigures], cases: Iterable[Case]) -> Xyz[float]:
-        """Maximum of the shaped cuts in some conditions."""
         ranks = [self.cases.index(case) for case in cases]
         simulated = [region.cases[rank] for region in figures if region.is_shaped for rank in ranks]
         return largest_xyz_um(each.residual_mm for each in simulated if each is not None)
@@ -305,7 +319,6 @@ def residual_floor_um(region: _core.Region, machine: Machine) -> float:
 def _case_verdict(
     case: Case, rows: Sequence[tuple[CaseFigures, RegionLimits, tuple[int, int]]], material_side: str | None
 ) -> CaseVerdict:
-    """All regions in one case."""
     checks = [(each, where) for run, limit, where in rows for each in judge_region(run, limit)]
     worst, where = max(checks, key=lambda pair: pair[0].share)
     simulated = [run for run, _, _ in rows]
@@ -340,7 +353,6 @@ def _case_verdict(
 
 
 def _largest(deviations: Iterable[Deviation | None]) -> Deviation | None:
-    """Of all regions; None if one was not measured."""
     rows = list(deviations)
     measured = [each for each in rows if each is not None]
     return Deviation.largest(measured) if rows and len(measured) == len(rows) else None
