@@ -194,7 +194,6 @@ def non_negative_least_squares(matrix: FloatArray, right: FloatArray) -> FloatAr
 
 
 def _over(matrix: FloatArray, right: FloatArray, used: NDArray[np.bool_]) -> FloatArray:
-    """Least squares over some unknowns; the others are zero."""
     x = np.zeros(matrix.shape[1])
     x[used] = np.linalg.lstsq(matrix[:, used], right, rcond=None)[0]
     return x
@@ -305,7 +304,6 @@ class TapProblem:
     _limit: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
-        """Prepare the sweeps."""
         times_s = np.arange(self.last + 1, dtype=np.float64) * self.period_s
         self._bands = [_Band(band, times_s) for band in self.bands]
         self._rows = [[] for _ in self.bands]
@@ -369,7 +367,6 @@ class TapProblem:
             directions[:] = [directions[k] for k in keep]
 
     def _with_planes(self, limit: float) -> TapProgram:
-        """The linear program with the planes so far, all of them below a limit."""
         new: list[FloatArray] = []
         for band, rows, omegas, directions in zip(
             self._bands, self._rows, self.pool.omegas, self.pool.directions, strict=True

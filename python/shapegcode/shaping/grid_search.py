@@ -15,16 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapegcode._core import (
-    DesignError,
-    Mode,
-    ShapegcodeError,
-    Shaper,
-    convolve,
-    grid_polynomial,
-    sensitivity_curve,
-    worst_residual,
-)
+from shapegcode import _core
 from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import check_times, ms, whole_periods
 from shapegcode.shaping.cutting_planes import TapProgram
@@ -44,7 +35,7 @@ _CENTRINGS = 4  # steps of that way
 _SAME_CENTRE = 1e-6  # of the duration
 
 
-def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: float, *, title: str) -> Shaper:
+def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: float, *, title: str) -> _core.Shaper:
     """Shortest shaper with taps at multiples of a period that meets the conditions.
 
     Among the shapers of the shortest duration, one without negative impulses has the least second central moment that
@@ -63,21 +54,20 @@ def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: fl
     if further > most:
         longer = search.shortest(further)
         if longer is not None:
-            raise DesignError(f"{text}; the shortest lasts {ms(longer.duration_s)}")
+            raise _core.DesignError(f"{text}; the shortest lasts {ms(longer.duration_s)}")
         text += f", nor within {ms(further * period_s)}"
-    raise DesignError(f"{text}; {_polynomial(conditions, period_s)}; try another period")
+    raise _core.DesignError(f"{text}; {_polynomial(conditions, period_s)}; try another period")
 
 
 def _polynomial(conditions: Conditions, period_s: float) -> str:
-    """What the polynomial with the same zeros would be."""
     if not conditions.zeros:
         return "there is no zero from which a polynomial could be made"
     try:
-        shaper = Shaper([0.0], [1.0])
+        shaper = _core.Shaper([0.0], [1.0])
         for zero in conditions.zeros:
             for _ in range(zero.multiplicity):
-                shaper = convolve(shaper, grid_polynomial([zero.mode], period_s))
-    except ShapegcodeError as error:
+                shaper = _core.convolve(shaper, _core.grid_polynomial([zero.mode], period_s))
+    except _core.ShapegcodeError as error:
         return f"nor is there a polynomial: {error}"
     return f"the polynomial with its zeros lasts {ms(shaper.duration_s)} with sum|a| {shaper.abs_sum:.4g}"
 
@@ -86,7 +76,7 @@ def _polynomial(conditions: Conditions, period_s: float) -> str:
 class Zero:
     """A mode of which nothing may be left: `multiplicity` - 1 derivatives of the residual vanish with it."""
 
-    mode: Mode
+    mode: _core.Mode
     multiplicity: int = 1
 
 
@@ -94,14 +84,14 @@ class Zero:
 class ResidualLimit:
     """The most that may be left of a mode (no unit) whose natural frequency lies anywhere in a band (Hz)."""
 
-    mode: Mode
+    mode: _core.Mode
     lowest_hz: float
     highest_hz: float
     limit: float
 
-    def worst(self, shaper: Shaper) -> tuple[float, float]:
+    def worst(self, shaper: _core.Shaper) -> tuple[float, float]:
         """Proven bound on the residual over the band, and the frequency (Hz) where it is largest."""
-        found = worst_residual(shaper, self.mode, self.lowest_hz, self.highest_hz)
+        found = _core.worst_residual(shaper, self.mode, self.lowest_hz, self.highest_hz)
         return found.upper_bound, found.frequency_hz
 
 
@@ -133,13 +123,13 @@ class GridSearch:
         self._programs: dict[int, tuple[TapProgram, int]] = {}
         self._answers: dict[int, FloatArray | None] = {}
         self._planes = [
-            _Plane(Mode(float(frequency_hz), each.mode.damping_ratio).pole, float(direction), each.limit)
+            _Plane(_core.Mode(float(frequency_hz), each.mode.damping_ratio).pole, float(direction), each.limit)
             for each in conditions.limits
             for frequency_hz in _frequencies(each, _FIRST_FREQUENCIES)
             for direction in 2.0 * np.pi * np.arange(_FIRST_DIRECTIONS) / _FIRST_DIRECTIONS
         ]
 
-    def shortest(self, most: int) -> Shaper | None:
+    def shortest(self, most: int) -> _core.Shaper | None:
         """The shortest shaper of at most that many periods, or None."""
         last = self._smallest_feasible(most)
         while last is not None and last <= most:
@@ -183,7 +173,6 @@ class GridSearch:
         return max(1, math.ceil(swings_s / self._period_s))
 
     def _candidates(self, last: int) -> list[FloatArray]:
-        """Taps of that many periods, the best first."""
         feasible = self._feasible(last)
         rest = [] if feasible is None else [feasible]
         if self._conditions.largest_tap is not None:
@@ -248,11 +237,10 @@ class GridSearch:
             cost = np.ones(last + 1)
         try:
             return self._with_planes(last).solve(cost, 1.0 - LIMIT_MARGIN)
-        except DesignError:
+        except _core.DesignError:
             return None
 
     def _with_planes(self, last: int) -> TapProgram:
-        """The linear program of a duration, with every plane so far."""
         largest = self._conditions.largest_tap
         program, done = self._programs.get(last, (None, 0))
         if program is None:
@@ -265,7 +253,6 @@ class GridSearch:
         return program
 
     def _equalities(self, last: int) -> tuple[FloatArray, FloatArray]:
-        """Matrix and right-hand side of zeros and sum."""
         zeros = self._conditions.zeros
         modes, counts = [zero.mode for zero in zeros], [zero.multiplicity for zero in zeros]
         return exact_conditions(modes, self._period_s, last, counts)
@@ -278,29 +265,28 @@ class GridSearch:
         return np.asarray(decay * np.cos(phases), dtype=np.float64)
 
     def _cut(self, taps: FloatArray) -> bool:
-        """Add the planes that cut these taps off; False if they meet every limit."""
         if not self._conditions.limits:
             return False
         last = len(taps) - 1
-        shaper = Shaper((np.arange(last + 1) * self._period_s).tolist(), (taps / taps.sum()).tolist())
+        shaper = _core.Shaper((np.arange(last + 1) * self._period_s).tolist(), (taps / taps.sum()).tolist())
         before = len(self._planes)
         for each in self._conditions.limits:
             worst, frequency_hz = each.worst(shaper)
             if worst <= each.limit:
                 continue
             sweep = _frequencies(each, _SWEEP)
-            curve = np.array(sensitivity_curve(shaper, each.mode.damping_ratio, sweep.tolist()))
+            curve = np.array(_core.sensitivity_curve(shaper, each.mode.damping_ratio, sweep.tolist()))
             padded = np.concatenate([[-1.0], curve, [-1.0]])
             peaks = sweep[(curve >= padded[:-2]) & (curve >= padded[2:]) & (curve > each.limit)]
             for frequency in (*peaks.tolist(), frequency_hz):
-                pole = Mode(frequency, each.mode.damping_ratio).pole
+                pole = _core.Mode(frequency, each.mode.damping_ratio).pole
                 steps = np.arange(last + 1)
                 left = np.exp(self._period_s * (pole.real * (last - steps) + 1j * pole.imag * steps)) @ taps
                 direction = float(np.angle(left)) - pole.imag * self._period_s * 0.5 * last
                 self._planes.append(_Plane(pole, direction, each.limit))
         return len(self._planes) > before
 
-    def _polished(self, vertex: FloatArray) -> Shaper | None:
+    def _polished(self, vertex: FloatArray) -> _core.Shaper | None:
         """The taps solved again to rounding, or None if they then break a condition."""
         matrix, right = self._equalities(len(vertex) - 1)
         largest = self._conditions.largest_tap
@@ -315,12 +301,12 @@ class GridSearch:
             taps[free] = refined(columns[:, free], right - columns[:, ~free] @ taps[~free], taps[free])
             if abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT and (taps.min() > 0.0 or largest is not None):
                 times = (support - support[0]) * self._period_s
-                shaper = Shaper(times.tolist(), (taps / taps.sum()).tolist())
+                shaper = _core.Shaper(times.tolist(), (taps / taps.sum()).tolist())
                 if self._meets(shaper) and float(np.abs(matrix[:-1, support] @ taps).max(initial=0.0)) < RESIDUAL_LIMIT:
                     return shaper
         return None
 
-    def _meets(self, shaper: Shaper) -> bool:
+    def _meets(self, shaper: _core.Shaper) -> bool:
         largest = self._conditions.largest_tap
         return (
             all(shaper.residual_ratio(zero.mode) <= RESIDUAL_LIMIT for zero in self._conditions.zeros)
@@ -330,7 +316,6 @@ class GridSearch:
 
 
 def _frequencies(limit: ResidualLimit, count: int) -> FloatArray:
-    """Over the band of a limit, its ends among them."""
     if limit.lowest_hz == limit.highest_hz:
         return np.array([limit.lowest_hz])
     return np.linspace(limit.lowest_hz, limit.highest_hz, count)

@@ -28,6 +28,11 @@ _MEANS = 9  # mean delays that are compared
 _POINT = 1e-8  # periods: means that differ by less are one
 
 
+def shaper_fir(shaper: Shaper, period_s: float) -> Fir:
+    """A shaper in whole periods of its grid."""
+    return Fir([round(time / period_s) for time in shaper.times_s], list(shaper.amplitudes))
+
+
 @dataclass(frozen=True)
 class MovingMode:
     """A mode and how it depends on the position of the axis that is followed."""
@@ -66,12 +71,7 @@ class ShaperTrack:
     @cached_property
     def filters(self) -> VaryingFir:
         """The shapers in whole periods."""
-        return VaryingFir(
-            [
-                Fir([round(time / self.period_s) for time in node.shaper.times_s], list(node.shaper.amplitudes))
-                for node in self.nodes
-            ]
-        )
+        return VaryingFir([shaper_fir(node.shaper, self.period_s) for node in self.nodes])
 
     def following(self, offset_mm: float = 0.0) -> FollowingFir:
         """The filter that follows the axis."""

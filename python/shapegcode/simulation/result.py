@@ -204,7 +204,6 @@ class Simulation(Result):
 
     @staticmethod
     def _judged_answer(verdict: ProgramFigures) -> str:
-        """The figures of `convert`, and the worst cut that misses a limit."""
         out = [cut for cut in verdict.all_cuts if cut.misses]
         residual = verdict.residual_vibration_um
         axis = max("xyz", key=lambda each: residual.original[each])
@@ -274,7 +273,6 @@ class Simulation(Result):
         return Table("", columns, rows)
 
     def _parts(self) -> Iterator[tuple[Simulation | ShapedFigures, str]]:
-        """The figures of all regions, and of the shaped ones where others are beside them."""
         yield self, ""
         if self.of_shaped is not None and self.of_shaped.regions < len(self.regions):
             yield self.of_shaped, f", {self.of_shaped.regions} shaped regions alone"

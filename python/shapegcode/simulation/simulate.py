@@ -20,8 +20,7 @@ from shapegcode.model.stream import stream
 from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions
 from shapegcode.results.outcome import ContourError, Tracks, Xyz, largest_xyz_um
-from shapegcode.simulation.files import csv_file, npz_file
-from shapegcode.simulation.motion import MotionRecorder
+from shapegcode.simulation.motion import MotionRecorder, csv_file, npz_file
 from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation
 from shapegcode.verdict.judge import judge_program
 
