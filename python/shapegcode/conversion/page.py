@@ -88,11 +88,7 @@ def _picker(conversion: Conversion, provenance: Provenance | None) -> model.CutP
         )
         for cut in conversion.cuts
     ]  # fmt: skip
-    command = (
-        "shapegcode convert IN -m MACHINE -o OUT"
-        if provenance is None or not provenance.command
-        else provenance.command
-    )
+    command = ("" if provenance is None else provenance.command) or "shapegcode convert IN -m MACHINE -o OUT"
     command = re.sub(r" --(?:only|leave)[ =]\S+", "", command)
     totals = model.CutTotals(
         conversion.cycle_time_s.original,

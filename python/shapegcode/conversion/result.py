@@ -249,12 +249,15 @@ class Conversion(ProgramFigures, Result):
         if worst_stay and best.is_shaped:
             beside = "; the worst cuts are left unchanged, lines {} to {} are better by ".format(*best.lines)
             beside += f"{best.gain_um:.1f} µm"
+        share, shaped = "", len(self.regions)
+        if shaped < len(self.cuts):
+            share = f" ({shaped} of {len(self.cuts)} cuts shaped, the others unchanged)"
         shown = f"residual vibration {axis.upper()} {vibration.original[axis]:.1f} → {vibration.emitted[axis]:.1f} µm, "
         if shown.count(" 0.0 ") == 2:
             shown = ""  # the gain is in the contour
         return (
             f"{verdict}: {shown}contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}"
-            f"{self._share}{beside}"
+            f"{share}{beside}"
         )
 
     def _why_unchanged(self) -> str:
@@ -280,11 +283,6 @@ class Conversion(ProgramFigures, Result):
             cost = f", {asked.tolerance_um:.3g} µm would cost {asked.time_increase_percent:+.3g} %" if asked else ""
             return f"shaped for {cut.tolerance_um:.3g} µm within the price{cost}"
         return "shaped as closely as the feed allows"
-
-    @property
-    def _share(self) -> str:
-        shaped = len(self.regions)
-        return f" ({shaped} of {len(self.cuts)} cuts shaped, the others unchanged)" if shaped < len(self.cuts) else ""
 
     @property
     def next_step(self) -> str:
@@ -337,11 +335,8 @@ class Conversion(ProgramFigures, Result):
         if self.nothing_shaped:
             return [*cuts, *curve] if any(cut.misses for cut in self.cuts) else cuts
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
-        rests = (
-            [sensitivity_table(self.parameter_sensitivity, self.unverified_parameters_tested)]
-            if self.parameter_sensitivity
-            else []
-        )
+        unverified = self.parameter_sensitivity
+        rests = [sensitivity_table(unverified, self.unverified_parameters_tested)] if unverified else []
         points = [restart_table(self.restart_points)] if self.restart_points else []
         before_after = before_after_table(self.before_after())
         return [before_after, *cuts, *curve, *cases, *rests, control_table(self.at_the_control), *points]
@@ -350,18 +345,15 @@ class Conversion(ProgramFigures, Result):
         """Every figure of original and emitted, in groups."""
         pairs = (("cycle time", self.cycle_time_s), ("cutting time", self.cutting_time_s))
         times = [BeforeAfter(name, "s", pair.original, pair.emitted, 3) for name, pair in pairs]
-        return [times, *self._vibrations(), *self._contours(), self._orbits(), self._feeds(), self._sizes()]
+        return [times, *self._vibrations(), *self._contours(), *self._orbits_and_feeds(), self._sizes()]
 
     def _vibrations(self) -> Iterator[list[BeforeAfter]]:
         for key, name in _VIBRATIONS.items():
             both: Pair[Xyz[float]] = getattr(self, key)
+            limits = {axis: self.residual_limit_um(axis) for axis in "xyz" if name.startswith("residual")}
             yield [
                 BeforeAfter(
-                    f"{name} {axis.upper()}",
-                    "µm",
-                    both.original[axis],
-                    both.emitted[axis],
-                    limit=self.residual_limit_um(axis) if name.startswith("residual") else None,
+                    f"{name} {axis.upper()}", "µm", both.original[axis], both.emitted[axis], limit=limits.get(axis)
                 )
                 for axis in "xyz"
                 if both.original[axis] or both.emitted[axis]
@@ -397,18 +389,13 @@ class Conversion(ProgramFigures, Result):
                     rows.append(BeforeAfter(f"{name}, {suffix}", "µm", original, emitted, limit=limit))
             yield rows
 
-    def _orbits(self) -> list[BeforeAfter]:
-        errors = self.orbit_error_percent
-        if not errors:
-            return []
-        name = "orbit error" if len(errors) == 1 else f"largest orbit error of {len(errors)} arcs"
-        return [BeforeAfter(name, "%", None, max(errors, key=abs), 4)]
-
-    def _feeds(self) -> list[BeforeAfter]:
-        if self.feed_excess is None:
-            return []
-        above, limit = max(0.0, self.feed_excess.ratio - 1.0) * 100.0, self.limits.feed_excess_ratio * 100.0
-        return [BeforeAfter("speed above the programmed feed", "%", None, above, limit=limit)]
+    def _orbits_and_feeds(self) -> Iterator[list[BeforeAfter]]:
+        if errors := self.orbit_error_percent:
+            name = "orbit error" if len(errors) == 1 else f"largest orbit error of {len(errors)} arcs"
+            yield [BeforeAfter(name, "%", None, max(errors, key=abs), 4)]
+        if self.feed_excess is not None:
+            above, limit = max(0.0, self.feed_excess.ratio - 1.0) * 100.0, self.limits.feed_excess_ratio * 100.0
+            yield [BeforeAfter("speed above the programmed feed", "%", None, above, limit=limit)]
 
     def _sizes(self) -> list[BeforeAfter]:
         rows = [

@@ -96,13 +96,11 @@ def require_dialect(program: Program, machine: Machine, budget: Budget | None) -
     if budget is not None and (dialect.one_code or (budget.limits_rate and other_blocks)):
         raise _core.ArgumentError(
             f"budgets are computed for FANUC's blocks only, not for {dialect.control} (emission.dialect = {name}): "
-            "give "
-            f"{'none' if dialect.one_code else '--max-bytes alone'}"
+            f"give {'none' if dialect.one_code else '--max-bytes alone'}"
         )
     decimals = machine.emission.position_decimals
-    for region in program.regions:
-        if decimals is None:
-            break
+    for region in program.regions if decimals is not None else ():
+        assert decimals is not None
         inch = region.exit.units == 20
         limit_mm = (10.0 ** (7 - decimals) * MM_PER_INCH) if inch else 10.0 ** (8 - decimals)
         reach_mm = float(np.abs(region.path.polyline(1.0)).max())
@@ -179,8 +177,7 @@ class _Translator:
         shaped: Sequence[tuple[_core.Path, tuple[int, int], tuple[int, int]]],
         block_period_s: float,
     ) -> None:
-        self._program, self._machine, self._original = program, machine, original
-        self._dialect = dialect
+        self._program, self._machine, self._original, self._dialect = program, machine, original, dialect
         self._own = {code_name(word): text for word, text in machine.emission.words.items()}
         self._shaped = shaped
         self.state = _State(int(machine.power_on.motion[1:]), machine.power_on.units)
@@ -195,11 +192,13 @@ class _Translator:
         self._arcs = dict(_arcs(program)) if self._dialect.chord_tolerance_mm else {}
         self._times: dict[int, str] = {}
         self._firsts, self._lasts = set[int](), set[int]()
-        foreign = self._original.foreign
-        same_control = foreign is not None and foreign.dialect == machine.emission.dialect
-        self._names = foreign.settings.names if foreign is not None and same_control else {}
+        foreign = original.foreign
+        settings = None
+        if foreign is not None and foreign.dialect == machine.emission.dialect:
+            settings = foreign.settings
+        self._names = {} if settings is None else settings.names
         # Cuts that are left unchanged keep the path tolerance of the program.
-        self._tolerance = foreign.settings.path_tolerance_mm if foreign is not None and same_control else None
+        self._tolerance = None if settings is None else settings.path_tolerance_mm
         self._begins = {first for _, (first, _), _ in shaped}
         self._ends = {last for _, (_, last), _ in shaped}
         self._is_shaped = False
@@ -439,7 +438,11 @@ class _Translator:
             if code == "G43" and dialect.arc_radius == "CR=":
                 return "D1"
             if code not in dialect.same and code not in dialect.becomes:
-                raise self._refusal(number, code)
+                here, there = fanuc_meaning(code), dialect.means.get(code, "not known")
+                raise self._error(
+                    number, f"{code} is {here} on FANUC, and {there} on {dialect.control}: delete it, or state a "
+                    f'replacement: emission.words = {{ "{code}" = "..." }}'
+                )  # fmt: skip
             if code in dialect.cautions and number > 0:
                 self.cautions[code] = f"{self._where(number)}: {code}: {dialect.cautions[code]}"
             short = letter + (value.lstrip("0") or "0") if dialect.short_codes else letter + value
@@ -570,14 +573,6 @@ class _Translator:
 
     def _error(self, number: int, message: str) -> _core.ProgramError:
         return located_error(*self._place(number), 1, message)
-
-    def _refusal(self, number: int, code: str) -> _core.ProgramError:
-        here = fanuc_meaning(code)
-        there = self._dialect.means.get(code, "not known")
-        return self._error(
-            number, f"{code} is {here} on FANUC, and {there} on {self._dialect.control}: delete it, or state a "
-            f'replacement: emission.words = {{ "{code}" = "..." }}'
-        )  # fmt: skip
 
 
 _BEHIND_THE_MOVE = {"M00", "M01", "M02", "M05", "M09", "M30"}

@@ -268,7 +268,6 @@ class FeedSchedule(Result):
         return Table(title, columns, rows, sections=(len(LOADS) + 1,))
 
     def _limit_table(self) -> Table:
-        """The ranges of lines with the lowest feeds, in order."""
         slowest = sorted(self.limits, key=lambda entry: entry.feed_mm_per_min.min)[:_SHOWN_RANGES]
         title = "what limits the feed"
         if len(self.limits) > len(slowest):

@@ -110,7 +110,6 @@ def survey(
 def _material(
     walk: Walk, program: Program, machine: Machine, tools: Sequence[Tool], stock: Stock, resolution_mm: float | None
 ) -> _core.Material:
-    """The stock on a grid, its layers where the program moves."""
     cutters = walk.tools_of_regions()
     reasons = [why_not_swept(region, walk.zero) for region in program.regions]
     swept = [index for index, reason in enumerate(reasons) if not reason and cutters[index] is not None]
@@ -147,6 +146,12 @@ class SurveyedRegion:
     # which the track takes for whole or gone. None: wherever the track says so
     clear: npt.NDArray[np.bool_] | None = None
 
+    @property
+    def window_s(self) -> float:
+        """Time between two teeth, over which feeds are taken; of a region with tool and speed."""
+        assert self.tool is not None
+        return 60.0 / (self.tool.tool.flutes * self.spindle_rev_per_min)
+
 
 @dataclass(frozen=True)
 class SurveyedMove:
@@ -167,9 +172,9 @@ def why_not_swept(region: _core.Region, zero: ZeroPoints) -> str:
     if region.incremental:
         return "its place is not known"
     if not region.path.arcs_in_xy:
-        path = region.path
-        first = next(i for i in range(len(path)) if path[i].kind == _core.SegmentKind.arc and path[i].normal != 2)
-        return f"it holds arcs that are not in the XY plane (G17), the first in line {path[first].line_number}"
+        segments = map(region.path.__getitem__, range(len(region.path)))
+        first = next(each for each in segments if each.kind == _core.SegmentKind.arc and each.normal != 2)
+        return f"it holds arcs that are not in the XY plane (G17), the first in line {first.line_number}"
     return ""
 
 
@@ -310,7 +315,6 @@ class Walk:
         self.warnings[:0] = messages
 
     def _look_at_depth(self, region: _core.Region, tool: Tool, track: _core.EngagementTrack) -> None:
-        """Say where the tool cuts above its flutes."""
         if not len(track.arcs):
             return
         tops = track.arcs[:, 3]

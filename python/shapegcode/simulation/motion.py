@@ -24,32 +24,29 @@ _BUCKETS = 4000
 
 
 class MotionEnvelope:
-    """Minimum and maximum of several curves over equal intervals of samples, as short as the number of intervals
-    allows."""
+    """Minimum and maximum of several curves over equal intervals of samples, as short as their number allows."""
 
     def __init__(self, most: int = _BUCKETS) -> None:
         """At most *most* intervals, 2 or more."""
         self._most = most
-        self._low: FloatArray | None = None
-        self._high: FloatArray | None = None
-        self._rest: FloatArray | None = None
+        self._low = self._high = self._rest = np.empty((0, 0))
         self.samples_per_bucket = 1
 
     def add(self, values: FloatArray) -> None:
         """Further samples, (k, curves)."""
-        rest = values if self._rest is None else np.concatenate([self._rest, values])
+        if not self._rest.shape[1]:
+            self._low = self._high = self._rest = np.empty((0, values.shape[1]))
+        rest = np.concatenate([self._rest, values])
         whole = len(rest) // self.samples_per_bucket
         body = rest[: whole * self.samples_per_bucket].reshape(whole, self.samples_per_bucket, rest.shape[1])
         self._rest = rest[whole * self.samples_per_bucket :].copy()
-        low, high = body.min(axis=1), body.max(axis=1)
-        self._low = low if self._low is None else np.concatenate([self._low, low])
-        self._high = high if self._high is None else np.concatenate([self._high, high])
+        self._low = np.concatenate([self._low, body.min(axis=1)])
+        self._high = np.concatenate([self._high, body.max(axis=1)])
         while len(self._low) > self._most:
             self._merge()
 
     def _merge(self) -> None:
         """Join pairs of intervals; an odd last one goes back to the waiting samples."""
-        assert self._low is not None and self._high is not None and self._rest is not None
         pairs = len(self._low) // 2
         if len(self._low) % 2:
             # Its two extremes stand for it until its stretch is full.
@@ -62,7 +59,7 @@ class MotionEnvelope:
 
     def result(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Middle of each interval in samples since the first, (n,); minimum and maximum, (n, curves)."""
-        if self._low is None or self._high is None or self._rest is None:
+        if not self._rest.shape[1]:
             raise ValueError("no sample: an envelope needs one or more")
         low, high = self._low, self._high
         starts = np.arange(len(low), dtype=np.float64) * self.samples_per_bucket
@@ -81,26 +78,20 @@ class MotionRecorder:
     def __init__(self, period_s: float) -> None:
         """Of a motion whose samples are one period apart."""
         self._period_s = period_s
-        self._begin_s = 0.0
-        self._end_s = 0.0
-        self._samples = 0
+        self._begin_s = self._end_s = 0.0
+        self.samples = 0  # that have passed
         self._largest: dict[str, FloatArray] = {}
         self._velocity: FloatArray | None = None
         self._envelope = MotionEnvelope()
 
-    @property
-    def samples(self) -> int:
-        """That have passed."""
-        return self._samples
-
     def add(self, chunk: Chunk) -> None:
         """Further samples."""
-        if not self._samples:
+        if not self.samples:
             self._begin_s = float(chunk.time_s[0])
         before = chunk.velocity_mm_per_s[:1] if self._velocity is None else self._velocity
         acceleration = np.diff(np.concatenate([before, chunk.velocity_mm_per_s]), axis=0) / self._period_s
         self._velocity = chunk.velocity_mm_per_s[-1:].copy()
-        self._samples += len(chunk)
+        self.samples += len(chunk)
         self._end_s = float(chunk.time_s[-1])
         self._note("largest_speed_mm_per_min", chunk.velocity_mm_per_s * 60.0)
         self._note("largest_acceleration_mm_per_s2", acceleration)
@@ -131,7 +122,7 @@ class MotionRecorder:
         return Motion(
             lines=lines,
             every=every,
-            samples=self._samples,
+            samples=self.samples,
             end_s=self._end_s,
             program=program,
             times_s=self._begin_s + middles * self._period_s,

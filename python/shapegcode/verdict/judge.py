@@ -109,16 +109,12 @@ class Judge:
     """Simulates emitted regions in every case and holds them against the machine's tolerances."""
 
     def __init__(self, model: MachineModel, cases: Sequence[Case] | None = None) -> None:
-        self._machine = model.machine
-        self._model = model
+        self._machine, self._model = model.machine, model
+        # In the order of `RegionFigures.cases`; rules of block timing: the controller's own, and in that of `emitted`.
         self.cases = stated_cases(model.machine) if cases is None else list(cases)
-        """In the order of `RegionFigures.cases`."""
-        self.own_rule = model.own_rule
-        """The controller's own rule of block timing."""
-        self.rules = model.block_rules
-        """The rules of block timing of `RegionFigures.emitted`."""
+        self.own_rule, self.rules = model.own_rule, model.block_rules
+        # What the contour tolerance is about.
         self.target: Target = "response" if model.machine.shaping.contour == "response" else "command"
-        """What the contour tolerance is about."""
 
     def measure(
         self,
@@ -197,9 +193,8 @@ class Judge:
         self, figures: Sequence[RegionFigures], placed: Sequence[Placed], block_period_s: float
     ) -> tuple[RegionVerdict, ...]:
         """Every cut beside its limits."""
-        return tuple(
-            self._verdict(region, place, block_period_s) for region, place in zip(figures, placed, strict=True)
-        )
+        pairs = zip(figures, placed, strict=True)
+        return tuple(self._verdict(region, place, block_period_s) for region, place in pairs)
 
     def summarise(
         self,
@@ -261,10 +256,8 @@ class Judge:
     def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
         """Limit of a region: its residual compared with that of the original as programmed, in every case."""
         tolerance, floor_um = self._machine.tolerance, residual_floor_um(place.region, self._machine)
-        before_um = figures.original.residual_mm * 1e3
-        return RegionLimits(
-            np.maximum(tolerance.residual_ratio * before_um, floor_um), tolerance.contour_um, self.target
-        )
+        limit_um = np.maximum(tolerance.residual_ratio * (figures.original.residual_mm * 1e3), floor_um)
+        return RegionLimits(limit_um, tolerance.contour_um, self.target)
 
     def _verdict(self, figures: RegionFigures, place: Placed, block_period_s: float) -> RegionVerdict:
         limits = self.limits(figures, place)
