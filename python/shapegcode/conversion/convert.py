@@ -176,7 +176,7 @@ def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
     left_unchanged = {} if plan.spending is None else plan.spending.left_unchanged
     unreported = {*left_unchanged, *plan.left, *plan.aims.emitted_s}
     on_progress = partial(plan.on_progress, stage) if stage else lambda _done, _total: None
-    written = plan.writer.write(plan.reasons, plan.aims.room_um, plan.aims.feed_ratio, unreported, on_progress)
+    written = plan.writer.write(plan.reasons, plan.aims.wanted(), unreported, on_progress)
     for index, reason in written.no_room.items():
         plan.reasons[index] = reason
     plan.curves.note(written)

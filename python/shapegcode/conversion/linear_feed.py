@@ -108,7 +108,7 @@ def linear_blocks(
     """
     fit = _JoinedBlocks(path, period_s, tolerance_mm, frozenset(joints))
     blocks = list(fit.blocks())
-    return _at_rest(blocks, fit.points, fit.ends(blocks), period_s, tolerance_mm, modes) if modes else blocks
+    return _at_rest(blocks, fit, modes) if modes else blocks
 
 
 def positions_mm(start_mm: Vector, blocks: Sequence[LinearBlock], times_s: Vector) -> Vector:
@@ -210,7 +210,7 @@ class _JoinedBlocks:
     """Chooses the blocks one after another, each as long as it may be."""
 
     def __init__(self, path: _core.Path, period_s: float, tolerance_mm: float, joints: frozenset[int]) -> None:
-        self._period, self._tolerance, self._joints = period_s, tolerance_mm, joints
+        self.period_s, self.tolerance_mm, self._joints = period_s, tolerance_mm, joints
         self._segments = [path[k] for k in range(len(path))]
         points, self._knots = [np.asarray(path.start_mm, dtype=float)], [0]
         for segment in self._segments:
@@ -240,13 +240,13 @@ class _JoinedBlocks:
         return [self._knots[block.last + 1] for block in blocks]
 
     def _time_s(self, at: int, end: int) -> float:
-        return (self._knots[end] - self._knots[at]) * self._period
+        return (self._knots[end] - self._knots[at]) * self.period_s
 
     def _speed_at(self, knot: int) -> float:
         m = self._knots[knot]
         before, behind = max(m - 1, 0), min(m + 1, len(self.points) - 1)
         step = self.points[behind] - self.points[before]
-        return float(np.linalg.norm(step)) / ((behind - before) * self._period)
+        return float(np.linalg.norm(step)) / ((behind - before) * self.period_s)
 
     def _bias(self, at: int, end: int) -> float:
         """Excess of the speeds at the ends over those of the command, so that the block keeps its mean speed.
@@ -264,7 +264,7 @@ class _JoinedBlocks:
         """
         before, behind = self._speed_at(at), self._speed_at(at + 1)
         is_short = self._knots[at + 1] - self._knots[at] == 1
-        if is_short and abs(behind - before) * self._period > 2.0 * self._tolerance:
+        if is_short and abs(behind - before) * self.period_s > 2.0 * self.tolerance_mm:
             shape, whole_s = self._shape(at, at + 1), self._time_s(at, at + 1)
             start = _written(before + self._bias(at, at + 1)) if at else 0.0
             end = None if shape is None else end_speed(shape.length_mm, start, whole_s - late_s)
@@ -293,7 +293,7 @@ class _JoinedBlocks:
     def _begun(self, at: int, late_s: float) -> tuple[LinearBlock | None, float]:
         """The longest block whose feed at its start is free."""
         speed = self._speed_at(at) if at else 0.0
-        if speed * self._period > self._tolerance:
+        if speed * self.period_s > self.tolerance_mm:
             return self._longest(at, None, late_s)
         found: tuple[LinearBlock | None, float] = (None, 0.0)
         for end in range(at + 1, min(at + 4, len(self._segments))):
@@ -328,16 +328,16 @@ class _JoinedBlocks:
         if shape is None or (exact := end_speed(shape.length_mm, speed, time_s)) is None:
             return None, 0.0
         wanted = self._speed_at(end) + self._bias(at, end) if end < len(self._segments) else exact
-        slack_s = _TIME_SHARE * self._tolerance / max(speed, wanted, exact)
+        slack_s = _TIME_SHARE * self.tolerance_mm / max(speed, wanted, exact)
         slowest, fastest = (end_speed(shape.length_mm, speed, time_s + sign * slack_s) or exact for sign in (1.0, -1.0))
         last = _written(min(max(wanted, slowest), fastest))
-        if last <= 0.0 or abs(last - wanted) * self._period > _SPEED_SHARE * self._tolerance:
+        if last <= 0.0 or abs(last - wanted) * self.period_s > _SPEED_SHARE * self.tolerance_mm:
             return None, 0.0
         late = late_s + duration_s(shape.length_mm, speed, last) - whole_s
-        times = np.arange(1.0, len(shape.along_mm) + 1.0) * self._period - late_s
+        times = np.arange(1.0, len(shape.along_mm) + 1.0) * self.period_s - late_s
         along = distance_mm(shape.length_mm, speed, last, np.asarray(times)) - shape.along_mm
         off = float(np.hypot(along, shape.aside_mm).max(initial=0.0))
-        if off > self._tolerance or abs(late) * max(last, wanted) > 2.0 * _TIME_SHARE * self._tolerance:
+        if off > self.tolerance_mm or abs(late) * max(last, wanted) > 2.0 * _TIME_SHARE * self.tolerance_mm:
             return None, 0.0
         block = self._made(at, end, shape, speed, last, sets_feed=sets_feed)
         return block, late
@@ -354,7 +354,7 @@ class _JoinedBlocks:
             return None
         along = (points[1:-1] - points[0]) @ chord / length
         aside = np.linalg.norm(points[1:-1] - points[0] - np.outer(along, chord / length), axis=1)
-        if aside.max(initial=0.0) <= _LINE_SHARE * self._tolerance:
+        if aside.max(initial=0.0) <= _LINE_SHARE * self.tolerance_mm:
             return _Shape(length, 0.0, 0.0, along, aside)
         return self._arc(points, length, self._segments[at].normal)
 
@@ -383,17 +383,13 @@ class _JoinedBlocks:
 
 
 def _at_rest(
-    blocks: list[LinearBlock],
-    points: Vector,
-    ends: Sequence[int],
-    period_s: float,
-    tolerance_mm: float,
-    modes: Sequence[tuple[int, float, float]],
+    blocks: list[LinearBlock], fit: _JoinedBlocks, modes: Sequence[tuple[int, float, float]]
 ) -> list[LinearBlock]:
     """The last blocks with speeds that leave the modes at rest and stay near the command: least squares.
 
     A micrometre of error at a mode's frequency, in some blocks before the end, is several of vibration behind it.
     """
+    points, ends, period_s = fit.points, fit.ends(blocks), fit.period_s
     first = max(0, len(blocks) - _POLISHED)
     while first < len(blocks) - 1 and ends[-1] - (ends[first - 1] if first else 0) > _POLISHED_PERIODS:
         first += 1
@@ -437,7 +433,7 @@ def _at_rest(
                 continue
             found = rows(tried)
             off = np.linalg.norm(found[: window.size].reshape(-1, 3), axis=1).max()
-            if off <= _REST_SHARE * tolerance_mm and found @ found < best_rows @ best_rows:
+            if off <= _REST_SHARE * fit.tolerance_mm and found @ found < best_rows @ best_rows:
                 best, best_rows = tried, found
                 break
         else:

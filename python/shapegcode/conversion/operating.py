@@ -11,7 +11,8 @@ from itertools import chain
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.restart import CutRestarts, RestartPoint
+from shapegcode.conversion.restart import RestartPoint
+from shapegcode.conversion.whole_text import Written
 from shapegcode.conversion.write import TransferLoad
 from shapegcode.machine import Machine
 from shapegcode.machine.dialects import dialect_of
@@ -40,15 +41,10 @@ class ControlNote:
 
 
 def at_the_control(
-    emitted: Program,
-    placed: Sequence[Placed],
-    loads: Mapping[int, TransferLoad],
-    figures: ProgramFigures,
-    model: MachineModel,
-    block_period_s: float,
-    restarts: Sequence[CutRestarts],
+    emitted: Program, written: Written, figures: ProgramFigures, model: MachineModel, block_period_s: float
 ) -> tuple[ControlNote, ...]:
     """Cautions for the operator of an emitted program."""
+    placed, loads = written.placed, written.loads
     if not placed:
         return ()
     machine = model.machine
@@ -67,7 +63,7 @@ def at_the_control(
         ControlNote(override.topic, "; ".join([override.sentence, *elsewhere])),
         ControlNote(FEED_HOLD.topic, FEED_HOLD.sentence),
         ControlNote(SINGLE_BLOCK.topic, f"{SINGLE_BLOCK.sentence}; {_single_block(emitted, placed, figures, model)}"),
-        ControlNote(RESTART.topic, "; ".join([RESTART.sentence, *_restarts(emitted, placed, restarts, machine)])),
+        ControlNote(RESTART.topic, "; ".join([RESTART.sentence, *_restarts(emitted, written, machine)])),
         ControlNote(FIRST_RUN.topic, FIRST_RUN.sentence),
     )
 
@@ -163,10 +159,8 @@ def _duration(time_s: float) -> str:
     return f"{time_s:.1f} s" if time_s < 10.0 else f"{time_s:.0f} s"
 
 
-def _restarts(
-    emitted: Program, placed: Sequence[Placed], restarts: Sequence[CutRestarts], machine: Machine
-) -> Iterator[str]:
-    emission = machine.emission
+def _restarts(emitted: Program, written: Written, machine: Machine) -> Iterator[str]:
+    emission, placed, restarts = machine.emission, written.placed, written.restarts
     if (own := dialect_of(emission.dialect)) is not None:
         yield f"{own.control}: {own.facts['restart'].text}"
     else:

@@ -91,8 +91,9 @@ def judge(plan: ConversionPlan, shaped: Shaped) -> ProgramVerdict:
 
 def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> Conversion:
     """The result: figures, warnings, what they rest on, and what the control will make of the text."""
-    program, machine = plan.program, plan.machine
-    core, tools = program.core, tools_of_cuts(program)
+    program, machine, written = plan.program, plan.machine, shaped.written
+    core, tolerance, tools_by_index = program.core, machine.tolerance, tools_of_cuts(program)
+    tools = [tools_by_index.get(plan.aims.index(place.region)) for place in written.placed]
     # For a core that waits while the last simulations run.
     mark = plan.pool.submit(lambda: shaped.emitted.mark)
     warnings = _warnings(plan, shaped, verdict.figures)
@@ -119,46 +120,32 @@ def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> 
         cutting_time_s=verdict.figures.region_time_s(),
         block_period_s=plan.grid.block_period_s,
         shaper=_used_shaper(plan.grid),
-        blocks=parts.BlockCount(core.block_count, shaped.written.blocks),
+        blocks=parts.BlockCount(core.block_count, written.blocks),
         expanded=core.expanded,
         expanded_radii_mm={f"D{number}": radius for number, radius in core.expanded_radii_mm.items()},
         bytes_read=core.size,
-        bytes_emitted=shaped.written.size,
+        bytes_emitted=written.size,
         limits=parts.AppliedLimits(
-            machine.tolerance.contour_um,
+            tolerance.contour_um,
             plan.judge.target,
-            machine.tolerance.residual_ratio,
-            machine.tolerance.residual_floor_um,
-            machine.tolerance.residual_floor_increments,
-            machine.tolerance.feed_excess_ratio,
+            tolerance.residual_ratio,
+            tolerance.residual_floor_um,
+            tolerance.residual_floor_increments,
+            tolerance.feed_excess_ratio,
             machine.verdict.plant,
             machine.price.program_time_percent,
             machine.price.cut_time_percent,
         ),
         warnings=tuple(warnings),
-        budget=plan.spending.outcome(plan.grid, shaped.written) if plan.spending is not None else None,
+        budget=plan.spending.outcome(plan.grid, written) if plan.spending is not None else None,
         rapids=shaped.rapids.outcome if shaped.rapids is not None else None,
         least_gain_um=machine.shaping.least_gain_um,
         parameter_sensitivity=sensitivity,
         unverified_parameters_tested=tried,
-        at_the_control=at_the_control(
-            shaped.emitted,
-            shaped.written.placed,
-            shaped.written.loads,
-            verdict.figures,
-            plan.model,
-            plan.grid.block_period_s,
-            shaped.written.restarts,
-        ),
-        restart_points=restart_points(
-            program,
-            (
-                (place, restarts, tools.get(plan.aims.index(place.region)))
-                for place, restarts in zip(shaped.written.placed, shaped.written.restarts, strict=True)
-            ),
-        ),
+        at_the_control=at_the_control(shaped.emitted, written, verdict.figures, plan.model, plan.grid.block_period_s),
+        restart_points=restart_points(program, zip(written.placed, written.restarts, tools, strict=True)),
         emitted=emitted,
-        placed=tuple(shaped.written.placed),
+        placed=tuple(written.placed),
         simulated=SimulatedPrograms(program, machine, emitted, plant=machine.verdict.plant),
     )
 

@@ -14,7 +14,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget, Spending
 from shapegcode.conversion.tables import StartedTrials
-from shapegcode.conversion.whole_text import TextWriter, Written, why_kept
+from shapegcode.conversion.whole_text import Aim, TextWriter, Written, why_kept
 from shapegcode.conversion.write import keepable
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
@@ -67,6 +67,12 @@ class Aims:
         self._blocks_s: dict[int, float] = {}  # time of its blocks
         self._tried: dict[int, _Attempt] = {}
         self._priced: set[int] = set()  # planned as closely as their price allows, whatever that reaches
+
+    def wanted(self) -> dict[int, Aim]:
+        """For what each cut that is not left unchanged is shaped."""
+        return {
+            index: (self.room_um[index], self.feed_ratio[index]) for index, why in enumerate(self.reasons) if not why
+        }
 
     def index(self, figures_place: object) -> int:
         """Rank of a region of the original."""
@@ -466,7 +472,7 @@ class ConversionPlan:
         self.originals_judged: dict[int, RegionFigures] = {}
         self.spending = None if budget is None else Spending(budget, program, machine)
         if budget is None:
-            self.writer.begin(self.reasons, self.aims.room_um, self.aims.feed_ratio)
+            self.writer.begin(self.aims.wanted())
         self.original_within = False  # every cut of the original keeps its limits
         self.original_s = pool.submit(self.model.cycle_time_s, program.core)
         self.rapid_vibration = pool.submit(rapid_vibration_um, program, self.model)

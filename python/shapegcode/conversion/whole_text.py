@@ -173,9 +173,8 @@ class TextWriter:
         self._loads: dict[int, TransferLoad] = {}
         self._started: tuple[dict[int, Aim], Prefetch[EmittedRegion]] | None = None
 
-    def begin(self, reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> None:
+    def begin(self, aims: dict[int, Aim]) -> None:
         """Begin to shape a few long regions on cores that would wait else, before anything is known of their gain."""
-        aims = _aims(reasons, room_um, feed_share)
         if len(aims) < cores():
             self._started = aims, self._ahead(aims, lambda _done: None)
             self._started[1].start()
@@ -187,14 +186,9 @@ class TextWriter:
         return self._regions.options(limits, self._regions.tolerance(), offset)
 
     def write(
-        self,
-        reasons: Sequence[str],
-        room_um: Sequence[float],
-        feed_share: Sequence[float],
-        unreported: Collection[int] = (),
-        on_progress: Step = lambda _done, _total: None,
+        self, reasons: Sequence[str], aims: Mapping[int, Aim], unreported: Collection[int], on_progress: Step
     ) -> Written:
-        """The whole text."""
+        """The whole text; `reasons`: why a region is left unchanged."""
         core, regions = self._program.core, self._program.regions
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)
@@ -202,7 +196,6 @@ class TextWriter:
         written = Written([], [], 0, [], 0, [], {}, {}, {}, set(), {}, [])
         blocks, size = 0, core.size
         begin = sum(map(len, parts))
-        aims = _aims(reasons, room_um, feed_share)
         # Moves that stay as they are: all, less those of the regions that are shaped.
         shaped_moves = sum(len(regions[index].path) for index in aims)
         kept_moves = core.move_count - shaped_moves
@@ -334,10 +327,6 @@ class TextWriter:
 
 def _lines(parts: Sequence[bytes]) -> int:
     return sum(part.count(b"\n") for part in parts)
-
-
-def _aims(reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> dict[int, Aim]:
-    return {index: (room_um[index], feed_share[index]) for index, why in enumerate(reasons) if not why}
 
 
 _LARGEST_SWEEP_RAD = math.pi / 2

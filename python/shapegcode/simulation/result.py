@@ -241,14 +241,7 @@ class Simulation(Result):
         return (
             Figure("cycle time", "s", None, self.cycle_time_s, 2, key_after="cycle_time_s"),
             *vibrations,
-            Figure(
-                CONTOURS["response"],
-                "µm",
-                None,
-                self.contour_error_um.response.max,
-                2,
-                key_after="contour_error_um.response.max",
-            ),
+            Figure(CONTOURS["response"], "µm", None, contour_um, 2, key_after="contour_error_um.response.max"),
         )
 
     def tables(self) -> list[Table]:
