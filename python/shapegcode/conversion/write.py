@@ -70,10 +70,6 @@ class RegionText:
         """Whether the text is part of a program's text."""
         self._parts, self._inside = None, (program, begin)
 
-    def joined(self) -> bytes:
-        """The text in one."""
-        return b"".join(self.parts())
-
 
 @dataclass(frozen=True)
 class EmittedRegion:
@@ -268,10 +264,10 @@ class RegionWriter:
         shaper = _core.RegionShaper(region.path, self._grid.fir, marked, options)
         shaper.begin_early()
         try:
-            return self._write(program, region, shaper, options, room, on_progress, stopped)
+            return self._write(program, region, shaper, room, on_progress, stopped)
         except _WithdrawnError:
             shaper.begin_anew()
-        return self._write(program, region, shaper, options, room, on_progress, stopped)
+        return self._write(program, region, shaper, room, on_progress, stopped)
 
     def _places(self, region: _core.Region) -> RestartPlaces:
         places = RestartPlaces(region, self._machine, self._grid.block_period_s)
@@ -302,7 +298,6 @@ class RegionWriter:
         program: Program,
         region: _core.Region,
         shaper: _core.RegionShaper,
-        options: _core.ShapingOptions,
         room: Room | None,
         on_progress: Callable[[float], None],
         stopped: tuple[int, int],

@@ -272,12 +272,13 @@ class _Band:
         at = np.flatnonzero((size >= padded[:-2]) & (size >= padded[2:]))
         omegas, step = self.omegas[at], self.omegas[1] - self.omegas[0] if len(self.omegas) > 1 else 0.0
         for _ in range(2 if step else 0):
-            three = _within(omegas[:, None] + step * _BESIDE, self.low, self.high)
+            # At an end of the band from beside it: a maximum may lie between the end and the frequency next to it.
+            centres = _within(omegas, self.low + step, self.high - step)
+            three = centres[:, None] + step * _BESIDE
             left, middle, right = (np.abs(self.residual(taps, three.ravel())) ** 2).reshape(-1, 3).T
             bend = left - 2.0 * middle + right
-            inner = (three[:, 2] - three[:, 0] > 1.99 * step) & (bend < 0.0)
-            shift = np.where(inner, 0.5 * (left - right) / np.where(inner, bend, -1.0), 0.0)
-            omegas = _within(omegas + step * _within(shift, -1.0, 1.0), self.low, self.high)
+            shift = np.where(bend < 0.0, 0.5 * (left - right) / np.where(bend < 0.0, bend, -1.0), 0.0)
+            omegas = centres + step * _within(shift, -1.0, 1.0)
             step *= 0.1
         omegas = np.concatenate([self.omegas[at], omegas])
         values = self.residual(taps, omegas)
@@ -298,6 +299,7 @@ class TapProblem:
     max_abs_sum: float | None  # largest sum of the taps' magnitudes; None: no tap is negative
     pool: CutPool  # planes, shared between problems of different duration
     last_tap: float = 0.0  # the tap at `last` periods is at least that
+    largest: float = math.inf  # largest magnitude of a tap
     _bands: list[_Band] = field(init=False)
     _rows: list[list[FloatArray]] = field(init=False)
     _program: TapProgram | None = field(init=False, default=None)
@@ -377,7 +379,8 @@ class TapProblem:
                 rows.extend(turned.real)
                 new.extend(turned.real)
         if self._program is None or limit != self._limit:
-            self._program = TapProgram(self.equalities, signed=self.max_abs_sum is not None, last_tap=self.last_tap)
+            signed = self.max_abs_sum is not None
+            self._program = TapProgram(self.equalities, signed=signed, largest=self.largest, last_tap=self.last_tap)
             if self.max_abs_sum is not None:
                 self._program.limit_magnitudes(self.max_abs_sum)
             self._limit = limit

@@ -320,9 +320,11 @@ class Recommendation(Result):
     def _designs_table(self, speed_mm_per_s: float, radius_mm: float, everything: bool) -> Table:
         indices = self.shown(everything=everything)
         rows = [self.designs[index] for index in indices]
-        marks = {id(self.designs[index]): self._mark(index) for index in indices}
+        marks = {id(self.design): _MARK}
+        if (on_grid := self.recommended_on_grid) is not None:
+            marks.setdefault(id(self.designs[on_grid]), _GRID_MARK)
         columns = (
-            Column("", value=lambda each: marks[id(each)], text=True),
+            Column("", value=lambda each: marks.get(id(each), ""), text=True),
             Column("family", text=True),
             Column("grid", "ms", lambda each: "any" if each.period_s is None else f"{each.period_s * 1e3:.4g}"),
             Column("lasts", "ms", lambda each: each.duration_s * 1e3, digits=2),
@@ -357,11 +359,6 @@ class Recommendation(Result):
     def plots(self) -> Mapping[str, Plot]:
         """Pareto front, sensitivity, impulses, steps, and for two modes the branches of minimal shapers."""
         return self._drawn_beside()
-
-    def _mark(self, index: int) -> str:
-        if index == self.recommended:
-            return _MARK
-        return _GRID_MARK if index == self.recommended_on_grid else ""
 
 
 def families_table() -> Table:

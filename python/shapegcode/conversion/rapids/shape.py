@@ -135,7 +135,7 @@ class _RapidShaper:
         # In G95 a dwell may count revolutions.
         lines += ["G94", _STOP] if region.entry.feed_mode != 94 else [_STOP]
         end = self.emitted.core.line_end.encode()
-        choice.text = b"".join(line.encode("latin-1") + end for line in lines) + shaped.text.joined()
+        choice.text = b"".join([*(line.encode("latin-1") + end for line in lines), *shaped.text.parts()])
         return shaped
 
     def _judge(self, choices: Sequence[Choice]) -> None:
