@@ -26,7 +26,6 @@ from shapegcode.shaping.bands import ModeBand
 # Tolerance and presolve: now and then the solver gives up, or goes round in circles, at the first of them.
 _WAYS = ((1e-10, False), (1e-9, True), (1e-9, False), (1e-8, True), (1e-7, True), (1e-7, False))
 _MOST_PIVOTS = 20  # per unknown and condition; some 1 is usual
-_MOST_SOLVER_ROUNDS = 3  # per unknown, of the least squares
 
 
 class _Quiet(highspy.Highs):
@@ -159,44 +158,6 @@ class TapProgram:
 
     def _parts(self, matrix: FloatArray) -> list[FloatArray]:
         return [matrix, -matrix] if self._signed else [matrix]
-
-
-def non_negative_least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
-    """The x >= 0 for which ``matrix @ x`` comes nearest to a right-hand side, to rounding.
-
-    Written out here because SciPy's is behind an import that takes longer than all the designs of a conversion.
-
-    Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
-    """
-    count = matrix.shape[1]
-    # Below it one unknown more would lower the squares by rounding only.
-    slightest = 10.0 * np.finfo(float).eps * max(matrix.shape) * float(np.abs(matrix).sum(axis=0).max())
-    x = np.zeros(count)
-    used = np.zeros(count, dtype=bool)
-    for _ in range(_MOST_SOLVER_ROUNDS * count):
-        gain = matrix.T @ (right - matrix @ x)
-        gain[used] = 0.0
-        following = int(np.argmax(gain))
-        if gain[following] <= slightest:
-            return x
-        used[following] = True
-        better = _over(matrix, right, used)
-        while np.any(better[used] <= 0.0):
-            falling = np.flatnonzero(used & (better <= 0.0))
-            shares = x[falling] / (x[falling] - better[falling])
-            x = x + shares.min() * (better - x)
-            used[falling[np.argmin(shares)]] = False
-            used &= x > 0.0
-            x[~used] = 0.0
-            better = _over(matrix, right, used)
-        x = better
-    return None
-
-
-def _over(matrix: FloatArray, right: FloatArray, used: NDArray[np.bool_]) -> FloatArray:
-    x = np.zeros(matrix.shape[1])
-    x[used] = np.linalg.lstsq(matrix[:, used], right, rcond=None)[0]
-    return x
 
 
 ComplexArray = NDArray[np.complex128]
@@ -359,7 +320,7 @@ class TapProblem:
 
     def _forget(self, taps: FloatArray, worst: float) -> None:
         """Remove cutting planes that do not bound the result from the pool."""
-        self._program = None
+        self._program = None if self._bands else self._program
         for rows, omegas, directions in zip(self._rows, self.pool.omegas, self.pool.directions, strict=True):
             keep = [
                 k for k in range(len(rows)) if k < self.pool.starts or float(rows[k] @ taps) >= _BOUNDS_SHARE * worst
@@ -378,7 +339,7 @@ class TapProblem:
                 turned = np.exp(np.outer(omegas[done:], band.q) - 1j * np.array(directions[done:])[:, None])
                 rows.extend(turned.real)
                 new.extend(turned.real)
-        if self._program is None or limit != self._limit:
+        if self._program is None or (self._bands and limit != self._limit):
             signed = self.max_abs_sum is not None
             self._program = TapProgram(self.equalities, signed=signed, largest=self.largest, last_tap=self.last_tap)
             if self.max_abs_sum is not None:

@@ -222,8 +222,8 @@ class Task:
         """The taps without round-off, their zeros solved again to rounding, judged; None if that breaks them."""
         if self.mirrored:
             taps = 0.5 * (taps + taps[::-1])
-        conditions, signed = self.conditions(len(taps) - 1), self.max_abs_sum is not None
-        shaper = polished(taps, conditions, self.period_s, _NO_TAP, signed=signed)
+        largest = None if self.max_abs_sum is None else math.inf
+        shaper = polished(taps, self.conditions(len(taps) - 1), self.period_s, _NO_TAP, largest)
         if shaper is None or any(shaper.residual_ratio(mode) > RESIDUAL_LIMIT * shaper.abs_sum for mode in self.exact):
             return None
         worst = proven_worst(shaper, self.bands)

@@ -14,8 +14,7 @@ from numpy.polynomial import legendre
 from shapegcode import _core
 from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import DesignOptions, ModeBand, mode_names, ms, on_grid
-from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, halved
-from shapegcode.shaping.grid_search import Conditions, ResidualLimit, Zero, shortest_on_grid
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, Conditions, Zero, halved, shortest_on_grid
 
 Solve = Callable[[Sequence[ModeBand], DesignOptions], Sequence[_core.Shaper]]
 """All shapers of a family for some bands, the preferred one first."""
@@ -57,12 +56,8 @@ def _defined(
     def of_one(mode: _core.Mode, options: DesignOptions) -> _core.Shaper:
         if options.period_s is None:
             return continuous(mode, options)
-        return shortest_on_grid(
-            conditions(mode, options),
-            options.period_s,
-            options.max_duration_s,
-            title=f"{name} for {mode_names([mode])}",
-        )
+        title, longest_s = f"{name} for {mode_names([mode])}", options.max_duration_s
+        return shortest_on_grid(conditions(mode, options), options.period_s, longest_s, title=title)
 
     return _one_after_the_other(of_one)
 
@@ -81,10 +76,10 @@ def hump_ei(name: str, humps: int) -> Solve:
 
     def conditions(mode: _core.Mode, options: DesignOptions) -> Conditions:
         zeros_hz = _core.extra_insensitive(mode, options.vibration_limit, humps).zeros_hz
-        return Conditions(
-            zeros=tuple(Zero(_core.Mode(frequency_hz, mode.damping_ratio)) for frequency_hz in zeros_hz),
-            limits=(ResidualLimit(mode, zeros_hz[0], zeros_hz[-1], options.vibration_limit),),
-        )
+        zeros = tuple(Zero(_core.Mode(frequency_hz, mode.damping_ratio)) for frequency_hz in zeros_hz)
+        low_hz, high_hz = zeros_hz[0], zeros_hz[-1]
+        middle = _core.Mode(0.5 * (low_hz + high_hz), mode.damping_ratio)
+        return Conditions(zeros, (ModeBand(middle, (high_hz - low_hz) / (high_hz + low_hz)),), options.vibration_limit)
 
     return _defined(
         name, lambda mode, options: _core.extra_insensitive(mode, options.vibration_limit, humps).shaper, conditions
@@ -108,18 +103,14 @@ negative = _defined(
 
 def specified(bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:
     """SI: the shortest non-negative impulses that leave at most the vibration limit over every band."""
-    conditions = Conditions(limits=tuple(_limit(band, options.vibration_limit) for band in bands))
-    period_s = options.period_s
-    if period_s is None:
-        period_s = 1.0 / (_STEPS_PER_PERIOD * max(each.highest_hz for each in conditions.limits))
-    title = f"SI shaper with {options.vibration_limit:.4g} left for {mode_names([band.mode for band in bands])}"
-    return [shortest_on_grid(conditions, period_s, options.max_duration_s, title=title)]
-
-
-def _limit(band: ModeBand, limit: float) -> ResidualLimit:
+    limit, period_s = options.vibration_limit, options.period_s
     if not 0.0 < limit < 1.0:
         raise _core.ArgumentError(f"the vibration limit is {limit:.4g}: it must be above 0 and below 1")
-    return ResidualLimit(band.mode, band.shifted(-1.0).frequency_hz, band.shifted(1.0).frequency_hz, limit)
+    if period_s is None:
+        period_s = 1.0 / (_STEPS_PER_PERIOD * max(band.shifted(1.0).frequency_hz for band in bands))
+    title = f"SI shaper with {limit:.4g} left for {mode_names([band.mode for band in bands])}"
+    conditions = Conditions(bands=tuple(bands), limit=limit)
+    return [shortest_on_grid(conditions, period_s, options.max_duration_s, title=title)]
 
 
 def simultaneous(bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:
