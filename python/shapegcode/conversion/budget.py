@@ -121,8 +121,7 @@ class Spending:
 
     def __init__(self, budget: Budget, program: Program, machine: Machine) -> None:
         self.budget = budget
-        self.left_unchanged: dict[int, GivenUp] = {}
-        """Regions that are left unchanged, per index."""
+        self.left_unchanged: dict[int, GivenUp] = {}  # regions that are left unchanged, per index
         self._program = program
         self._tick_s = machine.controller.interpolation_period_s
         self._most_ticks = math.floor(machine.shaping.max_duration_s / self._tick_s + _ROUNDING)

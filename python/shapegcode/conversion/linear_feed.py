@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.conversion.restart import decimal
 
 Vector = npt.NDArray[np.float64]
 
@@ -159,7 +160,7 @@ def linear_lines(
         label = _LABEL.match(lines[numbers[block.first]])
         out = written[numbers[block.first]]
         if block.sets_feed:
-            out.append(f"{'FNORM ' if is_linear else ''}F{_number(block.start_feed, 2)}")
+            out.append(f"{'FNORM ' if is_linear else ''}F{decimal(block.start_feed, 2)}")
             is_linear = False
         change = "" if block.is_linear == is_linear else "FLIN " if block.is_linear else "FNORM "
         is_linear = block.is_linear
@@ -167,9 +168,9 @@ def linear_lines(
         words = "" if motion == code else f"{motion} "
         code = motion
         moved = np.abs(np.round(block.end_mm, decimals) - np.round(start, decimals)) > 0.5 * 10.0**-decimals
-        words += "".join(f"{'XYZ'[k]}{_number(float(block.end_mm[k]), decimals)}" for k in range(3) if moved[k])
-        words += f"CR={_number(block.radius_mm, 3)}" if block.sweep_rad else ""
-        out.append(f"{change}{words}F{_number(block.feed, 2 if block.is_linear else 4)}")
+        words += "".join(f"{'XYZ'[k]}{decimal(float(block.end_mm[k]), decimals)}" for k in range(3) if moved[k])
+        words += f"CR={decimal(block.radius_mm, 3)}" if block.sweep_rad else ""
+        out.append(f"{change}{words}F{decimal(block.feed, 2 if block.is_linear else 4)}")
         if label is not None:
             out[0] = f"{label[0]} {out[0]}"
         start = block.end_mm
@@ -188,11 +189,6 @@ def joints_of(lines: Mapping[int, str], numbers: Sequence[int]) -> list[int] | N
 
 _LABEL = re.compile(r"N\d+")
 _MERE_MOVE = re.compile(r"(?:N\d+)?(?:G0?[123])?(?:[XYZIJKRF]-?(?:\d+\.\d*|\.\d+))+")
-
-
-def _number(value: float, decimals: int) -> str:
-    text = f"{value:.{decimals}f}".rstrip("0")
-    return "0." if text in ("0.", "-0.") else text
 
 
 @dataclass(frozen=True)

@@ -103,14 +103,13 @@ def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> 
         original_um = max((getattr(run, plan.judge.target).max_abs_mm for run in originals), default=0.0) * 1e3
         curve = plan.aims.tolerance_curve(verdict.cycle_time_s.original, original_um)
     mark.result()
-    emitted = shaped.emitted.with_verdict(
-        good=verdict.grade != "do not run", better=verdict.grade == "better, tolerance not met"
-    )
+    grade = verdict.grade
+    emitted = shaped.emitted.with_verdict(good=grade != "do not run", better=grade == "better, tolerance not met")
     return Conversion(
         **vars(verdict.figures),
         program=program.source,
         machine=machine.name,
-        recommendation=verdict.grade,
+        recommendation=grade,
         reason=verdict.reason,
         cuts=verdict.cuts,
         tolerance_curve=curve,

@@ -56,13 +56,10 @@ class Aims:
         self._places = {id(region): index for index, region in enumerate(program.regions)}
         self.reasons = reasons  # why a cut is left unchanged; empty: it is shaped; changed here
         self._asked_um = machine.tolerance.contour_um
-        self.room_um = [machine.tolerance.contour_um * _MARGIN] * count
-        """Deviation that its feed is planned for."""
-        self.feed_ratio = [1.0] * count
-        """Of the programmed feed, that it is planned with."""
+        self.room_um = [machine.tolerance.contour_um * _MARGIN] * count  # deviation that its feed is planned for
+        self.feed_ratio = [1.0] * count  # of the programmed feed, that it is planned with
         self.original_s: dict[int, float] = {}
-        self.emitted_s: dict[int, float] = {}
-        """Of every cut that was shaped once, until the set-points rest."""
+        self.emitted_s: dict[int, float] = {}  # of every cut that was shaped once, until the set-points rest
         self._asked_s: dict[int, float] = {}  # likewise, for the tolerance that was asked for
         self._blocks_s: dict[int, float] = {}  # time of its blocks
         self._tried: dict[int, _Attempt] = {}

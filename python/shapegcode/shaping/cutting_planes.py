@@ -161,10 +161,8 @@ class TapProgram:
 
 
 ComplexArray = NDArray[np.complex128]
-SAME_RESIDUAL = 1e-3
-"""Relative gap between the lower bound and the design at which the design counts as optimal."""
-NO_RESIDUAL = 1e-6
-"""Residual ratio that counts as none: no gap is pursued below it."""
+SAME_RESIDUAL = 1e-3  # relative gap between the lower bound and the design at which the design counts as optimal
+NO_RESIDUAL = 1e-6  # residual ratio that counts as none: no gap is pursued below it
 _STEP_RAD = 0.1  # of the sweep, seen from the middle of the shaper; the peaks are refined
 _FEWEST_STEPS = 8
 _MOST_ROUNDS = 60

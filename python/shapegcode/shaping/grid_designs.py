@@ -31,8 +31,7 @@ from shapegcode.shaping.bands import (
 )
 from shapegcode.shaping.cutting_planes import NO_RESIDUAL, SAME_RESIDUAL, CutPool, TapProblem
 
-RESIDUAL_LIMIT = 1e-10
-"""Largest residual ratio of a design that is handed out; the usual one is 1e-16 to 1e-15."""
+RESIDUAL_LIMIT = 1e-10  # largest residual ratio of a design that is handed out; the usual one is 1e-16 to 1e-15
 
 _SAME_CONDITION = 1e-13  # relative singular value below which two modes ask for the same thing on this grid
 _SUPPORT_THRESHOLDS = (1e-9, 1e-7, 1e-13)  # magnitudes above one of these are taps

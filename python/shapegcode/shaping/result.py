@@ -15,8 +15,7 @@ from shapegcode.results.table import Column, Table
 from shapegcode.shaping.bands import SAME, Design, ModeBand, ms, spoken
 from shapegcode.shaping.registry import FAMILIES
 
-NO_RESIDUAL = 1e-9
-"""A residual ratio below this is none: what is left is the rounding of the solver."""
+NO_RESIDUAL = 1e-9  # a residual ratio below this is none: what is left is the rounding of the solver
 
 _CONVERTED = {"non-negative", "robust"}  # what a conversion takes by itself
 _FOR_GRIDS = {row.name for row in FAMILIES if not row.continuous}

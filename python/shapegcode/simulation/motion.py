@@ -138,8 +138,7 @@ _COPY_BYTES = 1 << 20
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same motion gives the same bytes
 
 
-WriteMotion = Callable[[Chunk], None]
-"""Appends the rows of a chunk to a file."""
+WriteMotion = Callable[[Chunk], None]  # appends the rows of a chunk to a file
 
 
 def _csv(stream: BinaryIO) -> WriteMotion:

@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import compress, count
 from typing import TypeVar
 
 import numpy as np
@@ -366,9 +366,6 @@ def _haste(figures: RegionFigures, place: Placed, block_period_s: float) -> list
     ]
 
 
-T = TypeVar("T")
-
-
 def judge_program(
     emitted: Program,
     original: Program,
@@ -387,14 +384,12 @@ def judge_program(
             pool.submit(model.simulate_original, place.region.path, offset=model.offset(place.region))
             for place in placed
         ]
-
-        def of(wanted: bool, rows: Sequence[T]) -> list[T]:
-            return [row for row, each in zip(rows, is_shaped, strict=True) if each == wanted]
-
-        simulated = iter(judge.measure(emitted, of(True, placed), of(True, originals), pool))
+        shaped_cuts = [*compress(placed, is_shaped)], [*compress(originals, is_shaped)]
+        simulated = iter(judge.measure(emitted, *shaped_cuts, pool))
         unchanged = [
             pool.submit(simulate_unchanged, judge, model, mine, region, original.result())
-            for (mine, region), original in zip(of(False, pairs), of(False, originals), strict=True)
+            for (mine, region), original, each in zip(pairs, originals, is_shaped, strict=True)
+            if not each
         ]
         left = iter(run.result() for run in unchanged)
         figures = [next(simulated if each else left) for each in is_shaped]

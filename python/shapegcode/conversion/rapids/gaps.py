@@ -371,8 +371,7 @@ class RapidPlant:
         self.model = model.ordinary.model
         self.band_mm = machine.tolerance.residual_floor_um * 1e-3
         self._moving = any(mode.frequency_over is not None for axis in machine.axes.as_tuple() for mode in axis.modes)
-        self.longest_memory_s = model.vibration_memory_s or math.inf
-        """What moved longer ago no longer counts, s."""
+        self.longest_memory_s = model.vibration_memory_s or math.inf  # what moved longer ago no longer counts, s
         self._known: dict[tuple[float, ...], Timing] = {}
 
     def rapid(self, rapid: Rapid) -> Timing:
