@@ -187,19 +187,16 @@ def _case(rank: int, case: CaseVerdict, axes: list[str], conversion: Conversion)
 
 def _times(conversion: Conversion) -> model.Section:
     whole, cutting = conversion.cycle_time_s, conversion.cutting_time_s
-    rows = [
-        ("whole program", (whole.original, whole.emitted)),
-        ("cuts together", (cutting.original, cutting.emitted)),
-        ("everything else", (whole.original - cutting.original, whole.emitted - cutting.emitted)),
-    ]
-    keys = [("cycle_time_s.original", "cycle_time_s.emitted"), ("cutting_time_s.original", "cutting_time_s.emitted")]
-    keys.append(("", ""))
+    rest = Pair(whole.original - cutting.original, whole.emitted - cutting.emitted)
+    times = [("whole program", whole, "cycle_time_s"), ("cuts together", cutting, "cutting_time_s")]
+    times.append(("everything else", rest, ""))
     longest = sorted(enumerate(conversion.regions), key=lambda ranked: -ranked[1].time_s.emitted)[:_LONGEST_REGIONS]
     for rank, region in longest if len(conversion.regions) > 1 else []:
-        rows.append(("cut in lines {} to {}".format(*region.lines), (region.time_s.original, region.time_s.emitted)))
-        keys.append((f"regions.{rank}.time_s.original", f"regions.{rank}.time_s.emitted"))
+        times.append(("cut in lines {} to {}".format(*region.lines), region.time_s, f"regions.{rank}.time_s"))
+    rows = tuple((name, (pair.original, pair.emitted)) for name, pair, _ in times)
+    keys = tuple((f"{key}.original", f"{key}.emitted") if key else ("", "") for _, _, key in times)
     how = "Two bars each, original above emitted: where they differ, shaping costs or gains time."
-    bars = model.Bars("s", tuple(rows), ("original", "emitted"), digits=2, keys=tuple(keys))
+    bars = model.Bars("s", rows, ("original", "emitted"), digits=2, keys=keys)
     return model.Section("time", "Where the time goes", (bars,), how=how)
 
 

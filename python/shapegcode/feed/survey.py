@@ -218,10 +218,10 @@ class Walk:
                 self._tools[number] = tool
         # Where the program changes tools, T alone only gets the next one ready.
         self._changes = any(_TOOL_CHANGE in m_codes for m_codes, _, _ in self._functions)
-        used = {tool for _, tool, _ in self._functions if tool > 0}
-        if self._any is not None and len(used) > 1:
+        self._used = [f"T{number}" for number in sorted({tool for _, tool, _ in self._functions if tool > 0})]
+        if self._any is not None and len(self._used) > 1:
             self.warnings.append(
-                f"{program.source}: uses the tools {', '.join(f'T{n}' for n in sorted(used))}: all are taken as "
+                f"{program.source}: uses the tools {', '.join(self._used)}: all are taken as "
                 f"{self._any.tool.name}; give tool.number to tell them apart"
             )
 
@@ -269,8 +269,7 @@ class Walk:
         """Which tools are missing where no region has one; empty if that is not the reason."""
         if not cutters or any(cutter is not None for cutter in cutters):
             return ""
-        used = sorted({tool for _, tool, _ in self._functions if tool > 0})
-        used_tools = f"the program uses {', '.join(f'T{n}' for n in used)}" if used else "the program names no tool"
+        used_tools = f"the program uses {', '.join(self._used)}" if self._used else "the program names no tool"
         return f": {used_tools}, the tool files describe {', '.join(f'T{n}' for n in sorted(self._tools))}"
 
     def cuts_elsewhere(self) -> list[_core.Path]:
@@ -310,8 +309,8 @@ class Walk:
         places = list(dict.fromkeys(self._collisions))
         why = "rapid into material: is Z 0 of the stock file that of the program?"
         messages = [f"{place}: {why}" for place in places[:_SHOWN_COLLISIONS]]
-        if len(places) > _SHOWN_COLLISIONS:
-            messages.append(f"{self._program.source}: {len(places) - _SHOWN_COLLISIONS} more rapids into material")
+        if (more := len(places) - _SHOWN_COLLISIONS) > 0:
+            messages.append(f"{self._program.source}: {more} more rapids into material")
         self.warnings[:0] = messages
 
     def _look_at_depth(self, region: _core.Region, tool: Tool, track: _core.EngagementTrack) -> None:
