@@ -1,4 +1,4 @@
-"""Linear programs that go on from one another, and non-negative least squares, against SciPy's from the beginning."""
+"""Linear programs that go on from one another, against SciPy's from the beginning."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.optimize import linprog, nnls
+from scipy.optimize import linprog
 
-from shapegcode.shaping.cutting_planes import LinearProgram, non_negative_least_squares
+from shapegcode.shaping.cutting_planes import LinearProgram
 
 FloatArray = NDArray[np.float64]
 
@@ -58,17 +58,6 @@ def test_a_bound_that_moves() -> None:
     program.bound(1, 0.5, 0.5)
     program.bound(0, 0.0, 0.25)
     assert program.solve() is None
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_least_squares_without_negative_unknowns(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    rows, columns = int(rng.integers(1, 12)), int(rng.integers(1, 60))
-    matrix, right = rng.standard_normal((rows, columns)), rng.standard_normal(rows)
-    found = non_negative_least_squares(matrix, right)
-    assert found is not None
-    assert found.min() >= 0.0
-    assert float(np.linalg.norm(matrix @ found - right)) == pytest.approx(nnls(matrix, right)[1], abs=1e-12)
 
 
 def test_the_solver_prints_nothing(tmp_path: Path) -> None:

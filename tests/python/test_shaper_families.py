@@ -33,7 +33,7 @@ from shapegcode.shaping import (
     shortest_non_negative,
 )
 from shapegcode.shaping.bands import parse_taps
-from shapegcode.shaping.grid_search import Conditions, ResidualLimit, Zero, shortest_on_grid
+from shapegcode.shaping.grid_designs import Conditions, Zero, shortest_on_grid
 from shapegcode.shaping.registry import distinct
 from shapegcode.shaping.solvers import simultaneous_zv
 from shaper_residual import is_feasible, left_of, simulated
@@ -284,7 +284,7 @@ def test_a_grid_that_sees_no_vibration_is_refused_with_what_is_nearest() -> None
     with pytest.raises(DesignError, match=r"within 10 ms; one ZV after the other lasts 14\.689\d ms"):
         simultaneous_zv([SLOW.mode, FAST.mode], 0.01)
     with pytest.raises(DesignError, match="the polynomial with its zeros lasts 4 ms with sum"):
-        conditions = Conditions(zeros=(Zero(SLOW.mode),), limits=(ResidualLimit(SLOW.mode, 1.0, 46.0, 0.05),))
+        conditions = Conditions((Zero(SLOW.mode),), (ModeBand(Mode(23.5, SLOW.mode.damping_ratio), 45.0 / 47.0),), 0.05)
         shortest_on_grid(conditions, 0.002, 0.02, title="design that nothing meets")
 
 
@@ -296,8 +296,8 @@ def test_close_zeros_cost_no_precision() -> None:
 
 
 def test_a_limit_is_proven_over_its_band() -> None:
-    limit = ResidualLimit(SLOW.mode, 35.0, 60.0, 0.1)
-    shaper = shortest_on_grid(Conditions(limits=(limit,)), 0.002, 0.25, title="limit")
+    band = ModeBand(Mode(47.5, SLOW.mode.damping_ratio), 12.5 / 47.5)
+    shaper = shortest_on_grid(Conditions(bands=(band,), limit=0.1), 0.002, 0.25, title="limit")
     assert worst_residual(shaper, SLOW.mode, 35.0, 60.0).upper_bound <= 0.1
 
 

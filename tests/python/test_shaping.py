@@ -232,14 +232,6 @@ def test_shortest_non_negative_is_the_polynomial_at_5_ms() -> None:
     np.testing.assert_allclose(shaper.amplitudes, grid_polynomial(PAPER_MODES, 0.005).amplitudes, rtol=1e-12)
 
 
-def test_without_the_active_set_solver_the_linear_program_decides(monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = shortest_non_negative(PAPER_MODES, 0.004)
-    monkeypatch.setattr("shapegcode.shaping.grid_designs.non_negative_least_squares", lambda *_: None)
-    shaper = shortest_non_negative(PAPER_MODES, 0.004)
-    np.testing.assert_allclose(shaper.times_s, expected.times_s)
-    np.testing.assert_allclose(shaper.amplitudes, expected.amplitudes, rtol=1e-12)
-
-
 def test_least_contour_cost_among_the_shortest() -> None:
     """The second central moment is at most that of every vertex that some linear objective selects."""
     modes, period_s = (Mode(20.0, 0.01),), 0.001

@@ -18,8 +18,8 @@ from command import run
 from judge import Mode, contour_error_um, interpret, play, residual_um, response
 from judge.in_order import Way, deviation_um, missed_um
 from shapegcode import _core
+from shapegcode.conversion.outcome import recommend
 from shapegcode.conversion.plan import knee_of
-from shapegcode.conversion.recommendation import recommend
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results.outcome import Pair, Xyz

@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Protocol
-
-import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.write import EmittedRegion
+from shapegcode.conversion.whole_text import Written
+from shapegcode.conversion.write import TransferLoad, keepable
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.results.json import OldNames
@@ -40,7 +38,6 @@ class Budget:
     max_blocks_per_second: float | None = None
 
     def __post_init__(self) -> None:
-        """Check the limits."""
         for name, value in asdict(self).items():
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise _core.ArgumentError(f"budget {name} is {value}, must be finite and above 0")
@@ -76,20 +73,9 @@ class Budget:
         return ""
 
     def _rates(self, load: TransferLoad) -> list[tuple[str, float, float]]:
-        pairs = (
-            ("baud", load.baud, self.baud),
-            ("blocks per second", load.blocks_per_second, self.max_blocks_per_second),
-        )
-        return [(unit, value, limit) for unit, value, limit in pairs if limit is not None]
-
-
-@dataclass(frozen=True)
-class TransferLoad:
-    """Memory, data rate and block rate that a shaped region needs."""
-
-    extra_bytes: int  # size of its text less that of the original's
-    baud: float  # what its section with the most blocks per second needs of the line, bit/s
-    blocks_per_second: float  # blocks in its busiest stretch
+        rates = [("baud", load.baud, self.baud)]
+        rates.append(("blocks per second", load.blocks_per_second, self.max_blocks_per_second))
+        return [(unit, value, limit) for unit, value, limit in rates if limit is not None]
 
 
 @dataclass(frozen=True)
@@ -125,40 +111,9 @@ class BudgetOutcome(OldNames):
     left_unchanged: tuple[GivenUp, ...]  # regions that are left unchanged
 
 
-def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
-    """The data rate of a shaped cut over windows of the shaper's duration, the shortest in which it can change."""
-    durations = np.concatenate(shaped.block_periods, dtype=np.float64)
-    durations *= grid.block_period_s
-    window_s = max(grid.duration_s, grid.block_period_s)
-    sizes = np.concatenate(shaped.block_bytes, dtype=np.float64)
-    characters = _core.busiest_per_s(durations, sizes, window_s)
-    return TransferLoad(
-        shaped.text.size - (region.text_end - region.text_begin),
-        characters * bits_per_character,
-        _core.busiest_per_s(durations, None, window_s),
-    )
-
-
 # A stretch of a longer period may hold fewer blocks than one of a shorter period, but hardly less than this share.
 _LEAST_FILLED = 0.5
 _LINES_NAMED = 5  # lines of regions in the one sentence
-
-
-def keepable(region: _core.Region, machine: Machine) -> bool:
-    """Whether a region may be left unchanged in an emitted program: not with absolute arc centres."""
-    return machine.input.arc_centre != "absolute" or region.path.largest_sweep_rad <= 0.0
-
-
-class WrittenText(Protocol):
-    """A text and the loads of its shaped regions, per index."""
-
-    @property
-    def size(self) -> int:
-        """Bytes of the whole text."""
-
-    @property
-    def loads(self) -> Mapping[int, TransferLoad]:
-        """In the order of the regions."""
 
 
 class Spending:
@@ -166,8 +121,7 @@ class Spending:
 
     def __init__(self, budget: Budget, program: Program, machine: Machine) -> None:
         self.budget = budget
-        self.left_unchanged: dict[int, GivenUp] = {}
-        """Regions that are left unchanged, per index."""
+        self.left_unchanged: dict[int, GivenUp] = {}  # regions that are left unchanged, per index
         self._program = program
         self._tick_s = machine.controller.interpolation_period_s
         self._most_ticks = math.floor(machine.shaping.max_duration_s / self._tick_s + _ROUNDING)
@@ -182,7 +136,7 @@ class Spending:
         grid: Grid,
         residuals_mm: Sequence[float],
         design: Callable[[float], Grid],
-        write: Callable[[Grid], WrittenText],
+        write: Callable[[Grid], Written],
     ) -> Grid:
         """The block period on which the most that is worth shaping is not too fast; of equals the shortest shaper."""
         weights = [residual * 1e3 / unit for unit, residual in zip(self._unit_um, residuals_mm, strict=True)]
@@ -213,7 +167,7 @@ class Spending:
             self._before = _needs(grid, written)
         return best
 
-    def give_up(self, grid: Grid, written: WrittenText, verdicts: Sequence[RegionVerdict]) -> bool:
+    def give_up(self, grid: Grid, written: Written, verdicts: Sequence[RegionVerdict]) -> bool:
         """Choose regions that must be left unchanged; False if the text fits."""
         self._before = self._before or _needs(grid, written)
         loads = written.loads
@@ -239,7 +193,7 @@ class Spending:
             )
         return bool(chosen)
 
-    def outcome(self, grid: Grid, written: WrittenText) -> BudgetOutcome:
+    def outcome(self, grid: Grid, written: Written) -> BudgetOutcome:
         """What the budget did, once the text fits."""
         after = _needs(grid, written)
         left_unchanged = tuple(self.left_unchanged[index] for index in sorted(self.left_unchanged))
@@ -263,7 +217,6 @@ class Spending:
         return f"{self._program.source}: given up for the budget: {'; '.join(parts)}" if parts else ""
 
     def _factors(self, loads: Mapping[int, TransferLoad]) -> list[float]:
-        """By what factor each region exceeds its limit; regions within it are left out."""
         factors = (self.budget.excess(load) for load in loads.values())
         return [factor for factor in factors if factor > 1.0 + _ROUNDING]
 
@@ -275,13 +228,19 @@ class Spending:
     def _too_large(
         self, size: int, loads: Mapping[int, TransferLoad], simulated: Mapping[int, RegionVerdict]
     ) -> dict[int, str]:
-        """Regions to keep so that the text fits: least gain per byte first."""
         limit = self.budget.max_bytes
-        if limit is None or not loads or size <= limit:
-            if limit is not None and not loads and self._program.core.size > limit:
-                raise self._too_large_error(self._program.core.size)
+        if limit is None:
             return {}
-        gain = {index: self._gain(index, simulated[index]) for index in loads}
+        original = self._program.core.size
+        if not loads and original > limit:
+            raise self._too_large_error(original)
+        if not loads or size <= limit:
+            return {}
+        # Residual vibration that shaping a region removes, of its worst axis, in units of the tolerance.
+        gain = {
+            index: (max(both.original) - max(both.emitted)) / self._unit_um[index]
+            for index, both in ((index, simulated[index].residual_vibration_um) for index in loads)
+        }
         costly = [index for index, load in loads.items() if load.extra_bytes > 0 and self._keepable[index]]
         # Where the gain is negative, more of it per byte would be less: such regions go first, the worst before all.
         order = sorted(costly, key=lambda k: (gain[k] / (loads[k].extra_bytes if gain[k] > 0.0 else 1.0), k))
@@ -293,30 +252,17 @@ class Spending:
             size -= loads[index].extra_bytes
         if size > limit or len(kept) == len(loads):
             # Without a shaped region there is no header comment either.
-            return self._nothing_shaped(size, loads)
-        # What was given up for the sake of a large one may fit beside the rest.
-        for index in reversed(kept.copy()):
-            if gain[index] > 0.0 and size + loads[index].extra_bytes <= limit:
-                kept.remove(index)
-                size += loads[index].extra_bytes
-        return dict.fromkeys(kept, self._memory_reason())
-
-    def _gain(self, index: int, region: RegionVerdict) -> float:
-        """Residual vibration that shaping a region removes, of its worst axis, in units of the tolerance."""
-        both = region.residual_vibration_um
-        return (max(both.original) - max(both.emitted)) / self._unit_um[index]
-
-    def _nothing_shaped(self, size: int, loads: Mapping[int, TransferLoad]) -> dict[int, str]:
-        limit = self.budget.max_bytes
-        possible = all(self._keepable[index] for index in loads)
-        if limit is None or not possible or self._program.core.size > limit:
-            if possible:
-                raise self._too_large_error(min(size, self._program.core.size))
-            raise self._too_large_error(size, "; arcs with absolute centres cannot be left unchanged")
-        return dict.fromkeys(loads, self._memory_reason())
-
-    def _memory_reason(self) -> str:
-        return f"gains least per byte, limit {self.budget.max_bytes} bytes"
+            if not all(self._keepable[index] for index in loads):
+                raise self._too_large_error(size, "; arcs with absolute centres cannot be left unchanged")
+            if original > limit:
+                raise self._too_large_error(min(size, original))
+            kept = list(loads)
+        else:  # what was given up for the sake of a large one may fit beside the rest
+            for index in reversed(kept.copy()):
+                if gain[index] > 0.0 and size + loads[index].extra_bytes <= limit:
+                    kept.remove(index)
+                    size += loads[index].extra_bytes
+        return dict.fromkeys(kept, f"gains least per byte, limit {limit} bytes")
 
     def _too_large_error(self, least: int, why: str = "") -> _core.ArgumentError:
         return _core.ArgumentError(
@@ -325,7 +271,7 @@ class Spending:
         )
 
 
-def _needs(grid: Grid, written: WrittenText) -> TextNeeds:
+def _needs(grid: Grid, written: Written) -> TextNeeds:
     loads = written.loads.values()
     return TextNeeds(
         written.size,

@@ -8,13 +8,11 @@ from dataclasses import replace
 from functools import partial
 from itertools import compress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.outcome import judge, result_of
 from shapegcode.conversion.plan import ConversionPlan, CutChoice, Progress, Shaped
-from shapegcode.conversion.recommendation import gain_um
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.tables import StartedTrials, chosen_cuts, start_trials
 from shapegcode.conversion.whole_text import Written
@@ -24,9 +22,6 @@ from shapegcode.program.compensation import program_for_conversion
 from shapegcode.program.computer import cores
 from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN
 from shapegcode.shaping.grid import Grid
-
-if TYPE_CHECKING:
-    from shapegcode.conversion.rapids.shape import ShapedRapids
 
 _ATTEMPTS = 10  # each for cuts that left their tolerance, ran too fast or cost too much; few need more than two
 _PRICE_ROUNDS = 6
@@ -181,15 +176,15 @@ def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
     left_unchanged = {} if plan.spending is None else plan.spending.left_unchanged
     unreported = {*left_unchanged, *plan.left, *plan.aims.emitted_s}
     on_progress = partial(plan.on_progress, stage) if stage else lambda _done, _total: None
-    written = plan.writer.write(plan.reasons, plan.aims.room_um, plan.aims.feed_ratio, unreported, on_progress)
+    written = plan.writer.write(plan.reasons, plan.aims.wanted(), unreported, on_progress)
     for index, reason in written.no_room.items():
         plan.reasons[index] = reason
     plan.curves.note(written)
     return written
 
 
+# The text read, and trackers of the cuts that were not in the text before, by the rank of the cut.
 ReadBack = tuple[Program, dict[int, _core.ContourTracker]]
-"""The text read, and trackers of the cuts that were not in the text before, by the rank of the cut."""
 
 
 def read_back(plan: ConversionPlan, written: Written) -> ReadBack:
@@ -250,7 +245,7 @@ def _without_what_gains_nothing(plan: ConversionPlan, shaped: Shaped) -> Shaped:
     least = plan.machine.shaping.least_gain_um
     chosen = plan.chosen
     for index, figures, verdict in zip(chosen, shaped.figures, plan.verdicts(shaped), strict=True):
-        gained = plan.gains_um[index] = gain_um(figures)
+        gained = plan.gains_um[index] = figures.gain_um
         stays = not plan.is_keepable(index) or plan.choice.shape_all
         if not stays and (gained < least or verdict.worse):
             plan.leave(index, verdict.worse[0] if verdict.worse else f"shaping gains {gained:.1f} µm", gained)
@@ -270,9 +265,9 @@ def _rewritten(plan: ConversionPlan, shaped: Shaped, before: Sequence[int]) -> S
 def _as_it_was(plan: ConversionPlan, shaped: Shaped) -> Shaped:
     """Where nothing was shaped the file as it was given, if it was one program: not what it was expanded into."""
     rapids_shaped = shaped.rapids is not None and shaped.rapids.outcome.shaped > 0
-    if shaped.written.placed or rapids_shaped or plan.program.number is not None:
-        return shaped
-    if plan.program.foreign is not None:  # it was given in another control's words than those that are written
+    # A foreign one was given in another control's words than those that are written.
+    is_other = plan.program.number is not None or plan.program.foreign is not None
+    if shaped.written.placed or rapids_shaped or is_other:
         return shaped
     return replace(shaped, written=replace(shaped.written, size=plan.program.size), emitted=plan.program)
 
@@ -282,25 +277,20 @@ def shape_rapids(plan: ConversionPlan, shaped: Shaped) -> Shaped:
     from shapegcode.conversion.rapids import shape
 
     found = shape.shape_rapids(shaped.emitted, shaped.written.placed, plan.model, plan.grid, plan.pool, plan.budget)
-    found = _within_price(plan, shaped, found)
-    written = replace(shaped.written, size=found.emitted.size, placed=found.placed)
-    return replace(shaped, written=written, emitted=found.emitted, rapids=found)
-
-
-def _within_price(plan: ConversionPlan, shaped: Shaped, rapids: ShapedRapids) -> ShapedRapids:
-    """The shaped rapids; none if the program would then take more time than its price allows."""
-    price_s = plan.price_s()
+    price_s, outcome, count = plan.price_s(), found.outcome, found.outcome.shaped
     if plan.machine.emission.header:
-        added_s = plan.model.cycle_time_s(rapids.emitted.core) - plan.original_s.result()
+        added_s = plan.model.cycle_time_s(found.emitted.core) - plan.original_s.result()
     else:
-        added_s = plan.excess_s(shaped) + price_s + rapids.extra_s
-    if not rapids.outcome.shaped or added_s <= price_s:
-        return rapids
-    outcome, count = rapids.outcome, rapids.outcome.shaped
+        added_s = plan.excess_s(shaped) + price_s + found.extra_s
+    if not count or added_s <= price_s:
+        written = replace(shaped.written, size=found.emitted.size, placed=found.placed)
+        return replace(shaped, written=written, emitted=found.emitted, rapids=found)
     left = {**outcome.left_unchanged, "the price of the program": count}
     outcome = replace(outcome, shaped=0, left_unchanged=left, time_saved_s=0.0, blocks=0, slowed_blocks=0, moves=())
     why = f"{count} rapids stay rapids: with them as cutting moves the program would take {added_s:.2f} s more"
-    return replace(
-        rapids, emitted=shaped.emitted, placed=shaped.written.placed, outcome=outcome, extra_s=0.0,
-        warnings=[f"{why}, price {price_s:.2f} s (price.program_time_percent)"],
-    )  # fmt: skip
+    warning = f"{why}, price {price_s:.2f} s (price.program_time_percent)"
+    written = replace(shaped.written, size=shaped.emitted.size)
+    found = replace(
+        found, emitted=shaped.emitted, placed=written.placed, outcome=outcome, extra_s=0.0, warnings=[warning]
+    )
+    return replace(shaped, written=written, rapids=found)

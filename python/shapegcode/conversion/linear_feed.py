@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.conversion.restart import decimal
 
 Vector = npt.NDArray[np.float64]
 
@@ -108,7 +109,7 @@ def linear_blocks(
     """
     fit = _JoinedBlocks(path, period_s, tolerance_mm, frozenset(joints))
     blocks = list(fit.blocks())
-    return _at_rest(blocks, fit.points, fit.ends(blocks), period_s, tolerance_mm, modes) if modes else blocks
+    return _at_rest(blocks, fit, modes) if modes else blocks
 
 
 def positions_mm(start_mm: Vector, blocks: Sequence[LinearBlock], times_s: Vector) -> Vector:
@@ -127,7 +128,6 @@ def positions_mm(start_mm: Vector, blocks: Sequence[LinearBlock], times_s: Vecto
 
 
 def _on(start: Vector, block: LinearBlock, shares: Vector) -> Vector:
-    """Points of a block at shares of its length."""
     points = start + np.outer(shares, block.end_mm - start)
     if block.sweep_rad == 0.0:
         return points
@@ -160,7 +160,7 @@ def linear_lines(
         label = _LABEL.match(lines[numbers[block.first]])
         out = written[numbers[block.first]]
         if block.sets_feed:
-            out.append(f"{'FNORM ' if is_linear else ''}F{_number(block.start_feed, 2)}")
+            out.append(f"{'FNORM ' if is_linear else ''}F{decimal(block.start_feed, 2)}")
             is_linear = False
         change = "" if block.is_linear == is_linear else "FLIN " if block.is_linear else "FNORM "
         is_linear = block.is_linear
@@ -168,9 +168,9 @@ def linear_lines(
         words = "" if motion == code else f"{motion} "
         code = motion
         moved = np.abs(np.round(block.end_mm, decimals) - np.round(start, decimals)) > 0.5 * 10.0**-decimals
-        words += "".join(f"{'XYZ'[k]}{_number(float(block.end_mm[k]), decimals)}" for k in range(3) if moved[k])
-        words += f"CR={_number(block.radius_mm, 3)}" if block.sweep_rad else ""
-        out.append(f"{change}{words}F{_number(block.feed, 2 if block.is_linear else 4)}")
+        words += "".join(f"{'XYZ'[k]}{decimal(float(block.end_mm[k]), decimals)}" for k in range(3) if moved[k])
+        words += f"CR={decimal(block.radius_mm, 3)}" if block.sweep_rad else ""
+        out.append(f"{change}{words}F{decimal(block.feed, 2 if block.is_linear else 4)}")
         if label is not None:
             out[0] = f"{label[0]} {out[0]}"
         start = block.end_mm
@@ -191,11 +191,6 @@ _LABEL = re.compile(r"N\d+")
 _MERE_MOVE = re.compile(r"(?:N\d+)?(?:G0?[123])?(?:[XYZIJKRF]-?(?:\d+\.\d*|\.\d+))+")
 
 
-def _number(value: float, decimals: int) -> str:
-    text = f"{value:.{decimals}f}".rstrip("0")
-    return "0." if text in ("0.", "-0.") else text
-
-
 @dataclass(frozen=True)
 class _Shape:
     """A line or an arc between two ends of blocks, and the command beside it."""
@@ -211,7 +206,7 @@ class _JoinedBlocks:
     """Chooses the blocks one after another, each as long as it may be."""
 
     def __init__(self, path: _core.Path, period_s: float, tolerance_mm: float, joints: frozenset[int]) -> None:
-        self._period, self._tolerance, self._joints = period_s, tolerance_mm, joints
+        self.period_s, self.tolerance_mm, self._joints = period_s, tolerance_mm, joints
         self._segments = [path[k] for k in range(len(path))]
         points, self._knots = [np.asarray(path.start_mm, dtype=float)], [0]
         for segment in self._segments:
@@ -223,7 +218,6 @@ class _JoinedBlocks:
         self._shape = lru_cache(maxsize=512)(self._shape_between)
 
     def blocks(self) -> Iterator[LinearBlock]:
-        """From the begin to the end."""
         at, speed, late_s, count = 0, 0.0, 0.0, len(self._segments)
         while at < count:
             block, late = self._longest(at, speed, late_s) if speed > 0.0 else (None, 0.0)
@@ -239,19 +233,16 @@ class _JoinedBlocks:
                 speed, late_s = 0.0, 0.0  # other lines stand here, or somebody may begin here
 
     def ends(self, blocks: Sequence[LinearBlock]) -> list[int]:
-        """Periods at whose ends blocks end."""
         return [self._knots[block.last + 1] for block in blocks]
 
     def _time_s(self, at: int, end: int) -> float:
-        """Of the blocks from one to the one before another."""
-        return (self._knots[end] - self._knots[at]) * self._period
+        return (self._knots[end] - self._knots[at]) * self.period_s
 
     def _speed_at(self, knot: int) -> float:
-        """Of the command, from the periods beside."""
         m = self._knots[knot]
         before, behind = max(m - 1, 0), min(m + 1, len(self.points) - 1)
         step = self.points[behind] - self.points[before]
-        return float(np.linalg.norm(step)) / ((behind - before) * self._period)
+        return float(np.linalg.norm(step)) / ((behind - before) * self.period_s)
 
     def _bias(self, at: int, end: int) -> float:
         """Excess of the speeds at the ends over those of the command, so that the block keeps its mean speed.
@@ -269,7 +260,7 @@ class _JoinedBlocks:
         """
         before, behind = self._speed_at(at), self._speed_at(at + 1)
         is_short = self._knots[at + 1] - self._knots[at] == 1
-        if is_short and abs(behind - before) * self._period > 2.0 * self._tolerance:
+        if is_short and abs(behind - before) * self.period_s > 2.0 * self.tolerance_mm:
             shape, whole_s = self._shape(at, at + 1), self._time_s(at, at + 1)
             start = _written(before + self._bias(at, at + 1)) if at else 0.0
             end = None if shape is None else end_speed(shape.length_mm, start, whole_s - late_s)
@@ -298,7 +289,7 @@ class _JoinedBlocks:
     def _begun(self, at: int, late_s: float) -> tuple[LinearBlock | None, float]:
         """The longest block whose feed at its start is free."""
         speed = self._speed_at(at) if at else 0.0
-        if speed * self._period > self._tolerance:
+        if speed * self.period_s > self.tolerance_mm:
             return self._longest(at, None, late_s)
         found: tuple[LinearBlock | None, float] = (None, 0.0)
         for end in range(at + 1, min(at + 4, len(self._segments))):
@@ -312,7 +303,6 @@ class _JoinedBlocks:
         return found
 
     def _longest(self, at: int, speed: float | None, late_s: float) -> tuple[LinearBlock | None, float]:
-        """The longest block from a speed; None: from that of the command."""
         found: tuple[LinearBlock | None, float] = (None, 0.0)
         misses = 0
         for end in range(at + 1, min(at + _LONGEST, len(self._segments)) + 1):
@@ -334,16 +324,16 @@ class _JoinedBlocks:
         if shape is None or (exact := end_speed(shape.length_mm, speed, time_s)) is None:
             return None, 0.0
         wanted = self._speed_at(end) + self._bias(at, end) if end < len(self._segments) else exact
-        slack_s = _TIME_SHARE * self._tolerance / max(speed, wanted, exact)
+        slack_s = _TIME_SHARE * self.tolerance_mm / max(speed, wanted, exact)
         slowest, fastest = (end_speed(shape.length_mm, speed, time_s + sign * slack_s) or exact for sign in (1.0, -1.0))
         last = _written(min(max(wanted, slowest), fastest))
-        if last <= 0.0 or abs(last - wanted) * self._period > _SPEED_SHARE * self._tolerance:
+        if last <= 0.0 or abs(last - wanted) * self.period_s > _SPEED_SHARE * self.tolerance_mm:
             return None, 0.0
         late = late_s + duration_s(shape.length_mm, speed, last) - whole_s
-        times = np.arange(1.0, len(shape.along_mm) + 1.0) * self._period - late_s
+        times = np.arange(1.0, len(shape.along_mm) + 1.0) * self.period_s - late_s
         along = distance_mm(shape.length_mm, speed, last, np.asarray(times)) - shape.along_mm
         off = float(np.hypot(along, shape.aside_mm).max(initial=0.0))
-        if off > self._tolerance or abs(late) * max(last, wanted) > 2.0 * _TIME_SHARE * self._tolerance:
+        if off > self.tolerance_mm or abs(late) * max(last, wanted) > 2.0 * _TIME_SHARE * self.tolerance_mm:
             return None, 0.0
         block = self._made(at, end, shape, speed, last, sets_feed=sets_feed)
         return block, late
@@ -360,12 +350,11 @@ class _JoinedBlocks:
             return None
         along = (points[1:-1] - points[0]) @ chord / length
         aside = np.linalg.norm(points[1:-1] - points[0] - np.outer(along, chord / length), axis=1)
-        if aside.max(initial=0.0) <= _LINE_SHARE * self._tolerance:
+        if aside.max(initial=0.0) <= _LINE_SHARE * self.tolerance_mm:
             return _Shape(length, 0.0, 0.0, along, aside)
         return self._arc(points, length, self._segments[at].normal)
 
     def _arc(self, points: Vector, chord_mm: float, normal: int) -> _Shape | None:
-        """The arc through both ends and the middle, in the plane of the blocks."""
         first, second = (normal + 1) % 3, (normal + 2) % 3
         if np.ptp(points[:, normal]) > 0.0 or chord_mm < 0.02:
             return None
@@ -390,17 +379,13 @@ class _JoinedBlocks:
 
 
 def _at_rest(
-    blocks: list[LinearBlock],
-    points: Vector,
-    ends: Sequence[int],
-    period_s: float,
-    tolerance_mm: float,
-    modes: Sequence[tuple[int, float, float]],
+    blocks: list[LinearBlock], fit: _JoinedBlocks, modes: Sequence[tuple[int, float, float]]
 ) -> list[LinearBlock]:
     """The last blocks with speeds that leave the modes at rest and stay near the command: least squares.
 
     A micrometre of error at a mode's frequency, in some blocks before the end, is several of vibration behind it.
     """
+    points, ends, period_s = fit.points, fit.ends(blocks), fit.period_s
     first = max(0, len(blocks) - _POLISHED)
     while first < len(blocks) - 1 and ends[-1] - (ends[first - 1] if first else 0) > _POLISHED_PERIODS:
         first += 1
@@ -444,7 +429,7 @@ def _at_rest(
                 continue
             found = rows(tried)
             off = np.linalg.norm(found[: window.size].reshape(-1, 3), axis=1).max()
-            if off <= _REST_SHARE * tolerance_mm and found @ found < best_rows @ best_rows:
+            if off <= _REST_SHARE * fit.tolerance_mm and found @ found < best_rows @ best_rows:
                 best, best_rows = tried, found
                 break
         else:

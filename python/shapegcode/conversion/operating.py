@@ -11,9 +11,9 @@ from itertools import chain
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.budget import TransferLoad
-from shapegcode.conversion.restart import CutRestarts, RestartPoint
-from shapegcode.io.units import FloatArray
+from shapegcode.conversion.restart import RestartPoint
+from shapegcode.conversion.whole_text import Written
+from shapegcode.conversion.write import TransferLoad
 from shapegcode.machine import Machine
 from shapegcode.machine.dialects import dialect_of
 from shapegcode.model.machine_model import MachineModel
@@ -41,15 +41,10 @@ class ControlNote:
 
 
 def at_the_control(
-    emitted: Program,
-    placed: Sequence[Placed],
-    loads: Mapping[int, TransferLoad],
-    figures: ProgramFigures,
-    model: MachineModel,
-    block_period_s: float,
-    restarts: Sequence[CutRestarts],
+    emitted: Program, written: Written, figures: ProgramFigures, model: MachineModel, block_period_s: float
 ) -> tuple[ControlNote, ...]:
     """Cautions for the operator of an emitted program."""
+    placed, loads = written.placed, written.loads
     if not placed:
         return ()
     machine = model.machine
@@ -59,14 +54,16 @@ def at_the_control(
     if turned and machine.emission.override != "lock":
         worst = max(turned, key=lambda each: max(each.residual_um))
         elsewhere = [f"at {worst.override * 100:.0f} % up to {max(worst.residual_um):.1f} µm of residual vibration"]
+    size, room = emitted.size, machine.controller.program_memory_bytes
+    fits = "on this machine: " + ("fits" if size <= room else f"does not fit: {no_room(room)}")
     return (
-        ControlNote("memory", _memory(emitted.size, machine)),
+        ControlNote("memory", f"{size} bytes ({size / _TAPE_CHARACTERS_PER_M:.0f} m of tape); {room} bytes {fits}"),
         ControlNote("drip feed (DNC)", _line(loads, machine)),
         ControlNote("look-ahead", _look_ahead(loads, machine, block_period_s)),
         ControlNote(override.topic, "; ".join([override.sentence, *elsewhere])),
         ControlNote(FEED_HOLD.topic, FEED_HOLD.sentence),
         ControlNote(SINGLE_BLOCK.topic, f"{SINGLE_BLOCK.sentence}; {_single_block(emitted, placed, figures, model)}"),
-        ControlNote(RESTART.topic, "; ".join([RESTART.sentence, *_restarts(emitted, placed, restarts, machine)])),
+        ControlNote(RESTART.topic, "; ".join([RESTART.sentence, *_restarts(emitted, written, machine)])),
         ControlNote(FIRST_RUN.topic, FIRST_RUN.sentence),
     )
 
@@ -100,20 +97,14 @@ def restart_table(points: Sequence[RestartPoint]) -> Table:
     return Table("restart points inside of cuts", columns, points[:_SHOWN_POINTS], caption)
 
 
-def _memory(size: int, machine: Machine) -> str:
-    room = machine.controller.program_memory_bytes
-    fits = "fits" if size <= room else f"does not fit: {no_room(room)}"
-    return f"{size} bytes ({size / _TAPE_CHARACTERS_PER_M:.0f} m of tape); {room} bytes on this machine: {fits}"
-
-
 def _line(loads: Mapping[int, TransferLoad], machine: Machine) -> str:
     baud = max((load.baud for load in loads.values()), default=0.0)
     line = machine.controller.dnc_baud
-    here = f", the line of this machine has {line}" if line > 0 else ""
-    enough = (
-        "" if line <= 0 else ": enough" if baud <= line else ": buffer underrun (--baud fits the program to the line)"
-    )
-    return f"{baud:.0f} baud or more, where the cuts have the most blocks per second{here}{enough}"
+    here = ""
+    if line > 0:
+        enough = "enough" if baud <= line else "buffer underrun (--baud fits the program to the line)"
+        here = f", the line of this machine has {line}: {enough}"
+    return f"{baud:.0f} baud or more, where the cuts have the most blocks per second{here}"
 
 
 def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_period_s: float) -> str:
@@ -144,7 +135,8 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFi
     fast = fast[:: math.ceil(len(fast) / _FAST_BLOCKS)]
     slowest = np.array(slowest_excited_hz(model.machine))
     # The speed that each puts into the modes, all at once; the softest axis counts most.
-    steps = np.array([_direction(blocks[int(one)]) for one in fast]) * feeds[fast, None]
+    chords = np.array([blocks[int(one)].end_mm - blocks[int(one)].start_mm for one in fast])
+    steps = chords / np.maximum(np.linalg.norm(chords, axis=1), 1e-9)[:, None] * feeds[fast, None]
     fastest = fast[np.argsort(-np.linalg.norm(steps / slowest, axis=1), kind="stable")[:_SINGLE_BLOCKS]]
     offset = model.offset(place.region)
     mark_um = 0.0
@@ -160,11 +152,6 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFi
     )
 
 
-def _direction(segment: _core.Segment) -> FloatArray:
-    chord = segment.end_mm - segment.start_mm
-    return chord / max(float(np.linalg.norm(chord)), 1e-9)
-
-
 def _duration(time_s: float) -> str:
     for unit, seconds in (("h", 3600.0), ("min", 60.0)):
         if time_s >= 1.5 * seconds:
@@ -172,11 +159,8 @@ def _duration(time_s: float) -> str:
     return f"{time_s:.1f} s" if time_s < 10.0 else f"{time_s:.0f} s"
 
 
-def _restarts(
-    emitted: Program, placed: Sequence[Placed], restarts: Sequence[CutRestarts], machine: Machine
-) -> Iterator[str]:
-    """Restart lines and points, preparations, and cuts without a restart point with the reason."""
-    emission = machine.emission
+def _restarts(emitted: Program, written: Written, machine: Machine) -> Iterator[str]:
+    emission, placed, restarts = machine.emission, written.placed, written.restarts
     if (own := dialect_of(emission.dialect)) is not None:
         yield f"{own.control}: {own.facts['restart'].text}"
     else:

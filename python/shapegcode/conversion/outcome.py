@@ -2,44 +2,50 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from shapegcode import _core
 from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.plan import ConversionPlan, Shaped
-from shapegcode.conversion.recommendation import (
-    Grade,
-    filter_advice,
-    most_to_gain_um,
-    open_axes,
-    recommend,
-    simulation_warnings,
-    text_warnings,
-)
 from shapegcode.conversion.restart import restart_points
-from shapegcode.conversion.result import ChangeProof, Conversion
-from shapegcode.conversion.tables import CutOutcome, Sensitivity, outcome_of, parameter_sensitivity, tools_of_cuts
+from shapegcode.conversion.result import ChangeProof, Conversion, FilterAdvice, Grade
+from shapegcode.conversion.tables import (
+    CutOutcome,
+    Sensitivity,
+    parameter_sensitivity,
+    remedy_for,
+    tools_of_cuts,
+    unknown_axes,
+)
+from shapegcode.conversion.whole_text import Written
 from shapegcode.machine import Machine
-from shapegcode.model.machine_model import ini_lines
+from shapegcode.model.machine_model import MachineModel, ini_lines
 from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.model.programs import SimulatedPrograms
-from shapegcode.program import Program
-from shapegcode.program.comparison import Allowed, compare
+from shapegcode.program import Program, written_increment_mm
+from shapegcode.program.comparison import Allowed, ProgramDifference, compare
+from shapegcode.program.stamp import no_room
 from shapegcode.results.outcome import Pair
 from shapegcode.shaping.grid import Grid
-from shapegcode.verdict.figures import (
-    AppliedLimits,
-    BlockCount,
-    FollowingShapers,
-    GridTaps,
-    Placed,
-    ProgramFigures,
-    UsedShaper,
+from shapegcode.verdict import figures as parts
+from shapegcode.verdict.figures import Placed, ProgramFigures, RegionVerdict
+from shapegcode.verdict.judge import (
+    RegionFigures,
+    most_to_gain_um,
+    rapid_vibration_um,
+    simulate_unchanged,
+    unshaped_regions,
 )
-from shapegcode.verdict.judge import RegionFigures, rapid_vibration_um, simulate_unchanged, unshaped_regions
 
-_PATH_TOLERANCES = 10.0
-_PATH_UM = 200.0
+_MOSTLY = 0.7  # of the contour error of the machine table: the command itself errs so much
+_TRIALS = (0.9, 0.7, 0.5)  # of the time constant that a rounding in proportion to it would allow
+# How much worse than the original's a figure must be to be worth a warning: ratio, and size in um.
+_WORSE_RATIO, _WORSE_UM = 1.2, 5.0
+# How far an emitted path may leave the original's: the larger of both.
+_PATH_TOLERANCES, _PATH_UM = 10.0, 200.0
 
 
 @dataclass(frozen=True)
@@ -87,8 +93,9 @@ def judge(plan: ConversionPlan, shaped: Shaped) -> ProgramVerdict:
 
 def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> Conversion:
     """The result: figures, warnings, what they rest on, and what the control will make of the text."""
-    program, machine = plan.program, plan.machine
-    core, tools = program.core, tools_of_cuts(program)
+    program, machine, written = plan.program, plan.machine, shaped.written
+    core, tolerance, tools_by_index = program.core, machine.tolerance, tools_of_cuts(program)
+    tools = [tools_by_index.get(plan.aims.index(place.region)) for place in written.placed]
     # For a core that waits while the last simulations run.
     mark = plan.pool.submit(lambda: shaped.emitted.mark)
     warnings = _warnings(plan, shaped, verdict.figures)
@@ -98,69 +105,53 @@ def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> 
         original_um = max((getattr(run, plan.judge.target).max_abs_mm for run in originals), default=0.0) * 1e3
         curve = plan.aims.tolerance_curve(verdict.cycle_time_s.original, original_um)
     mark.result()
-    emitted = shaped.emitted.with_verdict(
-        good=verdict.grade != "do not run", better=verdict.grade == "better, tolerance not met"
-    )
+    grade = verdict.grade
+    emitted = shaped.emitted.with_verdict(good=grade != "do not run", better=grade == "better, tolerance not met")
     return Conversion(
         **vars(verdict.figures),
         program=program.source,
         machine=machine.name,
-        recommendation=verdict.grade,
+        recommendation=grade,
         reason=verdict.reason,
         cuts=verdict.cuts,
         tolerance_curve=curve,
         proof=verdict.proof,
-        advice=filter_advice(program, machine, plan.model, plan.judge, originals),
+        advice=_filter_advice(plan, originals),
         cycle_time_s=verdict.cycle_time_s,
         cutting_time_s=verdict.figures.region_time_s(),
         block_period_s=plan.grid.block_period_s,
         shaper=_used_shaper(plan.grid),
-        blocks=BlockCount(core.block_count, shaped.written.blocks),
+        blocks=parts.BlockCount(core.block_count, written.blocks),
         expanded=core.expanded,
         expanded_radii_mm={f"D{number}": radius for number, radius in core.expanded_radii_mm.items()},
         bytes_read=core.size,
-        bytes_emitted=shaped.written.size,
-        limits=AppliedLimits(
-            machine.tolerance.contour_um,
+        bytes_emitted=written.size,
+        limits=parts.AppliedLimits(
+            tolerance.contour_um,
             plan.judge.target,
-            machine.tolerance.residual_ratio,
-            machine.tolerance.residual_floor_um,
-            machine.tolerance.residual_floor_increments,
-            machine.tolerance.feed_excess_ratio,
+            tolerance.residual_ratio,
+            tolerance.residual_floor_um,
+            tolerance.residual_floor_increments,
+            tolerance.feed_excess_ratio,
             machine.verdict.plant,
             machine.price.program_time_percent,
             machine.price.cut_time_percent,
         ),
         warnings=tuple(warnings),
-        budget=plan.spending.outcome(plan.grid, shaped.written) if plan.spending is not None else None,
+        budget=plan.spending.outcome(plan.grid, written) if plan.spending is not None else None,
         rapids=shaped.rapids.outcome if shaped.rapids is not None else None,
         least_gain_um=machine.shaping.least_gain_um,
         parameter_sensitivity=sensitivity,
         unverified_parameters_tested=tried,
-        at_the_control=at_the_control(
-            shaped.emitted,
-            shaped.written.placed,
-            shaped.written.loads,
-            verdict.figures,
-            plan.model,
-            plan.grid.block_period_s,
-            shaped.written.restarts,
-        ),
-        restart_points=restart_points(
-            program,
-            (
-                (place, restarts, tools.get(plan.aims.index(place.region)))
-                for place, restarts in zip(shaped.written.placed, shaped.written.restarts, strict=True)
-            ),
-        ),
+        at_the_control=at_the_control(shaped.emitted, written, verdict.figures, plan.model, plan.grid.block_period_s),
+        restart_points=restart_points(program, zip(written.placed, written.restarts, tools, strict=True)),
         emitted=emitted,
-        placed=tuple(shaped.written.placed),
+        placed=tuple(written.placed),
         simulated=SimulatedPrograms(program, machine, emitted, plant=machine.verdict.plant),
     )
 
 
 def _unchanged(plan: ConversionPlan, shaped: Shaped) -> list[tuple[Placed, RegionFigures]]:
-    """The cuts left unchanged, as they stand in the emitted program, simulated."""
     left = [index for index, reason in enumerate(plan.reasons) if reason]
     if not left:
         return []
@@ -185,7 +176,6 @@ def _unchanged(plan: ConversionPlan, shaped: Shaped) -> list[tuple[Placed, Regio
 
 
 def _cuts(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> tuple[CutOutcome, ...]:
-    """One row for each cut."""
     tools = tools_of_cuts(plan.program)
     sizes = {
         plan.aims.index(place.region): text.size
@@ -197,18 +187,28 @@ def _cuts(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> tupl
         gained = plan.gains_um.get(index)
         if gained is None:
             gained = most_to_gain_um(plan.originals[index].result())
+        residual, reason, is_shaped = cut.residual_vibration_um, plan.reasons[index], index in sizes
         rows.append(
-            outcome_of(
-                cut, is_shaped=index in sizes, reason=plan.reasons[index], gain_um=gained,
-                tolerance_um=plan.aims.shaped_for_um(index), tool=tools.get(index),
-                size=Pair(read, sizes.get(index, read)),
+            CutOutcome(
+                lines=cut.lines,
+                emitted_lines=cut.emitted_lines,
+                tool=tools.get(index),
+                is_shaped=is_shaped,
+                reason=reason,
+                gain_um=gained,
+                residual_um=Pair(max(residual.original), max(residual.emitted)),
+                contour_um=Pair(cut.original_contour_error_um, cut.contour_error_um),
+                tolerance_um=plan.aims.shaped_for_um(index),
+                time_s=cut.time_s,
+                bytes=Pair(read, sizes.get(index, read)),
+                misses=cut.misses,
+                remedy="" if is_shaped or not cut.misses else remedy_for(reason),
             )
-        )  # fmt: skip
+        )
     return tuple(rows)
 
 
 def _sensitivity(plan: ConversionPlan, shaped: Shaped) -> tuple[tuple[Sensitivity, ...], int]:
-    """Sensitivity of the shaped cut that comes nearest to a limit."""
     deciding = plan.judge.deciding(shaped.figures, shaped.written.placed)
     if deciding is None:
         return (), 0
@@ -242,15 +242,14 @@ def _warnings(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> 
         warnings.append(f"{program.source}: no cutting moves that can be shaped: its motion is unchanged")
     if not written.placed:
         # Where something was shaped, the sensitivity to unverified parameters names them.
-        warnings += open_axes(program, machine)
-    warnings += simulation_warnings(program, figures, machine, is_priced=bool(plan.aims.priced))
-    warnings += text_warnings(program, written.placed, figures, machine, written.size, written.blocks)
+        warnings += _open_axes(program, machine)
+    warnings += _simulation_warnings(plan, figures)
+    warnings += _text_warnings(plan, written, figures)
     warnings += [why for _, _, why in ini_lines([place.blocks(shaped.emitted) for place in written.placed], machine)]
     return warnings + (shaped.rapids.warnings if shaped.rapids is not None else [])
 
 
 def _other_control(machine: Machine) -> list[str]:
-    """Where the program is written for another control than its planner is judged by."""
     kind, name = machine.controller.kind, machine.emission.dialect
     if kind == "grbl":
         return [
@@ -266,23 +265,23 @@ def _other_control(machine: Machine) -> list[str]:
     ]
 
 
-def _used_shaper(grid: Grid) -> UsedShaper:
+def _used_shaper(grid: Grid) -> parts.UsedShaper:
     following = None
     if grid.track is not None:
         nodes = grid.track.nodes
-        following = FollowingShapers(
+        following = parts.FollowingShapers(
             "xyz"[grid.track.axis],
             tuple(node.position_mm for node in nodes),
             tuple(tuple(node.shaper.times_s) for node in nodes),
             tuple(tuple(node.shaper.amplitudes) for node in nodes),
             grid.track.worst_residual,
         )
-    return UsedShaper(
+    return parts.UsedShaper(
         tuple(grid.shaper.times_s),
         tuple(grid.shaper.amplitudes),
         grid.family,
         grid.duration_s,
-        tuple(GridTaps(tuple(fir.delays), tuple(fir.taps)) for fir in grid.axis_firs),
+        tuple(parts.GridTaps(tuple(fir.delays), tuple(fir.taps)) for fir in grid.axis_firs),
         grid.per_axis_duration_s,
         following,
     )
@@ -302,3 +301,172 @@ def prove(original: Program, emitted: Program, machine: Machine, *, rapids_shape
     # Without header comments nothing says that lines of emission.* are the converter's own.
     refused = tuple(each for each in found.refused if machine.emission.header or each.kind != "emission")
     return ChangeProof(found.answer, found.counts, found.path_um, refused)
+
+
+def recommend(
+    cuts: Sequence[RegionVerdict],
+    *,
+    original_within: bool,
+    could_gain: bool,
+    benefit: bool,
+    other_changes: Sequence[ProgramDifference] = (),
+) -> tuple[Grade, str]:
+    """The grade of a program and its reason: the first that applies, from "do not run" upwards.
+
+    `original_within`: every cut of the original keeps its limits. `could_gain`: shaping gains enough in some cut, or
+    would as far as is known. `benefit`: of a shaped cut, see `benefits`. `other_changes`: a defect of shapegcode.
+    """
+    if worse := next((_at(cut, why) for cut in cuts for why in cut.worse), ""):
+        return "do not run", worse
+    for change in other_changes:
+        had, has = change.original or "nothing", change.emitted or "nothing"
+        return "do not run", f"{change.place}: {change.kind} changed: {had} became {has}: please report this defect"
+    if not cuts:
+        return "no benefit: run the original", "there is nothing to shape"
+    if not could_gain or (not benefit and not original_within):
+        return "no benefit: run the original", "nothing that misses its limit gets noticeably better"
+    if original_within:
+        return "already within tolerance: shaping is optional", "every cut of the original keeps its limits"
+    if missed := next((_at(cut, why) for cut in cuts for why in cut.misses), ""):
+        return "better, tolerance not met", missed
+    return "worth running", "every cut is within its limits, and within the price"
+
+
+def _at(cut: RegionVerdict, why: str) -> str:
+    return "lines {} to {}: {}".format(*cut.lines, why)
+
+
+def _filter_advice(plan: ConversionPlan, originals: Sequence[_core.SimulationFigures]) -> FilterAdvice | None:
+    """Find a smaller filter of the control with which the original keeps its limits without shaping."""
+    machine = plan.machine
+    limit_um, floor_um = machine.tolerance.contour_um, machine.tolerance.residual_floor_um
+    errors = [(getattr(run, plan.judge.target).max_abs_mm * 1e3, run.command.max_abs_mm * 1e3) for run in originals]
+    if not any(error > limit_um for error, _ in errors):
+        return None
+    if any(float(run.residual_mm.max()) * 1e3 > floor_um for run in originals):
+        return None  # vibration has to be cured in any case
+    if any(error > limit_um and command < _MOSTLY * error for error, command in errors):
+        return None
+    field = "look_ahead_filter_time_constant_s" if machine.controller.motion == "look_ahead" else "time_constant_s"
+    now_s, period_s = getattr(machine.controller, field), plan.model.period_s
+    worst = max(range(len(errors)), key=lambda index: errors[index][0])
+    region = plan.program.regions[worst]
+    for trial in _TRIALS if now_s > 0.0 else ():
+        enough_s = math.floor(now_s * trial * limit_um / errors[worst][0] / period_s) * period_s
+        if _keeps(plan, f"controller.{field}", enough_s):
+            lines = (region.first_line, region.last_line)
+            return FilterAdvice(f"controller.{field}", now_s, enough_s, errors[worst][1], lines)
+    return None
+
+
+def _keeps(plan: ConversionPlan, key: str, value: float) -> bool:
+    model, tolerance = MachineModel(plan.machine.with_values(key, value)), plan.machine.tolerance
+    limit_mm, floor_mm = tolerance.contour_um * 1e-3, tolerance.residual_floor_um * 1e-3
+    runs = (model.simulate_original(each.path, offset=model.offset(each)) for each in plan.program.regions)
+    return all(
+        getattr(run, plan.judge.target).max_abs_mm <= limit_mm and float(run.residual_mm.max()) <= floor_mm
+        for run in runs
+    )
+
+
+def _open_axes(program: Program, machine: Machine) -> list[str]:
+    return [
+        f"{letter.upper()} moves, and whether it has a vibration mode is not known: assumed rigid; "
+        f"tap it (shapegcode identify), or state axes.{letter}.rigid = true"
+        for letter in unknown_axes(machine)
+        if any(region.path.extent_mm["xyz".index(letter)] > 0.0 for region in program.regions)
+    ]
+
+
+def _simulation_warnings(plan: ConversionPlan, figures: ProgramFigures) -> Iterator[str]:
+    program = plan.program
+    expanded = " expanded" if program.core.expanded else ""
+    for region in figures.regions:
+        for miss in region.misses:
+            yield f"{program.place(region.lines[0])}: lines {region.lines[0]} to {region.lines[1]}{expanded}: {miss}"
+    yield from _binding(plan, figures)
+    pairs = [
+        (f"{name} {axis.upper()}", both.original[axis], both.emitted[axis])
+        for name, both in (
+            ("residual vibration", figures.residual_vibration_um),
+            ("peak vibration", figures.peak_vibration_um),
+        )
+        for axis in "xyz"
+    ]
+    response = figures.contour_error_um.response
+    pairs.append(("contour error of the machine table", response.original.max, response.emitted.max))
+    for name, before, after in pairs:
+        if after > _WORSE_RATIO * before and after - before > _WORSE_UM:
+            yield f"{name} is larger than the original's: {before:.1f} -> {after:.1f} um"
+
+
+def _binding(plan: ConversionPlan, figures: ProgramFigures) -> Iterator[str]:
+    """Tolerances that a conversion exceeds, by how much, and feasible values; nothing if all are kept."""
+    tolerance = plan.machine.tolerance
+    contour = max((region.contour_error_um for region in figures.regions), default=0.0)
+    if contour > tolerance.contour_um:
+        rounding_um = math.sqrt(2.0) * written_increment_mm(plan.machine, 21) * 1e3
+        how = "within the price (price.*)" if plan.aims.is_priced else "with the feed lowered as far as it helps"
+        share = f"; rounding the words alone may take {rounding_um:.1f} um of it"
+        yield (
+            f"tolerance.contour_um = {tolerance.contour_um:g} is exceeded: {contour:.1f} um were reached "
+            f"{how}{share if rounding_um > 0.2 * contour else ''}; "
+            f"feasible: {_rounded_up(contour):g} um"
+        )
+    over = [
+        (left, limit)
+        for region in figures.regions
+        for left, limit in zip(region.residual_vibration_um.emitted, region.residual_limit_um, strict=True)
+        if left > limit
+    ]
+    if over:
+        left, limit = max(over)
+        yield (
+            f"the tolerance of residual vibration is exceeded: {left:.2f} um remain, limit {limit:.2f} um "
+            f"(tolerance.residual_*); feasible: tolerance.residual_floor_um = {_rounded_up(left):g}, "
+            "or a longer shaper (`shapegcode shaper`)"
+        )
+
+
+def _rounded_up(value: float) -> float:
+    value *= 1.05
+    step = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / step) * step
+
+
+def _text_warnings(plan: ConversionPlan, written: Written, figures: ProgramFigures) -> Iterator[str]:
+    program, machine, placed, size = plan.program, plan.machine, written.placed, written.size
+    controller, emission = machine.controller, machine.emission
+    on = next((place.region for place in placed if place.region.look_ahead_mode), None)
+    if on is not None and not emission.prologue:
+        yield (
+            f"{program.place(on.first_line)}: shaped blocks run while the program's look-ahead mode is on; the verdict "
+            'is for look-ahead off: set emission.prologue = ["G05.1Q0"] and emission.epilogue = ["G05.1Q1"]'
+        )
+    fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
+    fast = next((place.region for place in placed if place.region.path.fastest_feed_mm_per_s * 60.0 > fastest), None)
+    if fast is not None:
+        yield (
+            f"{program.place(fast.first_line)}: programmed feed {fast.path.fastest_feed_mm_per_s * 60.0:g} mm/min is "
+            f"over every axis' largest ({fastest:g} mm/min, axes.*.max_feed_mm_per_min): shaped at the axes' limits"
+        )
+    if size > controller.program_memory_bytes:
+        yield (
+            f"the emitted program has {size} bytes, the controller's memory {controller.program_memory_bytes} "
+            f"(controller.program_memory_bytes): {no_room(controller.program_memory_bytes)}"
+        )
+    cutting_s = figures.region_time_s().emitted
+    if controller.dnc_baud > 0 and written.blocks > 0 and cutting_s > 0.0:
+        needed = size * controller.dnc_bits_per_character / cutting_s
+        if needed > controller.dnc_baud:
+            yield (
+                f"drip feeding needs {needed:.0f} baud on average, the line has {controller.dnc_baud} "
+                "(controller.dnc_baud): the buffer will run empty"
+            )
+    if figures.slowed_blocks and not emission.leaves_look_ahead:
+        example = ', for example ["G05.1Q0"]' if emission.dialect == "fanuc" else ""
+        yield (
+            f"{figures.slowed_blocks} of {written.blocks} shaped blocks change the speed of an axis by more than "
+            "controller.corner_speed_difference_mm_per_min: run them with the look-ahead mode off "
+            f"(emission.prologue{example}), or look-ahead slows them down"
+        )

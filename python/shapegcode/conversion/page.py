@@ -17,22 +17,8 @@ from shapegcode.conversion.tables import CutOutcome, before_after_table, sensiti
 from shapegcode.machine import Machine
 from shapegcode.results.json import Provenance
 from shapegcode.results.outcome import Pair
+from shapegcode.results.page import model
 from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
-from shapegcode.results.page.model import (
-    Bars,
-    CutPicker,
-    CutRow,
-    CutTotals,
-    Figure,
-    Figures,
-    HeatMap,
-    HeatRow,
-    Light,
-    NextStep,
-    Notes,
-    Section,
-    Text,
-)
 from shapegcode.results.table import Column, Table
 from shapegcode.verdict.figures import CaseVerdict
 
@@ -45,7 +31,7 @@ _SHOWN_KEYS = ("axes.", "tolerance.", "verdict.")
 _RUN_FIRST = ("first run",)
 
 
-def light_of(conversion: Conversion) -> tuple[Light, str]:
+def light_of(conversion: Conversion) -> tuple[model.Light, str]:
     """Colour of the traffic light, and the reason."""
     if not conversion.is_written_as_output:
         return "red", conversion.reason
@@ -61,13 +47,13 @@ def light_of(conversion: Conversion) -> tuple[Light, str]:
     return "green", f"every tolerance is kept in all {sum(case.counts for case in conversion.cases)} cases that count"
 
 
-def sections_of(conversion: Conversion, provenance: Provenance | None = None) -> Iterator[Section]:
+def sections_of(conversion: Conversion, provenance: Provenance | None = None) -> Iterator[model.Section]:
     """The sections of the page."""
     how = "Each card: original → emitted. The limit applies to the emitted program."
-    yield Section("gain", "What it gains", (Figures(tuple(_figures(conversion))),), how=how)
+    yield model.Section("gain", "What it gains", (model.Figures(tuple(_figures(conversion))),), how=how)
     if conversion.proof is not None:
         how = "The emitted program was read once more and compared with the original; shapegcode compare does the same."
-        yield Section("proof", "What did not change", (Text((conversion.proof.answer,)),), how=how)
+        yield model.Section("proof", "What did not change", (model.Text((conversion.proof.answer,)),), how=how)
     yield from warnings_of(conversion)
     yield next_steps(conversion, *_further(conversion))
     if conversion.cases:
@@ -75,14 +61,16 @@ def sections_of(conversion: Conversion, provenance: Provenance | None = None) ->
     if conversion.parameter_sensitivity:
         table = sensitivity_table(conversion.parameter_sensitivity, conversion.unverified_parameters_tested)
         how = "Measure the topmost first: it moves the verdict furthest. Red: it could turn it."
-        yield Section("rests", "Sensitivity to unverified parameters", (table,), how=how)
+        yield model.Section("rests", "Sensitivity to unverified parameters", (table,), how=how)
     yield from _price(conversion, provenance)
     yield _times(conversion)
     if isinstance(conversion, ScheduledConversion):
-        yield Section("feeds", "Feeds and cutting forces", tuple(conversion.feed_schedule.tables()), printed=False)
+        yield model.Section(
+            "feeds", "Feeds and cutting forces", tuple(conversion.feed_schedule.tables()), printed=False
+        )
     if not conversion.nothing_shaped:
         table = before_after_table(conversion.before_after())
-        yield Section("figures", "All figures, before and after", (table,), folded=True, printed=False)
+        yield model.Section("figures", "All figures, before and after", (table,), folded=True, printed=False)
     if conversion.simulated is not None:
         yield _machine(conversion.simulated.machine)
     yield from pictures_of(conversion, ("path", "vibration"))
@@ -90,54 +78,48 @@ def sections_of(conversion: Conversion, provenance: Provenance | None = None) ->
         yield _sheet(conversion, provenance)
 
 
-def _picker(conversion: Conversion, provenance: Provenance | None) -> CutPicker:
+def _picker(conversion: Conversion, provenance: Provenance | None) -> model.CutPicker:
     """The cuts that can be chosen; figures of a cut that was not shaped are not known."""
     rows = [
-        CutRow(
+        model.CutRow(
             cut.lines, "" if cut.tool is None else f"T{cut.tool}", cut.gain_um, _tried(cut.residual_um, cut),
             _tried(cut.contour_um, cut), _tried(cut.time_s, cut), _tried(cut.bytes, cut),
             "shaped" if cut.is_shaped else cut.reason, cut.is_shaped, cut.is_shaped,
         )
         for cut in conversion.cuts
     ]  # fmt: skip
-    command = (
-        "shapegcode convert IN -m MACHINE -o OUT"
-        if provenance is None or not provenance.command
-        else provenance.command
-    )
+    command = ("" if provenance is None else provenance.command) or "shapegcode convert IN -m MACHINE -o OUT"
     command = re.sub(r" --(?:only|leave)[ =]\S+", "", command)
-    totals = CutTotals(
+    totals = model.CutTotals(
         conversion.cycle_time_s.original,
         conversion.bytes_read,
         min(max(cut.residual_limit_um) for cut in conversion.all_cuts),
         conversion.limits.contour_um,
     )
-    return CutPicker(tuple(rows), f"{command} --only {{lines}}", totals)
+    return model.CutPicker(tuple(rows), f"{command} --only {{lines}}", totals)
 
 
 def _tried(pair: Pair[N], cut: CutOutcome) -> Pair[N | None]:
     return Pair(pair.original, pair.emitted if cut.is_shaped else None)
 
 
-def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[Section]:
-    """Cut by cut, and what other tolerances would cost."""
+def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[model.Section]:
     if len(conversion.cuts) > 1:
         how = "Select the cuts to shape: the sums are updated, and the command below shapes only them."
         parts, many = (_picker(conversion, provenance),), len(conversion.cuts) > _SHOWN_CUTS
-        yield Section("cuts", "Cut by cut", parts, how=how, folded=many, printed=False)
+        yield model.Section("cuts", "Cut by cut", parts, how=how, folded=many, printed=False)
     if conversion.tolerance_curve is not None:
         sentence = conversion.tolerance_curve.sentence
         how = f"{sentence}. " if sentence else ""
         how += "Planned for the cuts that can be shaped; the price is price.program_time_percent of the machine file."
-        yield Section("price", "Tolerance against time", (curve_table(conversion.tolerance_curve),), how=how)
+        yield model.Section("price", "Tolerance against time", (curve_table(conversion.tolerance_curve),), how=how)
 
 
-def _figures(conversion: Conversion) -> Iterator[Figure]:
-    """The main figures."""
+def _figures(conversion: Conversion) -> Iterator[model.Figure]:
     residual = conversion.residual_vibration_um
     for axis in "xyz":
         if max(residual.original[axis], residual.emitted[axis]) >= _LEAST_SHOWN_UM:
-            yield Figure(
+            yield model.Figure(
                 f"residual vibration {axis.upper()}", "µm", residual.original[axis], residual.emitted[axis],
                 limit=conversion.residual_limit_um(axis),
                 key_before=f"residual_vibration_um.original.{axis}", key_after=f"residual_vibration_um.emitted.{axis}",
@@ -145,34 +127,33 @@ def _figures(conversion: Conversion) -> Iterator[Figure]:
     target = conversion.limits.contour_target
     error = getattr(conversion.contour_error_um, target)
     key = f"contour_error_um.{target}"
-    yield Figure(
+    yield model.Figure(
         "contour error" + (" of the table" if target == "response" else " of the command"), "µm",
         error.original.max, error.emitted.max, limit=conversion.limits.contour_um,
         key_before=f"{key}.original.max", key_after=f"{key}.emitted.max",
     )  # fmt: skip
     time = conversion.cycle_time_s
-    yield Figure(
+    yield model.Figure(
         "cycle time", "s", time.original, time.emitted, digits=2,
         key_before="cycle_time_s.original", key_after="cycle_time_s.emitted",
     )  # fmt: skip
-    yield Figure(
+    yield model.Figure(
         "size of the program", "kB", conversion.bytes_read / 1e3, conversion.bytes_emitted / 1e3,
         key_before="bytes_read", key_after="bytes_emitted", factor=1e-3,
     )  # fmt: skip
 
 
-def _further(conversion: Conversion) -> Iterator[NextStep]:
-    """What to set on the control, and what to measure."""
+def _further(conversion: Conversion) -> Iterator[model.NextStep]:
     for note in conversion.at_the_control:
         if note.topic in ("look-ahead", "override") or "override" in note.topic:
-            yield NextStep(f"At the control, {note.topic}: {note.text}.")
+            yield model.NextStep(f"At the control, {note.topic}: {note.text}.")
     if conversion.parameter_sensitivity:
         key = conversion.parameter_sensitivity[0].key
         text = f"Measure {key}: it is assumed, and the verdict depends on it more than on any other parameter."
-        yield NextStep(text, "shapegcode identify --tap-plan -m MACHINE.toml" if ".modes" in key else "")
+        yield model.NextStep(text, "shapegcode identify --tap-plan -m MACHINE.toml" if ".modes" in key else "")
 
 
-def _cases(conversion: Conversion) -> Section:
+def _cases(conversion: Conversion) -> model.Section:
     axes = [axis for axis in "xyz" if any(case.residual_um[axis] >= _LEAST_SHOWN_UM for case in conversion.cases)]
     columns = (*(f"residual {axis.upper()} µm" for axis in axes), "contour, command µm", "contour, table µm",
                "worst share of its limit %")  # fmt: skip
@@ -183,11 +164,11 @@ def _cases(conversion: Conversion) -> Section:
     )
     counted = sum(case.counts for case in conversion.cases)
     caption = f"{counted} of {len(rows)} operating conditions count ([verdict] of the machine file)"
-    heat = HeatMap(columns, rows, 1, caption, factors=(*(1.0 for _ in axes), 1.0, 1.0, 100.0))
-    return Section("cases", "Under which conditions it was tried", (heat,), how=how)
+    heat = model.HeatMap(columns, rows, 1, caption, factors=(*(1.0 for _ in axes), 1.0, 1.0, 100.0))
+    return model.Section("cases", "Under which conditions it was tried", (heat,), how=how)
 
 
-def _case(rank: int, case: CaseVerdict, axes: list[str], conversion: Conversion) -> HeatRow:
+def _case(rank: int, case: CaseVerdict, axes: list[str], conversion: Conversion) -> model.HeatRow:
     errors = {"command": case.contour_error_um.command, "response": case.contour_error_um.response}
     share = None if case.share_of_limit is None else case.share_of_limit * 100.0
     judged = {conversion.limits.contour_target: conversion.limits.contour_um}
@@ -201,28 +182,25 @@ def _case(rank: int, case: CaseVerdict, axes: list[str], conversion: Conversion)
     names = (*(f"residual_um.{axis}" for axis in axes), "contour_error_um.command", "contour_error_um.response",
              "share_of_limit")  # fmt: skip
     keys = tuple(f"cases.{rank}.{name}" for name in names)
-    return HeatRow(case.name, (*measured, share), (*shares, case.share_of_limit), remark, case.counts, keys)
+    return model.HeatRow(case.name, (*measured, share), (*shares, case.share_of_limit), remark, case.counts, keys)
 
 
-def _times(conversion: Conversion) -> Section:
+def _times(conversion: Conversion) -> model.Section:
     whole, cutting = conversion.cycle_time_s, conversion.cutting_time_s
-    rows = [
-        ("whole program", (whole.original, whole.emitted)),
-        ("cuts together", (cutting.original, cutting.emitted)),
-        ("everything else", (whole.original - cutting.original, whole.emitted - cutting.emitted)),
-    ]
-    keys = [("cycle_time_s.original", "cycle_time_s.emitted"), ("cutting_time_s.original", "cutting_time_s.emitted")]
-    keys.append(("", ""))
+    rest = Pair(whole.original - cutting.original, whole.emitted - cutting.emitted)
+    times = [("whole program", whole, "cycle_time_s"), ("cuts together", cutting, "cutting_time_s")]
+    times.append(("everything else", rest, ""))
     longest = sorted(enumerate(conversion.regions), key=lambda ranked: -ranked[1].time_s.emitted)[:_LONGEST_REGIONS]
     for rank, region in longest if len(conversion.regions) > 1 else []:
-        rows.append(("cut in lines {} to {}".format(*region.lines), (region.time_s.original, region.time_s.emitted)))
-        keys.append((f"regions.{rank}.time_s.original", f"regions.{rank}.time_s.emitted"))
+        times.append(("cut in lines {} to {}".format(*region.lines), region.time_s, f"regions.{rank}.time_s"))
+    rows = tuple((name, (pair.original, pair.emitted)) for name, pair, _ in times)
+    keys = tuple((f"{key}.original", f"{key}.emitted") if key else ("", "") for _, _, key in times)
     how = "Two bars each, original above emitted: where they differ, shaping costs or gains time."
-    bars = Bars("s", tuple(rows), ("original", "emitted"), digits=2, keys=tuple(keys))
-    return Section("time", "Where the time goes", (bars,), how=how)
+    bars = model.Bars("s", rows, ("original", "emitted"), digits=2, keys=keys)
+    return model.Section("time", "Where the time goes", (bars,), how=how)
 
 
-def _machine(machine: Machine) -> Section:
+def _machine(machine: Machine) -> model.Section:
     """The machine data used: modes, tolerances, and every value that was not measured."""
     values = [value for value in machine.values() if value.unmeasured or value.key.startswith(_SHOWN_KEYS)]
     unmeasured = sum(value.unmeasured for value in values)
@@ -234,10 +212,10 @@ def _machine(machine: Machine) -> Section:
     )
     how = f"{unmeasured} of these values were not measured on this machine: assumed, inherited, or default."
     table = Table("", columns, values, row_style=lambda row: "" if row.unmeasured else "bold")
-    return Section("machine", "Machine data used", (table,), how=how, folded=True, printed=False)
+    return model.Section("machine", "Machine data used", (table,), how=how, folded=True, printed=False)
 
 
-def _sheet(conversion: Conversion, provenance: Provenance | None) -> Section:
+def _sheet(conversion: Conversion, provenance: Provenance | None) -> model.Section:
     """The run sheet: what the operator takes to the machine, on one page."""
     output = None if provenance is None else provenance.file("output")
     name = f"{Path(conversion.program).name}, shaped" if output is None else Path(output.name).name
@@ -255,4 +233,4 @@ def _sheet(conversion: Conversion, provenance: Provenance | None) -> Section:
     title = f"Run sheet: {conversion.recommendation}"
     how = "For the operator. Go through it from top to bottom before cycle start."
     points = (restart_table(conversion.restart_points),) if conversion.restart_points else ()
-    return Section("sheet", title, (Notes(tuple(rows), strong), *points), how=how, sheet=True)
+    return model.Section("sheet", title, (model.Notes(tuple(rows), strong), *points), how=how, sheet=True)

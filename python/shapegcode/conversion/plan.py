@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.budget import Budget, Spending, keepable
-from shapegcode.conversion.recommendation import benefits, most_to_gain_um
+from shapegcode.conversion.budget import Budget, Spending
 from shapegcode.conversion.tables import StartedTrials
-from shapegcode.conversion.whole_text import TextWriter, Written, why_kept
+from shapegcode.conversion.whole_text import Aim, TextWriter, Written, why_kept
+from shapegcode.conversion.write import keepable
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.results.table import Column, Table
 from shapegcode.shaping.grid import Grid, choose_grid
 from shapegcode.verdict.figures import Placed, RegionVerdict
-from shapegcode.verdict.judge import Judge, RegionFigures, rapid_vibration_um, simulate_unchanged
+from shapegcode.verdict.judge import Judge, RegionFigures, most_to_gain_um, rapid_vibration_um, simulate_unchanged
 
 if TYPE_CHECKING:
     from shapegcode.conversion.rapids.shape import ShapedRapids
@@ -56,17 +56,20 @@ class Aims:
         self._places = {id(region): index for index, region in enumerate(program.regions)}
         self.reasons = reasons  # why a cut is left unchanged; empty: it is shaped; changed here
         self._asked_um = machine.tolerance.contour_um
-        self.room_um = [machine.tolerance.contour_um * MARGIN] * count
-        """Deviation that its feed is planned for."""
-        self.feed_ratio = [1.0] * count
-        """Of the programmed feed, that it is planned with."""
+        self.room_um = [machine.tolerance.contour_um * _MARGIN] * count  # deviation that its feed is planned for
+        self.feed_ratio = [1.0] * count  # of the programmed feed, that it is planned with
         self.original_s: dict[int, float] = {}
-        self.emitted_s: dict[int, float] = {}
-        """Of every cut that was shaped once, until the set-points rest."""
+        self.emitted_s: dict[int, float] = {}  # of every cut that was shaped once, until the set-points rest
         self._asked_s: dict[int, float] = {}  # likewise, for the tolerance that was asked for
         self._blocks_s: dict[int, float] = {}  # time of its blocks
         self._tried: dict[int, _Attempt] = {}
         self._priced: set[int] = set()  # planned as closely as their price allows, whatever that reaches
+
+    def wanted(self) -> dict[int, Aim]:
+        """For what each cut that is not left unchanged is shaped."""
+        return {
+            index: (self.room_um[index], self.feed_ratio[index]) for index, why in enumerate(self.reasons) if not why
+        }
 
     def index(self, figures_place: object) -> int:
         """Rank of a region of the original."""
@@ -120,7 +123,7 @@ class Aims:
                 continue
             self._tried[index] = _Attempt(room_um[index], reached, overridden)
             room_um[index] = min(room_um[index], written.planned_um.get(index, math.inf))
-            room_um[index] *= MARGIN * limit / reached
+            room_um[index] *= _MARGIN * limit / reached
         return tightened
 
     def keep_cut_price(self, written: Written, keepable: Callable[[int], bool], attempts_left: int) -> bool:
@@ -181,19 +184,19 @@ class Aims:
         return bool(order)
 
     @property
-    def priced(self) -> set[int]:
-        """Cuts that are shaped for the tightest tolerance within their price, because the requested one costs more."""
-        return {index for index in self._priced if not self.reasons[index]}
+    def is_priced(self) -> bool:
+        """Whether cuts are shaped for the tightest tolerance within their price: the requested one costs more."""
+        return any(not self.reasons[index] for index in self._priced)
 
     def shaped_for_um(self, index: int) -> float:
         """Contour tolerance that a cut is shaped for: the requested one, or the tightest within its price."""
-        return max(self._asked_um, self.room_um[index] / MARGIN) if index in self._priced else self._asked_um
+        return max(self._asked_um, self.room_um[index] / _MARGIN) if index in self._priced else self._asked_um
 
     def time_s(self, index: int, tolerance_um: float) -> float:
         """What a cut takes at a contour tolerance: as simulated for the one that was asked for, else as planned."""
         if tolerance_um <= self._asked_um:
             return self._asked_s[index]
-        return min(self._asked_s[index], self._planned_s(index, tolerance_um * MARGIN))
+        return min(self._asked_s[index], self._planned_s(index, tolerance_um * _MARGIN))
 
     def tolerance_curve(self, original_s: float, original_um: float) -> ToleranceCurve | None:
         """Tolerance against time of the program."""
@@ -201,10 +204,10 @@ class Aims:
         if not cuts:
             return None
         asked = self._asked_um
-        wanted = [("as asked", asked), *((f"{factor:g} times", factor * asked) for factor in FACTORS[1:])]
+        wanted = [("as asked", asked), *((f"{factor:g} times", factor * asked) for factor in _FACTORS[1:])]
         if original_um > asked:
             wanted.append(("the original's contour error", original_um))
-        loosest = max(asked, *(self._curve_of(index).planned_um[-1] / MARGIN for index in cuts))
+        loosest = max(asked, *(self._curve_of(index).planned_um[-1] / _MARGIN for index in cuts))
         wanted.append(("no slowing", loosest))
         points = [self._point(name, um, cuts, original_s) for name, um in sorted(wanted, key=lambda each: each[1])]
         tolerances, times = [each.tolerance_um for each in points], [each.time_s for each in points]
@@ -253,12 +256,8 @@ def _bisect(low: float, high: float, is_enough: Callable[[float], bool]) -> floa
     return high
 
 
-MARGIN = 0.95
-"""Of the tolerance, for which a cut is planned: the rest is for rounding and for what the plan leaves out."""
-
-FACTORS = (1.0, 1.25, 1.5, 2.0)
-"""Ratios to the requested tolerance at which a cut is planned."""
-
+_MARGIN = 0.95  # of the tolerance, planned for: the rest is for rounding and for what the plan leaves out
+_FACTORS = (1.0, 1.25, 1.5, 2.0)  # ratios to the requested tolerance at which a cut is planned
 _BETWEEN = (2.8, 4.0, 5.6, 8.0)  # likewise, so that the curve between them is known where a price asks for it
 _FLAT = 0.002  # of the time: a curve that falls by less has no knee
 
@@ -293,6 +292,11 @@ class TolerancePoint:
     is_within_price: bool  # of the program and of each cut
     is_knee: bool = False  # a tighter tolerance costs disproportionately more time
 
+    @property
+    def remarks(self) -> str:
+        """For a table."""
+        return ", ".join(["knee"] * self.is_knee + ["above the price"] * (not self.is_within_price))
+
 
 @dataclass(frozen=True)
 class ToleranceCurve:
@@ -319,7 +323,7 @@ def plan_curve(
     """Plan a cut at several tolerances, from no slowing to the requested one; each search starts from the last
     speeds."""
     wanted = sorted(
-        {*(factor * asked_um for factor in (*FACTORS, *_BETWEEN)), max(original_um, asked_um)}, reverse=True
+        {*(factor * asked_um for factor in (*_FACTORS, *_BETWEEN)), max(original_um, asked_um)}, reverse=True
     )
     tried = [math.inf, *(each * 1e-3 for each in wanted)]
     planned = _core.plan_tolerances(path, fir, options, tried)
@@ -362,7 +366,7 @@ class CutCurves:
         """The curve of a cut."""
         if index in self._known:
             return self._known[index]
-        asked_um = self._machine.tolerance.contour_um * MARGIN
+        asked_um = self._machine.tolerance.contour_um * _MARGIN
         target = "command" if self._machine.shaping.contour != "response" else "response"
         original_um = getattr(self._originals[index].result(), target).max_abs_mm * 1e3
         path = self._program.regions[index].path
@@ -390,15 +394,10 @@ def curve_table(curve: ToleranceCurve) -> Table:
         Column("µm", value="tolerance_um", digits=1),
         Column("program s", value="time_s", digits=2),
         Column("increase %", value="time_increase_percent", digits=1),
-        Column("", value=lambda each: ", ".join(_remarks(each)), text=True),
+        Column("", value="remarks", text=True),
     )
-    return Table(
-        "tolerance against time", columns, curve.points, caption=f"of the cuts that can be shaped: {curve.cuts}"
-    )
-
-
-def _remarks(point: TolerancePoint) -> list[str]:
-    return (["knee"] if point.is_knee else []) + ([] if point.is_within_price else ["above the price"])
+    caption = f"of the cuts that can be shaped: {curve.cuts}"
+    return Table("tolerance against time", columns, curve.points, caption)
 
 
 _NEAR_PRICE = 0.7  # of the price: from here on the time of the program is worked out in full
@@ -470,7 +469,7 @@ class ConversionPlan:
         self.originals_judged: dict[int, RegionFigures] = {}
         self.spending = None if budget is None else Spending(budget, program, machine)
         if budget is None:
-            self.writer.begin(self.reasons, self.aims.room_um, self.aims.feed_ratio)
+            self.writer.begin(self.aims.wanted())
         self.original_within = False  # every cut of the original keeps its limits
         self.original_s = pool.submit(self.model.cycle_time_s, program.core)
         self.rapid_vibration = pool.submit(rapid_vibration_um, program, self.model)
@@ -495,9 +494,9 @@ class ConversionPlan:
         return self.original_s.result() * self.machine.price.program_time_percent / 100.0
 
     def is_benefit(self, shaped: Shaped) -> bool:
-        """Whether a shaped cut gains enough, see `benefits`."""
+        """Whether a shaped cut gains enough."""
         least, limit_um = self.machine.shaping.least_gain_um, self.machine.tolerance.contour_um
-        return any(benefits(verdict, limit_um, least) for verdict in self.verdicts(shaped))
+        return any(verdict.is_benefit(limit_um, least) for verdict in self.verdicts(shaped))
 
     def verdicts(self, shaped: Shaped) -> tuple[RegionVerdict, ...]:
         """Every shaped cut beside its limits."""

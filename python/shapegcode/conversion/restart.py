@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 
 import numpy as np
@@ -22,12 +23,8 @@ from shapegcode.program import Program, between_increments
 from shapegcode.program.stamp import whole_lines
 from shapegcode.verdict.figures import Placed
 
-EXTRA_SYSTEM = 541
-"""G54.1 as the core counts it."""
-
-PLACEHOLDER = "N00000"
-"""N word of a restart point before the program that it stands in is put together."""
-
+EXTRA_SYSTEM = 541  # G54.1 as the core counts it
+PLACEHOLDER = "N00000"  # N word of a restart point before the program that it stands in is put together
 _FIRST_NUMBER, _END_NUMBER = 10_000, 100_000  # five digits, as `PLACEHOLDER`
 _ROUND = 1000
 _N_WORD = re.compile(rb"N *0*([0-9]{1,8})")
@@ -79,12 +76,9 @@ class FreeNumbers:
 
     def __init__(self, program: Program) -> None:
         self._program = program
-        self._free: list[int] | None = None
 
     def first(self, count: int) -> list[int]:
         """N numbers that the program does not use, reproducible and, if possible, ascending."""
-        if self._free is None:
-            self._free = self._found()
         if count > len(self._free):
             raise _core.ProgramError(
                 f"{self._program.source}:1:1: {count} restart points, but only {len(self._free)} N numbers from "
@@ -92,7 +86,8 @@ class FreeNumbers:
             )
         return self._free[:count]
 
-    def _found(self) -> list[int]:
+    @cached_property
+    def _free(self) -> list[int]:
         used = np.zeros(_END_NUMBER, dtype=bool)
         for lines in whole_lines(self._program.core):
             numbers = np.array(_N_WORD.findall(lines.upper()), dtype="S8").astype(np.int64)
@@ -149,12 +144,9 @@ class RestartPlaces:
         self._floor_mm = machine.tolerance.residual_floor_um * 1e-3
         self._tolerance_mm = machine.tolerance.contour_um * 1e-3
         self._omega = 2.0 * math.pi * np.array(slowest_excited_hz(machine))
-        self.last = 0
-        """Period of the last point."""
-        self.longest = 0
-        """Most periods between two of them."""
-        self.reason = _why_none(region)
-        """Why there can be none; empty: there can."""
+        self.last = 0  # period of the last point
+        self.longest = 0  # most periods between two of them
+        self.reason = _why_none(region)  # why there can be none; empty: there can
 
     def low(self, piece: _core.ShapedCommand, at: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
         """Where the commanded speed of a piece is low and a start from rest keeps the contour tolerance."""
@@ -279,13 +271,13 @@ class RegionRestarts:
             block = int(blocks[index])
             begin, behind = lines.extent(block)
             parts += [text[done:begin], point(index) or b""]
+            at_mm = np.where(self._resting, self._region.path.start_mm, ends[block - 1] * self._fit.increment_mm)
+            x, y, z = (round(float(value), 6) for value in at_mm)
             mark = RestartMark(
                 byte=size + begin - done,
                 line=self._lines + text.count(b"\n", 0, begin),
                 time_s=float(periods[index]) * self._fit.block_period_s,
-                position_mm=_millimetres(
-                    np.where(self._resting, self._region.path.start_mm, ends[block - 1] * self._fit.increment_mm)
-                ),
+                position_mm=(x, y, z),
                 speed_mm_per_s=float(speed[index]),
                 vibration_um=float(left[index]) * 1e3,
             )
@@ -306,8 +298,6 @@ class RegionRestarts:
 
 
 class _PointLines:
-    """The lines of a piece, of which some become restart points."""
-
     def __init__(
         self, text: bytes, blocks: int, state: tuple[int, int], region: _core.Region, max_line_length: int
     ) -> None:
@@ -316,7 +306,6 @@ class _PointLines:
         self._begins, self._ends = block_lines(text, blocks)
 
     def extent(self, block: int) -> tuple[int, int]:
-        """Bytes of a block's words."""
         begin, end = int(self._begins[block]), int(self._ends[block])
         return begin, begin + len(self._text[begin:end].rstrip(b"\r\n"))
 
@@ -348,8 +337,3 @@ class _PointLines:
                 return bytes(found[-1])
             end = begin - 1
         return before
-
-
-def _millimetres(position: FloatArray) -> tuple[float, float, float]:
-    x, y, z = (round(float(value), 6) for value in position)
-    return x, y, z

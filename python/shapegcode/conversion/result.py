@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.operating import ControlNote, control_table, restart_table
 from shapegcode.conversion.plan import ToleranceCurve, curve_table
-from shapegcode.conversion.recommendation import FilterAdvice, Grade
 from shapegcode.conversion.restart import RestartPoint
 from shapegcode.conversion.tables import (
     BeforeAfter,
@@ -40,6 +39,16 @@ _LEAST_SHOWN_UM = 0.05
 _DEVIATIONS = {"max": "largest", "rms": "RMS", "gouge": "gouge", "excess": "excess"}
 
 
+Grade = Literal[
+    "worth running",
+    "better, tolerance not met",
+    "already within tolerance: shaping is optional",
+    "no benefit: run the original",
+    "do not run",
+]
+"""From the best down; the first that applies from the end is the answer."""
+
+
 @dataclass(frozen=True)
 class ChangeProof:
     """What is unchanged in an emitted program."""
@@ -66,6 +75,26 @@ class DialectNotes:
         return f"written for {self.control} (emission.dialect = {self.name}){assumed}"
 
 
+@dataclass(frozen=True)
+class FilterAdvice:
+    """A contour error caused by the control's own filter, and its remedy without shaping."""
+
+    key: str  # of the machine file, the filter's time constant
+    now_s: float  # its value
+    enough_s: float  # at which every cut of the original keeps its limits, simulated
+    rounding_um: float  # contour error of the command, which the filter makes
+    lines: tuple[int, int]  # of the cut in which it is largest
+
+    def __str__(self) -> str:
+        lower = f"lowered to {self.enough_s * 1e3:.3g} ms" if self.enough_s > 0.0 else "switched off"
+        return (
+            f"the control's {self.now_s * 1e3:.3g} ms filter rounds the path by {self.rounding_um:.0f} µm "
+            "(lines {} to {})".format(*self.lines)
+            + f": {lower} ({self.key}), or with contour control, the original "
+            "keeps every limit without shaping"
+        )
+
+
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class Conversion(ProgramFigures, Result):
     """A program, shaped: the emitted program, and what simulating it beside the original showed.
@@ -73,7 +102,7 @@ class Conversion(ProgramFigures, Result):
     Attributes:
         program: name of the original.
         machine: name of the machine.
-        recommendation: what to do with it: one of the five grades of `recommendation.GRADES`.
+        recommendation: what to do with it: one of the five values of `Grade`.
         reason: of the recommendation, in words.
         cuts: every cut, shaped or left unchanged, with its gain and its price.
         tolerance_curve: what other contour tolerances cost in time; null: not worked out, or nothing can be shaped.
@@ -220,12 +249,15 @@ class Conversion(ProgramFigures, Result):
         if worst_stay and best.is_shaped:
             beside = "; the worst cuts are left unchanged, lines {} to {} are better by ".format(*best.lines)
             beside += f"{best.gain_um:.1f} µm"
+        share, shaped = "", len(self.regions)
+        if shaped < len(self.cuts):
+            share = f" ({shaped} of {len(self.cuts)} cuts shaped, the others unchanged)"
         shown = f"residual vibration {axis.upper()} {vibration.original[axis]:.1f} → {vibration.emitted[axis]:.1f} µm, "
         if shown.count(" 0.0 ") == 2:
             shown = ""  # the gain is in the contour
         return (
             f"{verdict}: {shown}contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}"
-            f"{self._share}{beside}"
+            f"{share}{beside}"
         )
 
     def _why_unchanged(self) -> str:
@@ -246,18 +278,11 @@ class Conversion(ProgramFigures, Result):
             yield "lines {} to {}: ".format(*cut.lines) + f"{cut.misses[0]}; {how}{remedy}{more}"
 
     def _cost_of(self, cut: CutOutcome) -> str:
-        """Why a shaped cut does not keep its tolerance, as far as its price is the reason."""
         if cut.tolerance_um > self.limits.contour_um:
             asked = self.tolerance_curve.points[0] if self.tolerance_curve is not None else None
             cost = f", {asked.tolerance_um:.3g} µm would cost {asked.time_increase_percent:+.3g} %" if asked else ""
             return f"shaped for {cut.tolerance_um:.3g} µm within the price{cost}"
         return "shaped as closely as the feed allows"
-
-    @property
-    def _share(self) -> str:
-        """Of which cuts some are left unchanged."""
-        shaped = len(self.regions)
-        return f" ({shaped} of {len(self.cuts)} cuts shaped, the others unchanged)" if shaped < len(self.cuts) else ""
 
     @property
     def next_step(self) -> str:
@@ -310,11 +335,8 @@ class Conversion(ProgramFigures, Result):
         if self.nothing_shaped:
             return [*cuts, *curve] if any(cut.misses for cut in self.cuts) else cuts
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
-        rests = (
-            [sensitivity_table(self.parameter_sensitivity, self.unverified_parameters_tested)]
-            if self.parameter_sensitivity
-            else []
-        )
+        unverified = self.parameter_sensitivity
+        rests = [sensitivity_table(unverified, self.unverified_parameters_tested)] if unverified else []
         points = [restart_table(self.restart_points)] if self.restart_points else []
         before_after = before_after_table(self.before_after())
         return [before_after, *cuts, *curve, *cases, *rests, control_table(self.at_the_control), *points]
@@ -323,18 +345,15 @@ class Conversion(ProgramFigures, Result):
         """Every figure of original and emitted, in groups."""
         pairs = (("cycle time", self.cycle_time_s), ("cutting time", self.cutting_time_s))
         times = [BeforeAfter(name, "s", pair.original, pair.emitted, 3) for name, pair in pairs]
-        return [times, *self._vibrations(), *self._contours(), self._orbits(), self._feeds(), self._sizes()]
+        return [times, *self._vibrations(), *self._contours(), *self._orbits_and_feeds(), self._sizes()]
 
     def _vibrations(self) -> Iterator[list[BeforeAfter]]:
         for key, name in _VIBRATIONS.items():
             both: Pair[Xyz[float]] = getattr(self, key)
+            limits = {axis: self.residual_limit_um(axis) for axis in "xyz" if name.startswith("residual")}
             yield [
                 BeforeAfter(
-                    f"{name} {axis.upper()}",
-                    "µm",
-                    both.original[axis],
-                    both.emitted[axis],
-                    limit=self.residual_limit_um(axis) if name.startswith("residual") else None,
+                    f"{name} {axis.upper()}", "µm", both.original[axis], both.emitted[axis], limit=limits.get(axis)
                 )
                 for axis in "xyz"
                 if both.original[axis] or both.emitted[axis]
@@ -370,21 +389,15 @@ class Conversion(ProgramFigures, Result):
                     rows.append(BeforeAfter(f"{name}, {suffix}", "µm", original, emitted, limit=limit))
             yield rows
 
-    def _orbits(self) -> list[BeforeAfter]:
-        errors = self.orbit_error_percent
-        if not errors:
-            return []
-        name = "orbit error" if len(errors) == 1 else f"largest orbit error of {len(errors)} arcs"
-        return [BeforeAfter(name, "%", None, max(errors, key=abs), 4)]
-
-    def _feeds(self) -> list[BeforeAfter]:
-        if self.feed_excess is None:
-            return []
-        above, limit = max(0.0, self.feed_excess.ratio - 1.0) * 100.0, self.limits.feed_excess_ratio * 100.0
-        return [BeforeAfter("speed above the programmed feed", "%", None, above, limit=limit)]
+    def _orbits_and_feeds(self) -> Iterator[list[BeforeAfter]]:
+        if errors := self.orbit_error_percent:
+            name = "orbit error" if len(errors) == 1 else f"largest orbit error of {len(errors)} arcs"
+            yield [BeforeAfter(name, "%", None, max(errors, key=abs), 4)]
+        if self.feed_excess is not None:
+            above, limit = max(0.0, self.feed_excess.ratio - 1.0) * 100.0, self.limits.feed_excess_ratio * 100.0
+            yield [BeforeAfter("speed above the programmed feed", "%", None, above, limit=limit)]
 
     def _sizes(self) -> list[BeforeAfter]:
-        """Figures of the emitted program and its shaper."""
         rows = [
             BeforeAfter("blocks", "", self.blocks.read, self.blocks.emitted, 0),
             BeforeAfter("size of the program", "bytes", self.bytes_read, self.bytes_emitted, 0),

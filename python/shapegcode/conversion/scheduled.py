@@ -182,7 +182,7 @@ def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, m
         if load is None or part.tool is None:
             loads.append(load)
             continue
-        window_s = 60.0 / (part.tool.tool.flutes * part.spindle_rev_per_min)
+        window_s = part.window_s
         along = part.region.path
         place = placed.get(id(region))
         if place is None:

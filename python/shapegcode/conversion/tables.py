@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -17,13 +18,11 @@ from shapegcode.results.json import OldNames
 from shapegcode.results.outcome import Pair, Xyz
 from shapegcode.results.table import NO_BREAK, Column, Table
 from shapegcode.settings.keys import KeyValue
-from shapegcode.verdict.cases import Case, CaseFigures, LimitCheck, RegionLimits, case_figures, judge_region, unbroken
-from shapegcode.verdict.figures import Placed, RegionVerdict
+from shapegcode.verdict.cases import Case, CaseFigures, case_figures, judge_region, unbroken
+from shapegcode.verdict.figures import Placed
 from shapegcode.verdict.judge import Judge, RegionFigures
 
-LEAST_SHARE = 0.01
-"""Of a limit: a value that moves its figure by less does not matter."""
-
+_LEAST_SHARE = 0.01  # of a limit: a value that moves its figure by less does not matter
 _MOST_SHOWN = 8
 _FREE_S = 60.0  # of motion: so much is always simulated
 _FULL_RUNS = 2  # about half as often as a verdict simulates every region with its contour
@@ -54,8 +53,6 @@ class Sensitivity(OldNames):
 
 @dataclass(frozen=True)
 class _Trial:
-    """A value that is changed, and how the region is then simulated."""
-
     value: KeyValue
     tested_value: str  # in words
     machine: Machine
@@ -95,18 +92,20 @@ class _Region:
 
     @property
     def moving(self) -> str:
-        """Letters of the axes that move in it."""
         extent_mm = self.place.region.path.extent_mm
         return "".join(axis for axis, extent in zip("xyz", extent_mm, strict=True) if extent > 0.0)
 
-    def limits(self, figures: RegionFigures) -> RegionLimits:
-        """What it is judged by."""
-        return self.judge.limits(figures, self.place)
-
-    def before(self, figures: RegionFigures) -> dict[str, LimitCheck]:
-        """Its judged figures as it is meant to run, under the controller's own rule of block timing."""
+    def sensitivity(self, value: KeyValue, tested: str, figures: RegionFigures, simulated: CaseFigures) -> Sensitivity:
+        """The figure that a value moves furthest towards its limit, from what it is as the region is meant to run."""
+        limits = self.judge.limits(figures, self.place)
         own = figures.emitted[self.judge.rules.index(self.judge.own_rule)]
-        return {each.figure: each for each in judge_region(case_figures(own), self.limits(figures))}
+        before = {each.figure: each for each in judge_region(case_figures(own), limits)}
+        after = max(judge_region(simulated, limits), key=lambda each: each.share - before[each.figure].share)
+        unit = f" {value.unit}" if value.unit not in ("", "1") and value.value not in ("not set", "[]") else ""
+        shown = "none" if value.value == "[]" else value.value + unit
+        origin = "assumed" if value.assumed else value.origin
+        figure_um = before[after.figure].value_um
+        return Sensitivity(value.key, shown, origin, tested, after.figure, figure_um, after.value_um, after.limit_um)
 
 
 def start_trials(
@@ -149,37 +148,23 @@ def parameter_sensitivity(
         running.append(pool.submit(region.simulate, trial, contour=left_s >= 0.0) if run is None else run)
     rows = []
     for done, ((region, figures, trial), run) in enumerate(zip(trials, running, strict=True), start=1):
-        checks = judge_region(run.result(), region.limits(figures))
-        rows.append(_sensitivity(trial.value, trial.tested_value, region.before(figures), checks))
+        rows.append(region.sensitivity(trial.value, trial.tested_value, figures, run.result()))
         on_step(done, len(trials))
     rows += _from_cases(machine, deciding, decided)
     return _ranked(rows), len({row.key for row in rows})
-
-
-def _sensitivity(
-    value: KeyValue, tested: str, before: Mapping[str, LimitCheck], checks: Sequence[LimitCheck]
-) -> Sensitivity:
-    """The figure that a value moves furthest towards its limit."""
-    after = max(checks, key=lambda each: each.share - before[each.figure].share)
-    unit = f" {value.unit}" if value.unit not in ("", "1") and value.value not in ("not set", "[]") else ""
-    shown = "none" if value.value == "[]" else value.value + unit
-    origin = "assumed" if value.assumed else value.origin
-    figure_um = before[after.figure].value_um
-    return Sensitivity(value.key, shown, origin, tested, after.figure, figure_um, after.value_um, after.limit_um)
 
 
 def _ranked(rows: Sequence[Sensitivity]) -> tuple[Sensitivity, ...]:
     """The worst of each key, the furthest first; an axis that may have a mode or not is always named."""
     worst: dict[str, Sensitivity] = {}
     for row in rows:
-        matters = row.share >= LEAST_SHARE or row.key.endswith(".modes")
+        matters = row.share >= _LEAST_SHARE or row.key.endswith(".modes")
         if matters and (row.key not in worst or row.share > worst[row.key].share):
             worst[row.key] = row
     return tuple(sorted(worst.values(), key=lambda row: -row.share)[:_MOST_SHOWN])
 
 
 def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
-    """What is tried, the most likely to matter first."""
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
     now_s = machine.controller.shaped_time_constant_s
     other_s = 1.2 * now_s if now_s else _FILTER_S
@@ -192,19 +177,11 @@ def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
     yield from _other_command(freed, unmeasured, "controller.interpolation_period_s", period_s)
 
 
-def _changed(machine: Machine, key: str, value: object) -> Iterator[Machine]:
-    """The machine with another value; nothing where the file could not have it."""
-    try:
-        yield machine.with_values(key, value)
-    except MachineError:
-        return
-
-
 def _other_command(machine: Machine, unmeasured: Mapping[str, KeyValue], key: str, other_s: float) -> Iterator[_Trial]:
-    """Another time with which the set-points are others too."""
-    if key in unmeasured:
-        for each in _changed(machine, key, other_s):
-            yield _Trial(unmeasured[key], f"{other_s:g} s", each, moves_command=True)
+    """Another time with which the set-points are others too; nothing where the file could not have it."""
+    with suppress(MachineError):
+        if key in unmeasured:
+            yield _Trial(unmeasured[key], f"{other_s:g} s", machine.with_values(key, other_s), moves_command=True)
 
 
 def unknown_axes(machine: Machine) -> dict[str, KeyValue]:
@@ -224,7 +201,6 @@ def _with_usual_modes(machine: Machine, letters: Iterable[str]) -> Machine:
 
 
 def _axis_trials(machine: Machine) -> dict[str, _Trial]:
-    """Each unknown axis with a usual mode."""
     unknown = unknown_axes(machine)
     return {axis: _Trial(value, _USUAL_MODE, _with_usual_modes(machine, axis)) for axis, value in unknown.items()}
 
@@ -274,8 +250,9 @@ def _shares(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -
             mode, stem = getattr(machine.axes, letter).modes[number - 1], f"axes.{letter}.modes.{number}"
             stated = mode.damping_uncertainty_percent if name == "damping_ratio" else None
             percent = sign * (stated if stated is not None else _PERCENT[name])
-            for each in _changed(machine, f"{stem}.{name}", getattr(mode, name) * (1.0 + percent / 100.0)):
-                yield _Trial(unmeasured[f"{stem}.{name}"], f"{percent:+g} %", each)
+            with suppress(MachineError):
+                other = machine.with_values(f"{stem}.{name}", getattr(mode, name) * (1.0 + percent / 100.0))
+                yield _Trial(unmeasured[f"{stem}.{name}"], f"{percent:+g} %", other)
 
 
 def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> Iterator[Sensitivity]:
@@ -284,9 +261,7 @@ def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> It
     for case, simulated in zip(region.judge.cases, figures.cases, strict=True):
         key, tested = _key_of(case)
         if not case.counts and key in unmeasured and simulated is not None:
-            yield _sensitivity(
-                unmeasured[key], tested, region.before(figures), judge_region(simulated, region.limits(figures))
-            )
+            yield region.sensitivity(unmeasured[key], tested, figures, simulated)
 
 
 def _key_of(case: Case) -> tuple[str, str]:
@@ -375,7 +350,6 @@ def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
 
 
 def _figure(row: Sensitivity) -> str:
-    """A short name of the figure, and how far it moves."""
     name = row.figure.replace("residual vibration", "residual").replace("contour error", "contour")
     return f"{name.partition(' of ')[0]} " + f"{row.figure_um:.1f} → {row.tested_um:.1f}".replace(" ", NO_BREAK)
 
@@ -413,36 +387,7 @@ class CutOutcome(OldNames):
         return self.time_s.original
 
 
-def outcome_of(
-    cut: RegionVerdict,
-    *,
-    is_shaped: bool,
-    reason: str,
-    gain_um: float,
-    tolerance_um: float,
-    tool: int | None,
-    size: Pair[int],
-) -> CutOutcome:
-    """A row of the table."""
-    residual = cut.residual_vibration_um
-    return CutOutcome(
-        lines=cut.lines,
-        emitted_lines=cut.emitted_lines,
-        tool=tool,
-        is_shaped=is_shaped,
-        reason=reason,
-        gain_um=gain_um,
-        residual_um=Pair(max(residual.original), max(residual.emitted)),
-        contour_um=Pair(cut.original_contour_error_um, cut.contour_error_um),
-        tolerance_um=tolerance_um,
-        time_s=cut.time_s,
-        bytes=size,
-        misses=cut.misses,
-        remedy="" if is_shaped or not cut.misses else _remedy(reason),
-    )
-
-
-def _remedy(reason: str) -> str:
+def remedy_for(reason: str) -> str:
     """What the reason of a cut left unchanged suggests."""
     if "price." in reason:
         return "allow more time (--max-cut-time-increase, --max-time-increase) or a larger --contour-tolerance"

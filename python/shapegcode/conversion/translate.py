@@ -96,13 +96,11 @@ def require_dialect(program: Program, machine: Machine, budget: Budget | None) -
     if budget is not None and (dialect.one_code or (budget.limits_rate and other_blocks)):
         raise _core.ArgumentError(
             f"budgets are computed for FANUC's blocks only, not for {dialect.control} (emission.dialect = {name}): "
-            "give "
-            f"{'none' if dialect.one_code else '--max-bytes alone'}"
+            f"give {'none' if dialect.one_code else '--max-bytes alone'}"
         )
     decimals = machine.emission.position_decimals
-    for region in program.regions:
-        if decimals is None:
-            break
+    for region in program.regions if decimals is not None else ():
+        assert decimals is not None
         inch = region.exit.units == 20
         limit_mm = (10.0 ** (7 - decimals) * MM_PER_INCH) if inch else 10.0 ** (8 - decimals)
         reach_mm = float(np.abs(region.path.polyline(1.0)).max())
@@ -154,8 +152,6 @@ def translated(conversion: Conversion) -> Translation | None:
 
 @dataclass
 class _State:
-    """What is in force behind a line, as far as the writing depends on it."""
-
     motion: int
     unit: str
     incremental: bool = False
@@ -172,8 +168,6 @@ class _State:
 
 
 class _Translator:
-    """Writes the program for another control line by line."""
-
     def __init__(
         self,
         dialect: Dialect,
@@ -183,8 +177,7 @@ class _Translator:
         shaped: Sequence[tuple[_core.Path, tuple[int, int], tuple[int, int]]],
         block_period_s: float,
     ) -> None:
-        self._program, self._machine, self._original = program, machine, original
-        self._dialect = dialect
+        self._program, self._machine, self._original, self._dialect = program, machine, original, dialect
         self._own = {code_name(word): text for word, text in machine.emission.words.items()}
         self._shaped = shaped
         self.state = _State(int(machine.power_on.motion[1:]), machine.power_on.units)
@@ -199,11 +192,13 @@ class _Translator:
         self._arcs = dict(_arcs(program)) if self._dialect.chord_tolerance_mm else {}
         self._times: dict[int, str] = {}
         self._firsts, self._lasts = set[int](), set[int]()
-        foreign = self._original.foreign
-        same_control = foreign is not None and foreign.dialect == machine.emission.dialect
-        self._names = foreign.settings.names if foreign is not None and same_control else {}
+        foreign = original.foreign
+        settings = None
+        if foreign is not None and foreign.dialect == machine.emission.dialect:
+            settings = foreign.settings
+        self._names = {} if settings is None else settings.names
         # Cuts that are left unchanged keep the path tolerance of the program.
-        self._tolerance = foreign.settings.path_tolerance_mm if foreign is not None and same_control else None
+        self._tolerance = None if settings is None else settings.path_tolerance_mm
         self._begins = {first for _, (first, _), _ in shaped}
         self._ends = {last for _, (_, last), _ in shaped}
         self._is_shaped = False
@@ -309,7 +304,6 @@ class _Translator:
         return [*comments, *dialect.opening, *self._block(0, "", words, ()), *self._block(0, "", start, ())]
 
     def _move(self, number: int, line: str, move: re.Match[str]) -> list[str]:
-        """A line of nothing but motion, with a point in every number."""
         if move[2] is not None:
             self.state.motion, self.state.cycle = int(move[2]), False
         dialect = self._dialect
@@ -322,7 +316,6 @@ class _Translator:
         return [line]
 
     def _frame(self, body: str, comments: Sequence[str], line: str) -> list[str]:
-        """`%`, the program's number or name, comments."""
         dialect = self._dialect
         if _MARK_LINE.fullmatch(line.strip()):
             return ["(TEXT 00000000)"] if dialect.comment == "(" else []
@@ -339,12 +332,10 @@ class _Translator:
         return shown or [""]
 
     def name(self) -> str:
-        """Of the program, where the control wants one."""
         found = re.search(rb"(?m)^[O:](\d+)", self._program.core.slice(0, min(self._program.core.size, 4096)))
         return f"O{found[1].decode()}" if found else "SHAPED"
 
     def _block(self, number: int, skip: str, words: Sequence[tuple[str, str]], comments: Sequence[str]) -> list[str]:
-        """A block of words."""
         codes = [code_name(letter + value) for letter, value in words if letter in "GM"]
         before, behind, out = [], [], []
         for code in codes:
@@ -416,7 +407,6 @@ class _Translator:
         return any(not CODE.fullmatch(text) for text in own)
 
     def _note(self, code: str) -> None:
-        """Keep what a code puts into force."""
         state = self.state
         if code in _MOTION:
             state.motion, state.cycle = int(code[1:]), False
@@ -448,7 +438,11 @@ class _Translator:
             if code == "G43" and dialect.arc_radius == "CR=":
                 return "D1"
             if code not in dialect.same and code not in dialect.becomes:
-                raise self._refusal(number, code)
+                here, there = fanuc_meaning(code), dialect.means.get(code, "not known")
+                raise self._error(
+                    number, f"{code} is {here} on FANUC, and {there} on {dialect.control}: delete it, or state a "
+                    f'replacement: emission.words = {{ "{code}" = "..." }}'
+                )  # fmt: skip
             if code in dialect.cautions and number > 0:
                 self.cautions[code] = f"{self._where(number)}: {code}: {dialect.cautions[code]}"
             short = letter + (value.lstrip("0") or "0") if dialect.short_codes else letter + value
@@ -521,7 +515,6 @@ class _Translator:
     def _split(
         self, number: int, codes: Sequence[str], words: Sequence[tuple[str, str]], out: Sequence[str]
     ) -> list[str]:
-        """A line for each code, and the move with its own G."""
         named, state = dict(words), self.state
         lines, late, move = list[str](), list[str](), list[str]()
         for (letter, value), text in zip(words, out, strict=True):
@@ -545,7 +538,6 @@ class _Translator:
         return [*lines, " ".join(filter(None, [f"G{state.motion}", *move, feed])), *late]
 
     def _chords(self, number: int, words: Sequence[tuple[str, str]], feed: str) -> list[str]:
-        """An arc as lines from one of its points to the next."""
         arc, named = self._arcs.get(number), dict(words)
         if arc is None:
             raise self._error(number, "an arc whose start is not known cannot be written as chords")
@@ -570,7 +562,6 @@ class _Translator:
         return "{}:{}".format(*self._place(number))
 
     def _place(self, number: int) -> tuple[str, int]:
-        """File and line of the original from which a line comes."""
         shift = 0
         for _, lines, original in self._shaped:
             if number <= lines[1]:
@@ -583,21 +574,12 @@ class _Translator:
     def _error(self, number: int, message: str) -> _core.ProgramError:
         return located_error(*self._place(number), 1, message)
 
-    def _refusal(self, number: int, code: str) -> _core.ProgramError:
-        here = fanuc_meaning(code)
-        there = self._dialect.means.get(code, "not known")
-        return self._error(
-            number, f"{code} is {here} on FANUC, and {there} on {self._dialect.control}: delete it, or state a "
-            f'replacement: emission.words = {{ "{code}" = "..." }}'
-        )  # fmt: skip
-
 
 _BEHIND_THE_MOVE = {"M00", "M01", "M02", "M05", "M09", "M30"}
 _CURE = ": delete it in the program, or state a replacement (emission.words)"
 
 
 def _arcs(program: Program) -> Iterator[tuple[int, _core.Segment]]:
-    """Arcs by their lines."""
     for region in program.regions:
         for number, line in enumerate(region.path.segment_lines):
             if (segment := region.path[number]).kind == _core.SegmentKind.arc:

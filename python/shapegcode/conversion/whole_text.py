@@ -13,9 +13,17 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.budget import TransferLoad, keepable, measure_load
 from shapegcode.conversion.restart import CutRestarts, FreeNumbers
-from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionText, RegionWriter, Room
+from shapegcode.conversion.write import (
+    EmittedRegion,
+    NoRoomError,
+    RegionText,
+    RegionWriter,
+    Room,
+    TransferLoad,
+    keepable,
+    measure_load,
+)
 from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
@@ -28,15 +36,12 @@ from shapegcode.verdict.figures import Placed
 
 T = TypeVar("T")
 
-OnShare = Callable[[float], None]
-"""Called with how much of a part is done, 0 to 1."""
+OnShare = Callable[[float], None]  # called with how much of a part is done, 0 to 1
+Step = Callable[[float, int], None]
+Aim = tuple[float, float]  # tolerance, µm, and share of the feed for which a region is shaped
 
 _WAITING = 2  # parts per core that are under way or done and not yet taken: what bounds the memory
 _MOST_PERIODS = 10_000_000  # of a region: what fits into half a gigabyte
-
-Step = Callable[[float, int], None]
-Aim = tuple[float, float]
-"""Tolerance, µm, and share of the feed for which a region is shaped."""
 
 
 def why_kept(program: Program, region: _core.Region, machine: Machine, grid: Grid) -> str:
@@ -81,8 +86,7 @@ class Written:
     placed: list[Placed]  # its shaped regions
     blocks: int  # shaped blocks in it
     kept_warnings: list[str]  # a sentence for every region that is left unchanged
-    # per index of a shaped region the deviation that its feed was planned for, µm, where the contour is kept by a
-    # target
+    # per index of a shaped region the deviation that its feed was planned for, µm, where a target keeps the contour
     planned_um: dict[int, float]
     loads: dict[int, TransferLoad]  # per index of a shaped region what it asks of memory, line and control
     # per index of a region that was to be shaped and is left unchanged why there is no room for it
@@ -160,10 +164,7 @@ class TextWriter:
     """Writes a program with its regions shaped on one grid."""
 
     def __init__(self, program: Program, model: MachineModel, grid: Grid, pool: Executor) -> None:
-        self._program = program
-        self._machine = model.machine
-        self._model = model
-        self.grid = grid
+        self._program, self._machine, self._model, self.grid = program, model.machine, model, grid
         self._regions = RegionWriter(model, grid)
         self._numbers = FreeNumbers(program)
         self._pool = pool
@@ -172,9 +173,8 @@ class TextWriter:
         self._loads: dict[int, TransferLoad] = {}
         self._started: tuple[dict[int, Aim], Prefetch[EmittedRegion]] | None = None
 
-    def begin(self, reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> None:
+    def begin(self, aims: dict[int, Aim]) -> None:
         """Begin to shape a few long regions on cores that would wait else, before anything is known of their gain."""
-        aims = _aims(reasons, room_um, feed_share)
         if len(aims) < cores():
             self._started = aims, self._ahead(aims, lambda _done: None)
             self._started[1].start()
@@ -186,14 +186,9 @@ class TextWriter:
         return self._regions.options(limits, self._regions.tolerance(), offset)
 
     def write(
-        self,
-        reasons: Sequence[str],
-        room_um: Sequence[float],
-        feed_share: Sequence[float],
-        unreported: Collection[int] = (),
-        on_progress: Step = lambda _done, _total: None,
+        self, reasons: Sequence[str], aims: Mapping[int, Aim], unreported: Collection[int], on_progress: Step
     ) -> Written:
-        """The whole text."""
+        """The whole text; `reasons`: why a region is left unchanged."""
         core, regions = self._program.core, self._program.regions
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)
@@ -201,7 +196,6 @@ class TextWriter:
         written = Written([], [], 0, [], 0, [], {}, {}, {}, set(), {}, [])
         blocks, size = 0, core.size
         begin = sum(map(len, parts))
-        aims = _aims(reasons, room_um, feed_share)
         # Moves that stay as they are: all, less those of the regions that are shaped.
         shaped_moves = sum(len(regions[index].path) for index in aims)
         kept_moves = core.move_count - shaped_moves
@@ -211,26 +205,23 @@ class TextWriter:
             position = region.text_end
             line += between.count(b"\n")
             begin += len(between)
-            shaped = None
+            shaped, bytes_read = None, region.text_end - region.text_begin
             if not reason:
-                size -= region.text_end - region.text_begin
                 try:
                     shaped = self._shaped_region(index, aims[index], ahead)
-                    self._room(size, blocks + kept_moves).require(shaped.text.size, shaped.blocks)
+                    self._room(size - bytes_read, blocks + kept_moves).require(shaped.text.size, shaped.blocks)
                 except NoRoomError as error:
                     shaped = None
                     written.no_room[index] = str(error)
+                    kept_moves += len(region.path)
             if shaped is None:
                 if index not in unreported:
                     written.kept_warnings.append(self._keep(region, written.no_room.get(index, reason)))
                 texts: Sequence[bytes] = [core.slice(region.text_begin, region.text_end)]
-                if index in written.no_room:
-                    size += region.text_end - region.text_begin
-                    kept_moves += len(region.path)
             else:
                 written.restarts.append(self._numbered(shaped, written.restarts))
                 texts = shaped.text.parts()
-                size += shaped.text.size
+                size += shaped.text.size - bytes_read
                 blocks += shaped.blocks
                 written.placed.append(Placed(region, line, line + _lines(texts) - 1))
                 written.texts.append((shaped.text, begin))
@@ -239,7 +230,7 @@ class TextWriter:
                     written.unslowed.add(index)
                 if shaped.planned_um > 0.0:
                     written.planned_um[index] = shaped.planned_um
-                written.loads[index] = self._load(index, region, shaped)
+                written.loads[index] = self._loads[index]
             line += _lines(texts)
             begin += sum(map(len, texts))
             parts += [between, *texts]
@@ -257,16 +248,7 @@ class TextWriter:
         numbered = (replace(mark, number=number) for mark, number in zip(marks, numbers, strict=True))
         return replace(shaped.restarts, marks=tuple(numbered))
 
-    def _load(self, index: int, region: _core.Region, shaped: EmittedRegion) -> TransferLoad:
-        if index not in self._loads:
-            bits = self._machine.controller.dnc_bits_per_character
-            self._loads[index] = measure_load(region, shaped, self.grid, bits)
-            shaped.block_periods.clear()  # nobody else asks for them
-            shaped.block_bytes.clear()
-        return self._loads[index]
-
     def _room(self, size: int, moves: int) -> Room:
-        """Room for a region beside the rest of the program, all else as it is."""
         controller = self._machine.controller
         return Room(controller.max_program_bytes - size, controller.max_program_moves - moves, self._machine)
 
@@ -280,11 +262,11 @@ class TextWriter:
         regions = self._program.regions
         # None may have more than the whole program; beside the others it may turn out to be too much nevertheless.
         room = self._room(0, 0)
-
-        def shaping(index: int, region: _core.Region, aim: Aim) -> Callable[[OnShare], EmittedRegion]:
-            return lambda on_share: self._shaped_anew(region, *aim, room, on_share)
-
-        tasks = {index: shaping(index, regions[index], aim) for index, aim in aims.items() if self._is_new(index, aim)}
+        tasks = {
+            index: partial(self._shaped_anew, regions[index], *aim, room)
+            for index, aim in aims.items()
+            if self._is_new(index, aim)
+        }
         weights = {index: float(len(regions[index].path)) for index in aims}
         return Prefetch(self._pool, tasks, weights, on_moves)
 
@@ -293,8 +275,12 @@ class TextWriter:
 
     def _shaped_region(self, index: int, aim: Aim, ahead: Prefetch[EmittedRegion]) -> EmittedRegion:
         if self._is_new(index, aim):
-            self._shaped[index] = aim, ahead.result(index)
-            self._loads.pop(index, None)
+            shaped = ahead.result(index)
+            bits = self._machine.controller.dnc_bits_per_character
+            self._loads[index] = measure_load(self._program.regions[index], shaped, self.grid, bits)
+            shaped.block_periods.clear()  # nobody else asks for them
+            shaped.block_bytes.clear()
+            self._shaped[index] = aim, shaped
         else:
             ahead.skip(index)
         return self._shaped[index][1]
@@ -310,7 +296,6 @@ class TextWriter:
             raise self._program.region_error(region, str(error)) from error
 
     def _keep(self, region: _core.Region, reason: str) -> str:
-        """The warning for a region that is left unchanged."""
         if not keepable(region, self._machine):
             why = f"{reason}; its arcs have absolute centres and cannot be left unchanged"
             raise self._program.region_error(region, why)
@@ -318,7 +303,6 @@ class TextWriter:
         return f"{place}: {self._program.lines(region)} left unchanged: {reason}"
 
     def _opening(self, *, shapes: bool) -> bytes:
-        """Header comments where something is shaped, and the guards of expanded radii."""
         radii_mm = self._program.core.expanded_radii_mm
         lines = guard_lines(radii_mm, self._machine)
         if self._machine.emission.header and shapes:
@@ -345,14 +329,7 @@ def _lines(parts: Sequence[bytes]) -> int:
     return sum(part.count(b"\n") for part in parts)
 
 
-def _aims(reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> dict[int, Aim]:
-    """For what each region that is not left unchanged is shaped."""
-    return {index: (room_um[index], feed_share[index]) for index, why in enumerate(reasons) if not why}
-
-
 _LARGEST_SWEEP_RAD = math.pi / 2
-
-
 _STATE_FIELDS = (
     "motion", "plane", "distance", "feed_mode", "units", "compensation", "length_offset",
     "cycle", "cycle_return", "coordinate_system", "exact_stop", "feed",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
@@ -38,8 +38,7 @@ class RegionText:
         self._parts: Sequence[bytes] | None = parts
         self._inside: tuple[Program, int] | None = None
         self._numbers: Sequence[int] = ()
-        self.size = sum(map(len, parts))
-        """Bytes."""
+        self.size = sum(map(len, parts))  # bytes
 
     def parts(self) -> Sequence[bytes]:
         """The text, in as many parts as it has."""
@@ -71,10 +70,6 @@ class RegionText:
         """Whether the text is part of a program's text."""
         self._parts, self._inside = None, (program, begin)
 
-    def joined(self) -> bytes:
-        """The text in one."""
-        return b"".join(self.parts())
-
 
 @dataclass(frozen=True)
 class EmittedRegion:
@@ -89,6 +84,34 @@ class EmittedRegion:
     restarts: CutRestarts  # blocks of it at which the control can begin
     is_slowed: bool = True  # it is slower than without a contour tolerance
     duration_s: float = 0.0  # of its blocks
+
+
+@dataclass(frozen=True)
+class TransferLoad:
+    """Memory, data rate and block rate that a shaped region needs."""
+
+    extra_bytes: int  # size of its text less that of the original's
+    baud: float  # what its section with the most blocks per second needs of the line, bit/s
+    blocks_per_second: float  # blocks in its busiest stretch
+
+
+def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
+    """The data rate of a shaped cut over windows of the shaper's duration, the shortest in which it can change."""
+    durations = np.concatenate(shaped.block_periods, dtype=np.float64)
+    durations *= grid.block_period_s
+    window_s = max(grid.duration_s, grid.block_period_s)
+    sizes = np.concatenate(shaped.block_bytes, dtype=np.float64)
+    characters = _core.busiest_per_s(durations, sizes, window_s)
+    return TransferLoad(
+        shaped.text.size - (region.text_end - region.text_begin),
+        characters * bits_per_character,
+        _core.busiest_per_s(durations, None, window_s),
+    )
+
+
+def keepable(region: _core.Region, machine: Machine) -> bool:
+    """Whether a region may be left unchanged in an emitted program: not with absolute arc centres."""
+    return machine.input.arc_centre != "absolute" or region.path.largest_sweep_rad <= 0.0
 
 
 class NoRoomError(Exception):
@@ -145,12 +168,8 @@ class _WithdrawnError(Exception):
 
 
 class _Marks:
-    """N words and comments of a region, in the pieces in which it is written."""
-
     def __init__(self, program: Program, notes: Sequence[_core.RegionNote]) -> None:
-        self._program = program
-        self._notes = notes
-        self._next = 0
+        self._program, self._notes, self._next = program, notes, 0
         self.first_word = ""
         """N word at the region's begin, as it was written, which belongs before its prologue; empty: none."""
 
@@ -174,36 +193,23 @@ class _Marks:
         return marks, breaks
 
 
-class _BlockBytes:
-    """Characters of each block with its line end; comment lines count with the block that follows."""
-
-    def __init__(self) -> None:
-        self.parts: list[npt.NDArray[np.uint32]] = []
-        self._open = 0  # behind the last block
-
-    def add(self, part: bytes, blocks: int) -> None:
-        """The next part of a text, and how many blocks it holds."""
-        last = block_lines(part, blocks)[1]
-        self.parts.append(np.diff(last, prepend=-self._open).astype(np.uint32))
-        self._open = len(part) - int(last[-1]) if len(last) else self._open + len(part)
-
-    def end(self) -> list[npt.NDArray[np.uint32]]:
-        """Of each part; comments and N words behind the last block count with it."""
-        for part in reversed(self.parts):
-            if len(part):
-                part[-1] += self._open
-                break
-        return self.parts
+def _block_bytes(texts: Sequence[bytes], blocks: Iterable[int]) -> list[npt.NDArray[np.uint32]]:
+    """Characters of each block with its line end and the comment lines before it; of the last with those behind it."""
+    sizes, behind = [], 0
+    for text, count in zip(texts, blocks, strict=True):
+        ends = block_lines(text, count)[1]
+        sizes.append(np.diff(ends, prepend=-behind).astype(np.uint32))
+        behind = len(text) - int(ends[-1]) if len(ends) else behind + len(text)
+    for part in [each for each in sizes if len(each)][-1:]:
+        part[-1] += behind
+    return sizes
 
 
 class RegionWriter:
     """Shapes regions on one grid and writes them."""
 
     def __init__(self, model: MachineModel, grid: Grid, mark: str = REGION_MARK) -> None:
-        self._machine = model.machine
-        self._model = model
-        self._grid = grid
-        self._mark = mark
+        self._machine, self._model, self._grid, self._mark = model.machine, model, grid, mark
         interval_s = self._machine.emission.restart_interval_s
         if interval_s < grid.block_period_s * (1.0 - 1e-9):
             raise _core.ArgumentError(
@@ -258,10 +264,10 @@ class RegionWriter:
         shaper = _core.RegionShaper(region.path, self._grid.fir, marked, options)
         shaper.begin_early()
         try:
-            return self._write(program, region, shaper, options, room, on_progress, stopped)
+            return self._write(program, region, shaper, room, on_progress, stopped)
         except _WithdrawnError:
             shaper.begin_anew()
-        return self._write(program, region, shaper, options, room, on_progress, stopped)
+        return self._write(program, region, shaper, room, on_progress, stopped)
 
     def _places(self, region: _core.Region) -> RestartPlaces:
         places = RestartPlaces(region, self._machine, self._grid.block_period_s)
@@ -292,7 +298,6 @@ class RegionWriter:
         program: Program,
         region: _core.Region,
         shaper: _core.RegionShaper,
-        options: _core.ShapingOptions,
         room: Room | None,
         on_progress: Callable[[float], None],
         stopped: tuple[int, int],
@@ -303,7 +308,6 @@ class RegionWriter:
         restarts = RegionRestarts(self._places(region), region, self._machine, fit, state.position_decimals)
         texts: list[bytes] = []
         periods: list[npt.NDArray[np.uint32]] = []
-        sizes = _BlockBytes()
         starts: list[list[int]] = []  # of the pieces, in increments
         with closing(_pieces(shaper)) as pieces:
             for piece, share, is_last in pieces:
@@ -322,7 +326,6 @@ class RegionWriter:
                 end = piece.first_period + len(piece.middle_mm)
                 texts.append(text)
                 periods.append(fitted.periods)
-                sizes.add(text, len(fitted.periods))
                 if room is not None:
                     room.require(sum(map(len, texts)), sum(map(len, periods)))
                 on_progress(share)
@@ -330,22 +333,25 @@ class RegionWriter:
         number = marks.first_word
         before = self._head(region, number, starts[0], state)
         emission = self._machine.emission
-        after = [
-            _restore_line(region, state.motion, state.plane),
-            *_own(emission, "UNLOCK"),
-            *_own(emission, "EPILOGUE"),
-        ]
+        restored = _restore_line(region, state.motion, state.plane)
+        after = [restored, *_own(emission, "UNLOCK"), *_own(emission, "EPILOGUE")]
         emitted = RegionText([before, *texts, _lines(after, state)])
         unstopped, stops = stopped
         found = restarts.result(before, stops, (end - unstopped) * fit.block_period_s if stops else 0.0)
         planned_um = shaper.largest_deviation_mm * 1e3
         duration_s = float(sum(int(part.sum()) for part in periods)) * self._grid.block_period_s
         return EmittedRegion(
-            emitted, sum(map(len, periods)), periods, sizes.end(), planned_um, found, shaper.is_slowed, duration_s
+            emitted,
+            sum(map(len, periods)),
+            periods,
+            _block_bytes(texts, map(len, periods)),
+            planned_um,
+            found,
+            shaper.is_slowed,
+            duration_s,
         )
 
     def _fit(self, region: _core.Region) -> _core.FitOptions:
-        """How shaped motion becomes blocks in the units of a region."""
         controller, emission = self._machine.controller, self._machine.emission
         unit, feed_decimals = self._units(region)
         fit = _core.FitOptions()
@@ -367,7 +373,6 @@ class RegionWriter:
         return fit
 
     def _writer(self, program: Program, region: _core.Region, fit: _core.FitOptions) -> _core.WriterOptions:
-        """How the blocks of a region are written, and the modal state that they leave."""
         unit, feed_decimals = self._units(region)
         writer = _core.WriterOptions()
         writer.position_decimals = -round(math.log10(fit.increment_mm / unit))
@@ -386,7 +391,6 @@ class RegionWriter:
         return MM_PER_INCH if inch else 1.0, decimals if finer is None else max(decimals, finer + inch)
 
     def _head(self, region: _core.Region, number: str, start: list[int], writer: _core.WriterOptions) -> bytes:
-        """The lines before the blocks: prologue, a safe line, the dwell in which the buffer fills."""
         emission = self._machine.emission
         fastest = max(axis.max_feed_mm_per_min for axis in self._machine.axes.as_tuple())
         unit_mm, _ = self._units(region)
@@ -462,7 +466,6 @@ def _safe_line(
 
 
 def _restore_line(region: _core.Region, motion: int, plane: int) -> str:
-    """Words that give the modal state of the original's last block back, behind the shaped blocks."""
     state, distance = region.exit, 91 if region.incremental else 90
     shaped = {"motion": motion, "plane": plane, "distance": distance, "feed_mode": 94, "exact_stop": 64}
     codes = [code for name, own in shaped.items() if (code := getattr(state, name)) != own]

@@ -23,19 +23,13 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 Points = NDArray[np.float64]
-# Points of a program nearer than this are the same.
-_SAME_MM = 2e-3
-# A run is a closed contour with its lead-in and lead-out if so much of its length closes upon itself.
-_CLOSED_RATIO = 0.5
-# Chords leave the arcs that they stand for by less than this.
-_SAGITTA_MM = 4e-5
-# GEOS takes corners nearer than this, relative to the distance, for one; so far may they be off.
-_SNAP = 2e-3
+_SAME_MM = 2e-3  # points of a program nearer than this are the same
+_CLOSED_RATIO = 0.5  # of a run's length closes upon itself: it is a closed contour with its lead-in and lead-out
+_SAGITTA_MM = 4e-5  # by less than this chords leave the arcs that they stand for
+_SNAP = 2e-3  # GEOS takes corners nearer than this, relative to the distance, for one; so far may they be off
 _ROUNDS = 3
-# A corner, not two chords of an arc.
-_TURN_RAD = 0.1
-# Height of the layers on ramps and helices.
-_RAMP_STEP_RATIO = 0.1  # of the tool's diameter
+_TURN_RAD = 0.1  # a corner, not two chords of an arc
+_RAMP_STEP_RATIO = 0.1  # of the tool's diameter: height of the layers on ramps and helices
 _MAX_LAYERS = 200  # sweeping one costs time in every layer above the tip
 
 
@@ -65,14 +59,11 @@ def stock_polygons(stock: Stock, paths: Sequence[_core.Path], tool_radius_mm: fl
 def _polygon(stock: Stock, polygon: Polygon, key: str) -> list[StockPiece]:
     import shapely
 
-    outline = shapely.Polygon(polygon.points_mm)
-    if not outline.is_valid or outline.area == 0:
-        raise stock.error(f"{key}.points_mm", "", f"must go round an area: {shapely.is_valid_reason(outline)}")
-    holes = [shapely.Polygon(ring) for ring in polygon.holes_mm]
-    for number, hole in enumerate(holes, start=1):
-        if not hole.is_valid or hole.area == 0:
-            reason = shapely.is_valid_reason(hole)
-            raise stock.error(f"{key}.holes_mm.{number}", "", f"must go round an area: {reason}")
+    names = ["points_mm", *(f"holes_mm.{number}" for number in range(1, len(polygon.holes_mm) + 1))]
+    outline, *holes = areas = [shapely.Polygon(ring) for ring in (polygon.points_mm, *polygon.holes_mm)]
+    for name, area in zip(names, areas, strict=True):
+        if not area.is_valid or area.area == 0:
+            raise stock.error(f"{key}.{name}", "", f"must go round an area: {shapely.is_valid_reason(area)}")
     pieces = _pieces(outline.difference(shapely.union_all(holes)), polygon.z_mm)
     if not pieces:
         raise stock.error(f"{key}.holes_mm", "", "must leave something of the polygon")
@@ -105,7 +96,6 @@ class _Allowance:
         self._rough = allowance.allowance_mm + corner
 
     def area(self, paths: Sequence[_core.Path]) -> Area | MultiPolygon:
-        """The area of the stock in the plane XY."""
         import shapely
 
         keys = self._keys
@@ -131,7 +121,6 @@ class _Allowance:
         return self._stock.error(f"allowance.{key}", toml(getattr(self._keys, key)), limit)
 
     def _runs(self, paths: Sequence[_core.Path]) -> Iterator[Points]:
-        """Parts of the paths below the top of the stock, projected to the plane, without repeated points."""
         top = self._keys.z_mm[1] - 1e-9
         for path in paths:
             points = path.polyline(self._step_rad(path))
@@ -145,7 +134,6 @@ class _Allowance:
                     yield plane
 
     def _step_rad(self, path: _core.Path) -> float:
-        """Angle of the chords of a path's arcs: fine enough for what is offset from them."""
         radius = max((path[index].radius_mm for index in range(len(path))), default=0.0)
         return chord_angle_rad(radius + self._reach + self._rough)
 
@@ -197,7 +185,6 @@ class _Allowance:
         return shapely.union_all(behind), swept(straight, self._radius)
 
     def _behind(self, faces: NDArray[np.object_], points: Points) -> list[Area]:
-        """Those of the faces beside a path that lie on the side of the wall."""
         import shapely
 
         along = np.diff(points, axis=0)
@@ -224,7 +211,6 @@ def _signed_area(loop: Points) -> float:
 
 
 def _extended(points: Points, length_mm: float) -> Points:
-    """A line with its ends continued straight."""
     first, last = points[0] - points[1], points[-1] - points[-2]
     before = points[0] + first * (length_mm / np.hypot(*first))
     after = points[-1] + last * (length_mm / np.hypot(*last))
@@ -297,7 +283,6 @@ def swept(points: Points, distance_mm: float, *, round_ends: bool = True) -> Geo
 
 
 def _quarter(distance_mm: float) -> int:
-    """Chords of a quarter of a circle."""
     return math.ceil(0.5 * math.pi / chord_angle_rad(abs(distance_mm)))
 
 
@@ -410,7 +395,6 @@ def _fewer(borders_mm: Sequence[float]) -> list[float]:
 
 
 def _moves(stock: Stock, rough: Rough, machine: Machine) -> list[_core.Path]:
-    """The moves of the roughing program in order, each run of cutting moves as one path."""
     program = Program.read(stock.beside(rough.file), machine)
 
     def refusal(reason: str, line: int = 0) -> StockError:

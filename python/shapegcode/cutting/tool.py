@@ -57,8 +57,6 @@ class WorkMaterial(TomlTable):
 
 
 class _Library(TomlTable):
-    """The materials that come with shapegcode."""
-
     material: tuple[WorkMaterial, ...] = key("the materials")
 
     @model_validator(mode="after")
@@ -145,7 +143,6 @@ class Cutting(TomlTable):
         return _core.CuttingCoefficients(**values, thickness=_core.ChipThickness.__members__[thickness])
 
     def _value(self, name: str) -> float:
-        """A coefficient: as given here, else of the material, else 0."""
         own, entry = getattr(self, name), self.library_entry()
         return float(own if own is not None else 0.0 if entry is None else getattr(entry, name))
 

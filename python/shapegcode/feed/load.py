@@ -61,11 +61,10 @@ def region_load(
     if part.track is None or part.tool is None or not part.spindle_rev_per_min > 0.0 or len(part.track) == 0:
         return None
     stations = np.asarray(part.track.s_mm)
-    window_s = 60.0 / (part.tool.tool.flutes * part.spindle_rev_per_min)
-    was = load_of(part, before.travel(part.region.path, part.region.path, stations, window_s))
+    was = load_of(part, before.travel(part.region.path, part.region.path, stations, part.window_s))
     if plan is None and before is after:
         return PathLoad(was, was, stations)
-    travelled = after.travel(written, part.region.path, stations, window_s)
+    travelled = after.travel(written, part.region.path, stations, part.window_s)
     return PathLoad(was, load_of(part, travelled), stations)
 
 
@@ -116,7 +115,6 @@ class FeedTraces:
     limit: Mapping[str, Vector]  # of tool and machine by the name of the load (`LOADS`), (n,); inf where there is none
 
     def __len__(self) -> int:
-        """Stations."""
         return len(self.distance_mm)
 
 
@@ -200,7 +198,12 @@ def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTrac
     load = traces.load.original.peak_resultant_n
     chosen = np.array([a + int(np.argmax(load[a:b])) for a, b in zip(starts, ends, strict=True)])
     parts = [part for part, known in zip(survey.regions, loads, strict=True) if known is not None]
-    height = np.linspace(*_reach(parts), _ROWS)
+    bands = [np.asarray(part.track.arcs)[:, 2:] for part in parts if part.track is not None]
+    cut = np.concatenate([*bands, np.empty((0, 2))])
+    # Between the lowest and the highest engagement above the tip.
+    height = (
+        np.linspace(float(cut[:, 0].min()), float(cut[:, 1].max()), _ROWS) if len(cut) else np.linspace(0, 1, _ROWS)
+    )
     maps = [(each, np.full((len(chosen), _ROWS), np.nan)) for each in (traces.load.original, traces.load.emitted)]
     owner = np.searchsorted(traces.begins, chosen, side="right") - 1
     for number, part in enumerate(parts):
@@ -218,13 +221,6 @@ def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTrac
         return None
     edges = np.append(traces.distance_mm[starts] - traces.length_mm[starts], traces.distance_mm[-1])
     return WallMaps(edges, height, Pair(original, emitted))
-
-
-def _reach(parts: Sequence[SurveyedRegion]) -> tuple[float, float]:
-    """Lowest and highest engagement above the tip, mm."""
-    bands = [np.asarray(part.track.arcs)[:, 2:] for part in parts if part.track is not None]
-    cut = np.concatenate([*bands, np.empty((0, 2))])
-    return (float(cut[:, 0].min()), float(cut[:, 1].max())) if len(cut) else (0.0, 1.0)
 
 
 def _wall(force: _core.MillingForce, beam: _core.ToolBeam, arcs: Vector, feed: float, height: Vector) -> Vector:

@@ -97,7 +97,6 @@ class FeedPlan:
     stretches: tuple[_core.FeedStretch, ...]  # the feeds, as they are written
     # stations at which the least feed per tooth is more than the limits allow, (n,) of bool
     held_at_minimum: npt.NDArray[np.bool_]
-    window_s: float  # time between two teeth, over which feeds are taken
 
 
 def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:
@@ -126,16 +125,16 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
 
     Source: this project; that a feed must stand for a least length is of Kim and Ko, 2001 (paper 001).
     """
-    region, tool, track = surveyed.region, surveyed.tool, surveyed.track
+    tool, track, path, control = surveyed.tool, surveyed.track, surveyed.region.path, machine.feed_control
     assert tool is not None and track is not None
-    teeth_per_min = tool.tool.flutes * surveyed.spindle_rev_per_min
-    path = region.path
-    segment = np.asarray(track.segment)
+    segment, stations_mm, window_s = np.asarray(track.segment), np.asarray(track.s_mm), surveyed.window_s
     programmed = path.segment_feeds_mm_per_s * 60.0
-    least = max((tool.limits.feed_per_tooth_min_mm or 0.0) * teeth_per_min, machine.controller.minimum_feed_mm_per_min)
-    kept = _kept_segments(surveyed, programmed, least, tool)
     # Without a least chip nobody wants the tool to rub for hours to keep a limit that cannot be kept.
-    share = 0.0 if tool.limits.feed_per_tooth_min_mm else _MIN_PROGRAMMED
+    chip_mm = tool.limits.feed_per_tooth_min_mm or 0.0
+    share = 0.0 if chip_mm else _MIN_PROGRAMMED
+    teeth_per_min = tool.tool.flutes * surveyed.spindle_rev_per_min
+    least = max(chip_mm * teeth_per_min, machine.controller.minimum_feed_mm_per_min)
+    kept = _kept_segments(surveyed, programmed, least)
     slowest = np.maximum(least, share * programmed)
     lowest = (feed_unit_mm_per_min * np.ceil(slowest / feed_unit_mm_per_min - 1e-9))[segment]  # what F can say
     limit, holds, load = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
@@ -143,35 +142,35 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
     at_minimum = (holds == MINIMUM) & ~frozen[segment]
     limit = np.where(frozen[segment], programmed[segment], limit)
     holds[frozen[segment]] = KEPT
-    window_s = 60.0 / teeth_per_min
-    stations_mm, stays = np.asarray(track.s_mm), np.where(frozen, programmed, 0.0)
-    task = _Task(
-        path, stations_mm, segment, limit, load, stays, programmed, divisible, lowest, feed_unit_mm_per_min, window_s
-    )
-    stretches = _stretches_that_keep(task, machine, motion)
-    return FeedPlan(surveyed, limit, holds, kept, tuple(stretches), at_minimum, window_s)
+    # Planned, travelled, and slowed down earlier or more where the travel is still too fast.
+    most_change = math.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min
+    floor = np.minimum(limit, lowest)
+    planned = np.maximum(_stepped(limit, programmed[segment]), floor)
+    before = np.full(len(planned), motion.reach_s + window_s)
+    behind = np.full(len(planned), motion.reach_s)
+    stretches: list[_core.FeedStretch] = []
+    for attempt in range(_ATTEMPTS):
+        feeds = _core.look_ahead_on_load(stations_mm, planned, load, before, behind)
+        stretches = _core.schedule_feed(
+            path.segment_ends_mm, np.where(frozen, programmed, 0.0), divisible, stations_mm, feeds, control.interval_mm,
+            most_change, feed_unit_mm_per_min,
+        )  # fmt: skip
+        run = motion.travel(_core.with_feeds(path, stretches), path, stations_mm, window_s).feed_mm_per_min
+        over = ~frozen[segment] & (run > load * (1.0 + _TOO_FAST))
+        if not over.any():
+            break
+        for reach in (before, behind):
+            longest = _LONGEST_REACH * (motion.reach_s + window_s)
+            reach[over] = np.minimum(1.5 * reach[over] + window_s, longest)
+        if attempt >= _LOWERING:
+            planned[over] *= np.maximum(load[over] / run[over], _MIN_SHARE)
+            planned = np.maximum(planned, floor)
+    return FeedPlan(surveyed, limit, holds, kept, tuple(stretches), at_minimum)
 
 
-@dataclass(frozen=True)
-class _Task:
-    """Conditions under which the feed sections of a region are chosen."""
-
-    path: _core.Path
-    stations_mm: Vector
-    segment: npt.NDArray[np.uint32]  # of each station
-    limit: Vector  # at each station: what is wanted
-    load: Vector  # at each station: what the load allows, and the least feed where it allows less
-    kept: Vector  # per segment the feed that stays, 0: it may change
-    programmed: Vector  # per segment
-    divisible: list[bool]
-    lowest: Vector  # at each station
-    feed_unit: float
-    window_s: float
-
-
-def _kept_segments(surveyed: SurveyedRegion, programmed: Vector, lowest: float, tool: Tool) -> tuple[str, ...]:
-    track = surveyed.track
-    assert track is not None
+def _kept_segments(surveyed: SurveyedRegion, programmed: Vector, lowest: float) -> tuple[str, ...]:
+    tool, track = surveyed.tool, surveyed.track
+    assert tool is not None and track is not None
     reasons = [""] * len(programmed)
     end_mm2 = np.pi * tool.radius_mm**2
     plunged = np.asarray(track.plunged_mm2) > _DEEPER_PLUNGE * end_mm2
@@ -246,38 +245,6 @@ def _stepped(limit: Vector, programmed: Vector) -> Vector:
 
 
 def _near_material(s_mm: Vector, air: npt.NDArray[np.bool_], approach_mm: float) -> npt.NDArray[np.bool_]:
-    """Stations from which the next material is no farther than the approach."""
     contact = np.where(air, np.inf, np.concatenate(([0.0], s_mm[:-1])))  # where the stretch of a station begins
     following = np.minimum.accumulate(contact[::-1])[::-1]
     return np.asarray(following - s_mm <= approach_mm)
-
-
-def _stretches_that_keep(task: _Task, machine: Machine, motion: Mover) -> list[_core.FeedStretch]:
-    """Plan, travel, and slow down earlier or more where the travel is still too fast."""
-    control = machine.feed_control
-    most_change = math.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min
-    floor = np.minimum(task.limit, task.lowest)
-    planned = np.maximum(_stepped(task.limit, task.programmed[task.segment]), floor)
-    before = np.full(len(planned), motion.reach_s + task.window_s)
-    behind = np.full(len(planned), motion.reach_s)
-    longest = _LONGEST_REACH * (motion.reach_s + task.window_s)
-    free = task.kept[task.segment] == 0.0
-    stretches: list[_core.FeedStretch] = []
-    for attempt in range(_ATTEMPTS):
-        feeds = _core.look_ahead_on_load(task.stations_mm, planned, task.load, before, behind)
-        stretches = _core.schedule_feed(
-            task.path.segment_ends_mm, task.kept, task.divisible, task.stations_mm, feeds, control.interval_mm,
-            most_change, task.feed_unit,
-        )  # fmt: skip
-        run = motion.travel(
-            _core.with_feeds(task.path, stretches), task.path, task.stations_mm, task.window_s
-        ).feed_mm_per_min
-        over = free & (run > task.load * (1.0 + _TOO_FAST))
-        if not over.any():
-            break
-        for reach in (before, behind):
-            reach[over] = np.minimum(1.5 * reach[over] + task.window_s, longest)
-        if attempt >= _LOWERING:
-            planned[over] *= np.maximum(task.load[over] / run[over], _MIN_SHARE)
-            planned = np.maximum(planned, floor)
-    return stretches

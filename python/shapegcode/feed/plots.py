@@ -114,7 +114,6 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
 
 
 def _feed_axis(panel: Axes, feeds: Vector) -> None:
-    """Air cuts may be many times faster than cuts, of which something must still be seen."""
     least, largest = float(feeds.min()), float(feeds.max())
     if least > 0.0 and largest > _LOGARITHMIC * least:
         panel.set_yscale("log")
@@ -222,7 +221,6 @@ def _coloured_path(panel: Axes, traces: FeedTraces, force_n: Vector, norm: Any) 
 
 
 def _pieces(traces: FeedTraces) -> tuple[Vector, npt.NDArray[np.intp]]:
-    """Lines of the path, (m, 2, 2), and the first station of each; none goes from region to region."""
     runs = np.unique(np.concatenate([groups(traces.distance_mm, _PIECES), traces.begins]))
     last = np.append(runs[1:], len(traces)) - 1
     begin = traces.xy_mm[np.maximum(runs - 1, 0)]
@@ -326,7 +324,6 @@ def with_forces(scene: Scene, schedule: FeedSchedule) -> Scene:
 
 
 def _along(variant: Variant, known: Sequence[tuple[Region, Vector, Vector]]) -> Vector:
-    """Force at each kept sample, by the distance through its region."""
     force = np.zeros(len(variant.sample))
     travel = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(variant.command_mm, axis=0), axis=1))])
     for region, stations_mm, values_n in known:

@@ -244,31 +244,25 @@ class FeedSchedule(Result):
         return self._drawn_beside()
 
     def _gain_table(self) -> Table:
-        rows: list[tuple[str, str, str, str, str]] = []
-
-        def row(name: str, pair: Pair[float] | Pair[int] | PeakLoad, digits: int, unit: str) -> None:
-            place = pair.place.rpartition(":")[2] if isinstance(pair, PeakLoad) else ""
-            rows.append((name, f"{pair.original:.{digits}f}", f"{pair.emitted:.{digits}f}", unit, place))
-
-        for key, (name, unit, digits) in LOADS.items():
-            row(name, getattr(self.peak, key), digits, unit)
         force = self.resultant_force_n
-        row("mean resultant over the time in material", Pair(force.original.mean, force.emitted.mean), 1, "N")
-        row("cycle time", self.cycle_time_s, 2, "s")
-        row("of it cutting moves in air", self.air_time_s, 2, "s")
-        row("cutting blocks", self.blocks, 0, "")
+        rows: list[tuple[str, Any, int, str]] = [
+            *((name, getattr(self.peak, key), digits, unit) for key, (name, unit, digits) in LOADS.items()),
+            ("mean resultant over the time in material", Pair(force.original.mean, force.emitted.mean), 1, "N"),
+            ("cycle time", self.cycle_time_s, 2, "s"),
+            ("of it cutting moves in air", self.air_time_s, 2, "s"),
+            ("cutting blocks", self.blocks, 0, ""),
+        ]
         columns = (
             Column("largest along the program", value=lambda row: row[0], text=True),
-            Column("before", value=lambda row: row[1]),
-            Column("after", value=lambda row: row[2]),
+            Column("before", value=lambda row: f"{row[1].original:.{row[2]}f}"),
+            Column("after", value=lambda row: f"{row[1].emitted:.{row[2]}f}"),
             Column("unit", value=lambda row: row[3], text=True),
-            Column("line", value=lambda row: row[4]),
+            Column("line", value=lambda row: getattr(row[1], "place", "").rpartition(":")[2]),
         )
         title = f"{self.program} on {self.machine}, tool {', '.join(self.tools) or '-'}"
         return Table(title, columns, rows, sections=(len(LOADS) + 1,))
 
     def _limit_table(self) -> Table:
-        """The ranges of lines with the lowest feeds, in order."""
         slowest = sorted(self.limits, key=lambda entry: entry.feed_mm_per_min.min)[:_SHOWN_RANGES]
         title = "what limits the feed"
         if len(self.limits) > len(slowest):

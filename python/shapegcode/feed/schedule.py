@@ -17,18 +17,10 @@ from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.errors import RoundTripError
+from shapegcode.feed import result
 from shapegcode.feed.load import LOADS, Load, PathLoad, exceeded, move_load, region_load
 from shapegcode.feed.plan import AIR, KEPT, MINIMUM, FeedPlan, Mover, OrdinaryMotion, limits_of, plan_region
-from shapegcode.feed.result import (
-    FeedRange,
-    FeedSchedule,
-    HeldLines,
-    KeptMove,
-    PeakLoad,
-    PeakLoads,
-    ResultantForce,
-    ScheduledRegion,
-)
+from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.survey import COMMENT, Survey, SurveyedMove, SurveyedRegion, survey
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
@@ -128,7 +120,6 @@ def schedule_survey(
 def _plan_all(
     surveyed: Survey, machine: Machine, motion: Mover, margin: float, on_progress: Callable[[int], None]
 ) -> list[FeedPlan | None]:
-    """Plans of the regions, each on its own: two at a time, as they share nothing."""
     program = surveyed.program
 
     def plan(index: int) -> FeedPlan | None:
@@ -141,8 +132,8 @@ def _plan_all(
 
     plans: list[FeedPlan | None] = []
     with ThreadPoolExecutor(max_workers=2) as pool:
-        for done, result in enumerate(pool.map(plan, range(len(surveyed.regions)))):
-            plans.append(result)
+        for done, found in enumerate(pool.map(plan, range(len(surveyed.regions)))):
+            plans.append(found)
             on_progress(done + 1)
     return plans
 
@@ -163,14 +154,12 @@ def _writer_options(
 
 
 def _feed_unit_mm_per_min(region: _core.Region, machine: Machine) -> float:
-    """Step of the F word, mm/min."""
     if region.exit.units == 20:
         return MM_PER_INCH * 10.0**-machine.controller.feed_decimals_inch
     return 10.0**-machine.controller.feed_decimals_mm
 
 
 def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine) -> tuple[bytes, list[int], int]:
-    """The text, per region its first line there, and the number of cutting blocks."""
     core = program.core
     parts: list[bytes] = []
     first_lines: list[int] = []
@@ -253,7 +242,7 @@ def feed_figures(
         margin=margin,
         feed_mm_per_min=_feeds(surveyed, plans),
         resultant_force_n=_resultants(known),
-        peak=PeakLoads(**{column: _peak(column, placed) for column in LOADS}),
+        peak=result.PeakLoads(**{column: _peak(column, placed) for column in LOADS}),
         cycle_time_s=cycle_time_s,
         air_time_s=Pair(
             sum(_air_time(load.original) for load in known), sum(_air_time(load.emitted) for load in known)
@@ -273,7 +262,7 @@ def feed_figures(
     )
 
 
-def _move(move: SurveyedMove, machine: Machine) -> KeptMove:
+def _move(move: SurveyedMove, machine: Machine) -> result.KeptMove:
     load = move_load(move)
     misses = ["its force is not known: no spindle speed"]
     if load is not None:
@@ -281,10 +270,12 @@ def _move(move: SurveyedMove, machine: Machine) -> KeptMove:
             f"cut at its own feed: {words} {getattr(load.emitted, column).max():.4g} {unit}, limit {limit:.4g} {unit}"
             for column, words, unit, limit in exceeded(move.tool, load.emitted, machine)
         ]
-    return KeptMove(move.place, move.feed_mm_per_min, tuple(misses), load)
+    return result.KeptMove(move.place, move.feed_mm_per_min, tuple(misses), load)
 
 
-def _region(part: SurveyedRegion, plan: FeedPlan | None, load: PathLoad | None, machine: Machine) -> ScheduledRegion:
+def _region(
+    part: SurveyedRegion, plan: FeedPlan | None, load: PathLoad | None, machine: Machine
+) -> result.ScheduledRegion:
     track = part.track
     misses = [words for words, _ in _misses(part, plan, load, machine)]
     if load is None and track is not None and track.section_mm2.any():
@@ -292,7 +283,7 @@ def _region(part: SurveyedRegion, plan: FeedPlan | None, load: PathLoad | None, 
     removed = None
     if track is not None and len(track) > 0:
         removed = float((np.diff(np.concatenate(([0.0], track.s_mm))) * track.section_mm2).sum())
-    return ScheduledRegion(
+    return result.ScheduledRegion(
         lines=(part.region.first_line, part.region.last_line),
         kept=part.kept,
         spindle_rev_per_min=part.spindle_rev_per_min,
@@ -326,21 +317,21 @@ def _misses(
 # --- loads ------------------------------------------------------------------------------------------------------------
 
 
-def _resultants(loads: Sequence[PathLoad]) -> Pair[ResultantForce]:
+def _resultants(loads: Sequence[PathLoad]) -> Pair[result.ResultantForce]:
     return Pair(_resultant([load.original for load in loads]), _resultant([load.emitted for load in loads]))
 
 
-def _resultant(loads: Sequence[Load]) -> ResultantForce:
+def _resultant(loads: Sequence[Load]) -> result.ResultantForce:
     """Mean over the time in material of the mean resultant, and the largest resultant of all."""
     cut = [load.peak_resultant_n > _AIR_N for load in loads]
     parts = list(zip(loads, cut, strict=True))
     time = sum(float(load.time_s[inside].sum()) for load, inside in parts)
     impulse = sum(float((load.time_s * load.mean_resultant_n)[inside].sum()) for load, inside in parts)
     largest = max((float(load.peak_resultant_n.max(initial=0.0)) for load in loads), default=0.0)
-    return ResultantForce(impulse / time if time > 0.0 else 0.0, largest)
+    return result.ResultantForce(impulse / time if time > 0.0 else 0.0, largest)
 
 
-def _peak(column: str, loads: Sequence[tuple[Callable[[int], str], PathLoad]]) -> PeakLoad:
+def _peak(column: str, loads: Sequence[tuple[Callable[[int], str], PathLoad]]) -> result.PeakLoad:
     """Largest value of a column before and after, and the place of the latter; beside a load what tells its places."""
     original, emitted, place = 0.0, 0.0, ""
     for place_of, load in loads:
@@ -348,11 +339,10 @@ def _peak(column: str, loads: Sequence[tuple[Callable[[int], str], PathLoad]]) -
         original = max(original, float(was.max(initial=0.0)))
         if len(now) and float(now.max()) > emitted:
             emitted, place = float(now.max()), place_of(int(np.argmax(now)))
-    return PeakLoad(original, emitted, place)
+    return result.PeakLoad(original, emitted, place)
 
 
 def _places(program: Program, part: SurveyedRegion) -> Callable[[int], str]:
-    """File and line of a station of a region."""
     assert part.track is not None
     lines, segment = part.region.path.segment_lines, part.track.segment
     return lambda station: program.place(int(lines[segment[station]]))
@@ -369,8 +359,7 @@ def _air_time(load: Load) -> float:
 # --- feeds ------------------------------------------------------------------------------------------------------------
 
 
-def _feeds(surveyed: Survey, plans: Plans) -> FeedRange:
-    """Lowest and highest feed that stands in the written regions."""
+def _feeds(surveyed: Survey, plans: Plans) -> result.FeedRange:
     feeds: list[float] = []
     for part, plan in zip(surveyed.regions, plans, strict=True):
         if plan is None:
@@ -380,16 +369,15 @@ def _feeds(surveyed: Survey, plans: Plans) -> FeedRange:
     return _range(feeds)
 
 
-def _range(feeds: Sequence[float]) -> FeedRange:
-    return FeedRange(min(feeds, default=0.0), max(feeds, default=0.0))
+def _range(feeds: Sequence[float]) -> result.FeedRange:
+    return result.FeedRange(min(feeds, default=0.0), max(feeds, default=0.0))
 
 
-def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[HeldLines]:
-    """Ranges of lines, each with its feeds and what holds them."""
+def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[result.HeldLines]:
     path = part.region.path
     if plan is None:
         feeds = (path.segment_feeds_mm_per_s * 60.0).tolist()
-        yield HeldLines((part.region.first_line, part.region.last_line), _range(feeds), KEPT, part.kept)
+        yield result.HeldLines((part.region.first_line, part.region.last_line), _range(feeds), KEPT, part.kept)
         return
     track = part.track
     assert track is not None
@@ -408,11 +396,10 @@ def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[HeldLines]:
     for (hold, reason), run in groupby(range(len(path)), key=lambda i: (holds[i], plan.kept[i])):
         indices = list(run)
         feeds = [feed for i in indices for feed in written[i]]
-        yield HeldLines((int(lines[indices[0]]), int(lines[indices[-1]])), _range(feeds), hold, reason)
+        yield result.HeldLines((int(lines[indices[0]]), int(lines[indices[-1]])), _range(feeds), hold, reason)
 
 
 def _feeds_of_segments(plan: FeedPlan, path: _core.Path) -> list[list[float]]:
-    """Programmed feed of each segment."""
     ends = np.array([stretch.end_mm for stretch in plan.stretches])
     feeds = [stretch.feed_mm_per_min for stretch in plan.stretches]
     borders = np.concatenate(([0.0], path.segment_ends_mm))
@@ -425,7 +412,7 @@ def _feeds_of_segments(plan: FeedPlan, path: _core.Path) -> list[list[float]]:
 # --- warnings ---------------------------------------------------------------------------------------------------------
 
 
-def _warnings(surveyed: Survey, plans: Plans, moves: Sequence[KeptMove], machine: Machine) -> Iterator[str]:
+def _warnings(surveyed: Survey, plans: Plans, moves: Sequence[result.KeptMove], machine: Machine) -> Iterator[str]:
     program = surveyed.program
     yield from program.warnings
     yield from surveyed.warnings
@@ -451,7 +438,6 @@ def _warnings(surveyed: Survey, plans: Plans, moves: Sequence[KeptMove], machine
 
 
 def _kept_blocks(place: Callable[[int], str], part: SurveyedRegion, plan: FeedPlan) -> Iterator[str]:
-    """One sentence per run of blocks that are left alone for one reason."""
     lines = part.region.path.segment_lines
     for reason, run in groupby(range(len(lines)), key=lambda i: plan.kept[i]):
         indices = list(run)

@@ -110,7 +110,6 @@ def survey(
 def _material(
     walk: Walk, program: Program, machine: Machine, tools: Sequence[Tool], stock: Stock, resolution_mm: float | None
 ) -> _core.Material:
-    """The stock on a grid, its layers where the program moves."""
     cutters = walk.tools_of_regions()
     reasons = [why_not_swept(region, walk.zero) for region in program.regions]
     swept = [index for index, reason in enumerate(reasons) if not reason and cutters[index] is not None]
@@ -147,6 +146,12 @@ class SurveyedRegion:
     # which the track takes for whole or gone. None: wherever the track says so
     clear: npt.NDArray[np.bool_] | None = None
 
+    @property
+    def window_s(self) -> float:
+        """Time between two teeth, over which feeds are taken; of a region with tool and speed."""
+        assert self.tool is not None
+        return 60.0 / (self.tool.tool.flutes * self.spindle_rev_per_min)
+
 
 @dataclass(frozen=True)
 class SurveyedMove:
@@ -167,9 +172,9 @@ def why_not_swept(region: _core.Region, zero: ZeroPoints) -> str:
     if region.incremental:
         return "its place is not known"
     if not region.path.arcs_in_xy:
-        path = region.path
-        first = next(i for i in range(len(path)) if path[i].kind == _core.SegmentKind.arc and path[i].normal != 2)
-        return f"it holds arcs that are not in the XY plane (G17), the first in line {path[first].line_number}"
+        segments = map(region.path.__getitem__, range(len(region.path)))
+        first = next(each for each in segments if each.kind == _core.SegmentKind.arc and each.normal != 2)
+        return f"it holds arcs that are not in the XY plane (G17), the first in line {first.line_number}"
     return ""
 
 
@@ -213,10 +218,10 @@ class Walk:
                 self._tools[number] = tool
         # Where the program changes tools, T alone only gets the next one ready.
         self._changes = any(_TOOL_CHANGE in m_codes for m_codes, _, _ in self._functions)
-        used = {tool for _, tool, _ in self._functions if tool > 0}
-        if self._any is not None and len(used) > 1:
+        self._used = [f"T{number}" for number in sorted({tool for _, tool, _ in self._functions if tool > 0})]
+        if self._any is not None and len(self._used) > 1:
             self.warnings.append(
-                f"{program.source}: uses the tools {', '.join(f'T{n}' for n in sorted(used))}: all are taken as "
+                f"{program.source}: uses the tools {', '.join(self._used)}: all are taken as "
                 f"{self._any.tool.name}; give tool.number to tell them apart"
             )
 
@@ -264,8 +269,7 @@ class Walk:
         """Which tools are missing where no region has one; empty if that is not the reason."""
         if not cutters or any(cutter is not None for cutter in cutters):
             return ""
-        used = sorted({tool for _, tool, _ in self._functions if tool > 0})
-        used_tools = f"the program uses {', '.join(f'T{n}' for n in used)}" if used else "the program names no tool"
+        used_tools = f"the program uses {', '.join(self._used)}" if self._used else "the program names no tool"
         return f": {used_tools}, the tool files describe {', '.join(f'T{n}' for n in sorted(self._tools))}"
 
     def cuts_elsewhere(self) -> list[_core.Path]:
@@ -305,12 +309,11 @@ class Walk:
         places = list(dict.fromkeys(self._collisions))
         why = "rapid into material: is Z 0 of the stock file that of the program?"
         messages = [f"{place}: {why}" for place in places[:_SHOWN_COLLISIONS]]
-        if len(places) > _SHOWN_COLLISIONS:
-            messages.append(f"{self._program.source}: {len(places) - _SHOWN_COLLISIONS} more rapids into material")
+        if (more := len(places) - _SHOWN_COLLISIONS) > 0:
+            messages.append(f"{self._program.source}: {more} more rapids into material")
         self.warnings[:0] = messages
 
     def _look_at_depth(self, region: _core.Region, tool: Tool, track: _core.EngagementTrack) -> None:
-        """Say where the tool cuts above its flutes."""
         if not len(track.arcs):
             return
         tops = track.arcs[:, 3]

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from typing import Any
 
 _MODULES = (
-    "bands", "registry", "robust", "ranking", "result", "comparison", "track", "grid", "plots",
+    "bands", "registry", "robust", "result", "comparison", "track", "grid", "plots",
 )  # fmt: skip
 
 

@@ -19,9 +19,7 @@ NO_MODE = (
     "the machine file gives no vibration mode (axes.x.modes): nothing to shape for; `shapegcode identify --tap-plan` "
     "describes the test"
 )
-"""Why there is no shaper."""
-NARROW_PERCENT = 0.2
-"""Half width above which a shaper is designed for the band of a mode."""
+NARROW_PERCENT = 0.2  # half width above which a shaper is designed for the band of a mode
 _SLOWEST_HZ = 0.1  # the period of a load on 25 m of rope; no machine tool has a slower mode
 _FASTEST_HZ = 10_000.0  # as in a machine file
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -29,13 +27,11 @@ _SIZE = r"(?:\d+\.?\d*|\.\d+)"
 _TEXT = re.compile(
     rf"({_NUMBER})(?::({_NUMBER}))?(?:(?:±|\+-|\+/-)({_NUMBER})(%|Hz)?|[-−]({_SIZE})(%|Hz)/?\+({_SIZE})(%|Hz))?"
 )
-VIBRATION_LIMIT = 0.05
-"""Residual ratio that a robust design may leave anywhere in the bands unless another one is asked for."""
+VIBRATION_LIMIT = 0.05  # residual ratio that a robust design may leave anywhere in the bands, if no other is asked for
+# Relative difference of durations (or, if none is within the limit, of worst residuals) below which the longer block
+# period is preferred.
 SAME = 0.02
-"""Relative difference of durations (or, if none is within the limit, of worst residuals) below which the longer block
-period is preferred."""
-ON_GRID = 1e-9
-"""Periods; forgives the rounding of a quotient."""
+ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
 
 
 @dataclass(frozen=True)
@@ -76,7 +72,6 @@ class ModeBand:
         return {"mode": Mode(data["frequency_hz"], data["damping_ratio"])}
 
     def __post_init__(self) -> None:
-        """Check the range."""
         if not 0.0 <= self.uncertainty < 1.0:
             raise ArgumentError(
                 f"uncertainty of the mode at {self.mode.frequency_hz:g} Hz is {self.uncertainty:.4g}: "
@@ -96,7 +91,6 @@ class ModeBand:
         return Mode(self.mode.frequency_hz * scale, self.mode.damping_ratio, self.mode.participation)
 
     def __str__(self) -> str:
-        """As `parse_mode_band` reads it."""
         text = f"{self.mode.frequency_hz:g}:{self.mode.damping_ratio:g}"
         return f"{text}±{100.0 * self.uncertainty:g}%" if self.uncertainty else text
 
@@ -314,7 +308,13 @@ def parse_taps(given: str | Sequence[Any] | dict[str, Any]) -> Shaper:
     if isinstance(given, str):
         text = given.strip()
         if not text.startswith(("[", "{")):
-            return _from_text(text)
+            taps = []
+            for part in text.split(","):
+                match = _TAP.fullmatch(part)
+                if match is None:
+                    raise ArgumentError(f"{part.strip()!r} is no impulse: {_FORM}")
+                taps.append((float(match[1]) * (1e-3 if match[2] == "ms" else 1.0), float(match[3])))
+            return Shaper(*zip(*taps, strict=True))
         try:
             given = json.loads(text)
         except json.JSONDecodeError as error:
@@ -341,19 +341,7 @@ def on_grid(shaper: Shaper, period_s: float) -> Shaper:
     return shaper
 
 
-def _from_text(text: str) -> Shaper:
-    times_s, amplitudes = [], []
-    for part in text.split(","):
-        match = _TAP.fullmatch(part)
-        if match is None:
-            raise ArgumentError(f"{part.strip()!r} is no impulse: {_FORM}")
-        times_s.append(float(match[1]) * (1e-3 if match[2] == "ms" else 1.0))
-        amplitudes.append(float(match[3]))
-    return Shaper(times_s, amplitudes)
-
-
 def _numbers(values: Any) -> list[float]:
-    """The numbers of a list; a text or a truth value is none."""
     if isinstance(values, str | bytes) or not isinstance(values, Sequence):
         raise ArgumentError(f"a list of numbers is wanted among the impulses: given {values!r}")
     for value in values:

@@ -26,9 +26,16 @@ from shapegcode.shaping.bands import (
     spoken,
 )
 from shapegcode.shaping.grid import candidate_periods, check_block_period
-from shapegcode.shaping.ranking import OBJECTIVES, is_within, pareto_front, reason_for, recommend
 from shapegcode.shaping.registry import FAMILIES, Family, design, family_named
-from shapegcode.shaping.result import Recommendation, Refusal
+from shapegcode.shaping.result import (
+    OBJECTIVES,
+    Recommendation,
+    Refusal,
+    is_within,
+    pareto_front,
+    reason_for,
+    recommend,
+)
 from shapegcode.shaping.robust import least_worst
 
 _SLOWEST_PERIODS = 3.0  # longest shaper where none is stated: three-hump EI of the slowest mode and of a faster one
@@ -143,8 +150,13 @@ def choose(
     """Design every family on every kind of times, compare, and recommend."""
     options = options or DesignOptions()
     _check(bands, periods_s, options, objective)
-    rows = _rows(families, options)
-    usable = _usable(bands, periods_s)
+    # The user's impulses only where there are some.
+    names = [row.name for row in FAMILIES if row.name != _OWN_TAPS] if families is None else list(families)
+    rows = [family_named(name) for name in dict.fromkeys([*names, *([] if options.taps is None else [_OWN_TAPS])])]
+    wanted = list(dict.fromkeys(periods_s))
+    usable = [period_s for period_s in wanted if period_s is None or not _aliases(bands, period_s)]
+    if not usable:
+        raise DesignError(next(_aliases(bands, period_s) for period_s in wanted if period_s is not None))
     found: list[Design] = []
     refusals: list[Refusal] = []
     work = list(itertools.product(rows, usable))
@@ -179,14 +191,6 @@ def choose(
     )
 
 
-def _rows(families: Sequence[str] | None, options: DesignOptions) -> tuple[Family, ...]:
-    """The families to compare: the user's impulses only where there are some."""
-    if families is None:
-        return tuple(row for row in FAMILIES if row.name != _OWN_TAPS or options.taps is not None)
-    names = [*families, *([] if options.taps is None else [_OWN_TAPS])]
-    return tuple(family_named(name) for name in dict.fromkeys(names))
-
-
 def _check(
     bands: Sequence[ModeBand], periods_s: Sequence[float | None], options: DesignOptions, objective: str
 ) -> None:
@@ -211,15 +215,6 @@ def _check(
         )
     if objective not in OBJECTIVES:
         raise ArgumentError(f"{objective!r} is no objective: {', '.join(OBJECTIVES)}")
-
-
-def _usable(bands: Sequence[ModeBand], periods_s: Sequence[float | None]) -> list[float | None]:
-    """The kinds of times on which every mode can be cancelled."""
-    wanted = list(dict.fromkeys(periods_s))
-    usable = [period_s for period_s in wanted if period_s is None or not _aliases(bands, period_s)]
-    if not usable:
-        raise DesignError(next(_aliases(bands, period_s) for period_s in wanted if period_s is not None))
-    return usable
 
 
 def _aliases(bands: Sequence[ModeBand], period_s: float) -> str:

@@ -26,7 +26,6 @@ from shapegcode.shaping.bands import ModeBand
 # Tolerance and presolve: now and then the solver gives up, or goes round in circles, at the first of them.
 _WAYS = ((1e-10, False), (1e-9, True), (1e-9, False), (1e-8, True), (1e-7, True), (1e-7, False))
 _MOST_PIVOTS = 20  # per unknown and condition; some 1 is usual
-_MOST_SOLVER_ROUNDS = 3  # per unknown, of the least squares
 
 
 class _Quiet(highspy.Highs):
@@ -161,50 +160,9 @@ class TapProgram:
         return [matrix, -matrix] if self._signed else [matrix]
 
 
-def non_negative_least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
-    """The x >= 0 for which ``matrix @ x`` comes nearest to a right-hand side, to rounding.
-
-    Written out here because SciPy's is behind an import that takes longer than all the designs of a conversion.
-
-    Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
-    """
-    count = matrix.shape[1]
-    # Below it one unknown more would lower the squares by rounding only.
-    slightest = 10.0 * np.finfo(float).eps * max(matrix.shape) * float(np.abs(matrix).sum(axis=0).max())
-    x = np.zeros(count)
-    used = np.zeros(count, dtype=bool)
-    for _ in range(_MOST_SOLVER_ROUNDS * count):
-        gain = matrix.T @ (right - matrix @ x)
-        gain[used] = 0.0
-        following = int(np.argmax(gain))
-        if gain[following] <= slightest:
-            return x
-        used[following] = True
-        better = _over(matrix, right, used)
-        while np.any(better[used] <= 0.0):
-            falling = np.flatnonzero(used & (better <= 0.0))
-            shares = x[falling] / (x[falling] - better[falling])
-            x = x + shares.min() * (better - x)
-            used[falling[np.argmin(shares)]] = False
-            used &= x > 0.0
-            x[~used] = 0.0
-            better = _over(matrix, right, used)
-        x = better
-    return None
-
-
-def _over(matrix: FloatArray, right: FloatArray, used: NDArray[np.bool_]) -> FloatArray:
-    """Least squares over some unknowns; the others are zero."""
-    x = np.zeros(matrix.shape[1])
-    x[used] = np.linalg.lstsq(matrix[:, used], right, rcond=None)[0]
-    return x
-
-
 ComplexArray = NDArray[np.complex128]
-SAME_RESIDUAL = 1e-3
-"""Relative gap between the lower bound and the design at which the design counts as optimal."""
-NO_RESIDUAL = 1e-6
-"""Residual ratio that counts as none: no gap is pursued below it."""
+SAME_RESIDUAL = 1e-3  # relative gap between the lower bound and the design at which the design counts as optimal
+NO_RESIDUAL = 1e-6  # residual ratio that counts as none: no gap is pursued below it
 _STEP_RAD = 0.1  # of the sweep, seen from the middle of the shaper; the peaks are refined
 _FEWEST_STEPS = 8
 _MOST_ROUNDS = 60
@@ -273,12 +231,13 @@ class _Band:
         at = np.flatnonzero((size >= padded[:-2]) & (size >= padded[2:]))
         omegas, step = self.omegas[at], self.omegas[1] - self.omegas[0] if len(self.omegas) > 1 else 0.0
         for _ in range(2 if step else 0):
-            three = _within(omegas[:, None] + step * _BESIDE, self.low, self.high)
+            # At an end of the band from beside it: a maximum may lie between the end and the frequency next to it.
+            centres = _within(omegas, self.low + step, self.high - step)
+            three = centres[:, None] + step * _BESIDE
             left, middle, right = (np.abs(self.residual(taps, three.ravel())) ** 2).reshape(-1, 3).T
             bend = left - 2.0 * middle + right
-            inner = (three[:, 2] - three[:, 0] > 1.99 * step) & (bend < 0.0)
-            shift = np.where(inner, 0.5 * (left - right) / np.where(inner, bend, -1.0), 0.0)
-            omegas = _within(omegas + step * _within(shift, -1.0, 1.0), self.low, self.high)
+            shift = np.where(bend < 0.0, 0.5 * (left - right) / np.where(bend < 0.0, bend, -1.0), 0.0)
+            omegas = centres + step * _within(shift, -1.0, 1.0)
             step *= 0.1
         omegas = np.concatenate([self.omegas[at], omegas])
         values = self.residual(taps, omegas)
@@ -299,13 +258,13 @@ class TapProblem:
     max_abs_sum: float | None  # largest sum of the taps' magnitudes; None: no tap is negative
     pool: CutPool  # planes, shared between problems of different duration
     last_tap: float = 0.0  # the tap at `last` periods is at least that
+    largest: float = math.inf  # largest magnitude of a tap
     _bands: list[_Band] = field(init=False)
     _rows: list[list[FloatArray]] = field(init=False)
     _program: TapProgram | None = field(init=False, default=None)
     _limit: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
-        """Prepare the sweeps."""
         times_s = np.arange(self.last + 1, dtype=np.float64) * self.period_s
         self._bands = [_Band(band, times_s) for band in self.bands]
         self._rows = [[] for _ in self.bands]
@@ -359,7 +318,7 @@ class TapProblem:
 
     def _forget(self, taps: FloatArray, worst: float) -> None:
         """Remove cutting planes that do not bound the result from the pool."""
-        self._program = None
+        self._program = None if self._bands else self._program
         for rows, omegas, directions in zip(self._rows, self.pool.omegas, self.pool.directions, strict=True):
             keep = [
                 k for k in range(len(rows)) if k < self.pool.starts or float(rows[k] @ taps) >= _BOUNDS_SHARE * worst
@@ -369,7 +328,6 @@ class TapProblem:
             directions[:] = [directions[k] for k in keep]
 
     def _with_planes(self, limit: float) -> TapProgram:
-        """The linear program with the planes so far, all of them below a limit."""
         new: list[FloatArray] = []
         for band, rows, omegas, directions in zip(
             self._bands, self._rows, self.pool.omegas, self.pool.directions, strict=True
@@ -379,8 +337,9 @@ class TapProblem:
                 turned = np.exp(np.outer(omegas[done:], band.q) - 1j * np.array(directions[done:])[:, None])
                 rows.extend(turned.real)
                 new.extend(turned.real)
-        if self._program is None or limit != self._limit:
-            self._program = TapProgram(self.equalities, signed=self.max_abs_sum is not None, last_tap=self.last_tap)
+        if self._program is None or (self._bands and limit != self._limit):
+            signed = self.max_abs_sum is not None
+            self._program = TapProgram(self.equalities, signed=signed, largest=self.largest, last_tap=self.last_tap)
             if self.max_abs_sum is not None:
                 self._program.limit_magnitudes(self.max_abs_sum)
             self._limit = limit

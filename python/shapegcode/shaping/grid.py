@@ -28,7 +28,7 @@ from shapegcode.shaping.bands import (
     whole_periods,
 )
 from shapegcode.shaping.grid_designs import shortest_non_negative
-from shapegcode.shaping.track import MovingMode, ShaperTrack, design_per_axis, design_track
+from shapegcode.shaping.track import MovingMode, ShaperTrack, design_per_axis, design_track, shaper_fir
 
 _ASSUMED_TICK_S = 0.001  # interpolation period where no machine states one
 _LONGEST_BLOCK_PERIOD_S = 0.02
@@ -143,13 +143,8 @@ def _periods(
     max_block_period_s: float,
     max_duration_s: float,
 ) -> list[float]:
-    """The block periods to try, ascending."""
-    check_modes_and_times(
-        bands,
-        interpolation_period_s=interpolation_period_s,
-        max_block_period_s=max_block_period_s,
-        max_duration_s=max_duration_s,
-    )
+    times_s = {"max_block_period_s": max_block_period_s, "max_duration_s": max_duration_s}
+    check_modes_and_times(bands, interpolation_period_s=interpolation_period_s, **times_s)
     if not (math.isfinite(block_time_s) and block_time_s >= 0.0):
         raise ArgumentError(f"block_time_s is {block_time_s} s: it must be finite and at least 0")
     fewest = max(1, math.ceil(block_time_s / interpolation_period_s - ON_GRID))
@@ -299,8 +294,7 @@ def make_grid(
     block_period_s: float, shaper: _core.Shaper, track: ShaperTrack | None = None, *, family: str = "", note: str = ""
 ) -> Grid:
     """Grid of a shaper whose times are whole block periods, and of shapers that follow an axis."""
-    delays = [round(t / block_period_s) for t in shaper.times_s]
-    return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)), track, family, note)
+    return Grid(block_period_s, shaper, shaper_fir(shaper, block_period_s), track, family, note)
 
 
 def choose_grid(
@@ -357,7 +351,8 @@ def choose_grid(
     if period is not None:
         best = robust_candidate(bands, period, shaping.max_duration_s, shaping.vibration_limit)
     assert best.shaper is not None  # what is chosen exists
-    grid = make_grid(best.period_s, best.shaper, _track(machine, best.period_s), family=family, note=best.note)
+    track = None if moving_axis(machine) is None else shaper_track(machine, best.period_s)
+    grid = make_grid(best.period_s, best.shaper, track, family=family, note=best.note)
     return _per_axis(grid, machine, exact=family == "non-negative")
 
 
@@ -394,13 +389,9 @@ def _of_family(
     from shapegcode.shaping.registry import design
 
     shaping = machine.shaping
-    periods_s = (
-        [period_s]
-        if period_s is not None
-        else candidate_periods(bands, machine, shaping.max_duration_s, shaping.vibration_limit)
-    )
-    found = []
-    refusals = []
+    limits = shaping.max_duration_s, shaping.vibration_limit
+    periods_s = candidate_periods(bands, machine, *limits) if period_s is None else [period_s]
+    found, refusals = [], []
     for each in periods_s:
         options = DesignOptions(each, shaping.max_duration_s, vibration_limit=shaping.vibration_limit)
         try:
@@ -419,11 +410,7 @@ def _of_family(
             f"the {name} shaper leaves up to {best.worst_residual:.1%} of the vibration within the modes' bands, "
             f"shaping.vibration_limit is {shaping.vibration_limit:.1%}"
         )
-    return make_grid(period, best.shaper, _track(machine, period), family=name, note=note)
-
-
-def _track(machine: Machine, period_s: float) -> ShaperTrack | None:
-    return None if moving_axis(machine) is None else shaper_track(machine, period_s)
+    return make_grid(period, best.shaper, family=name, note=note)
 
 
 def shaper_track(machine: Machine, period_s: float) -> ShaperTrack:
@@ -447,7 +434,7 @@ def override_vibration_um(
     """Largest residual vibration of straight moves in equal blocks, over the feed overrides."""
     moves = np.array([float(bool(modes)) for modes in excited_modes(model.machine)])
     speed = feed_mm_per_s * math.sqrt(moves.sum())
-    fir = _core.Fir([round(t / block_period_s) for t in shaper.times_s], list(shaper.amplitudes))
+    fir = shaper_fir(shaper, block_period_s)
     worst_mm = 0.0
     for stroke_s in _STROKES_S:
         path = _core.Path([_core.Segment.line(np.zeros(3), moves * feed_mm_per_s * stroke_s, speed)])

@@ -1,29 +1,43 @@
-"""Exact shaper designs on a sample grid that need an optimiser.
+"""Shapers on a sample grid: what defines a family, imposed exactly there, and the shortest taps that meet it.
 
-The shortest, a polynomial, may have wild taps: :func:`shortest_non_negative` spends a few more and never reverses.
+Rounding the times of a continuous design to a grid undoes its zeros. So a family is taken here by the
+conditions that define it, and the shortest taps on the grid that meet them are looked for: zeros, with their
+multiplicity, hold at ``z = e^{s*period}`` to rounding; a tolerated residual holds over its whole band, proven by
+:func:`shapegcode._core.worst_residual`. A zero is linear in the taps; limits on the residual: see `cutting_planes`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
+from shapegcode import _core
 from shapegcode._core import DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
 from shapegcode.io.units import FloatArray
-from shapegcode.shaping.bands import check_modes_and_times, mode_names, ms, whole_periods
-from shapegcode.shaping.cutting_planes import LinearProgram, non_negative_least_squares
+from shapegcode.shaping.bands import (
+    ModeBand,
+    check_modes_and_times,
+    check_times,
+    mode_names,
+    ms,
+    proven_worst,
+    whole_periods,
+)
+from shapegcode.shaping.cutting_planes import NO_RESIDUAL, SAME_RESIDUAL, CutPool, TapProblem
 
-RESIDUAL_LIMIT = 1e-10
-"""Largest residual ratio of a design that is handed out; the usual one is 1e-16 to 1e-15."""
+RESIDUAL_LIMIT = 1e-10  # largest residual ratio of a design that is handed out; the usual one is 1e-16 to 1e-15
 
 _SAME_CONDITION = 1e-13  # relative singular value below which two modes ask for the same thing on this grid
-_FEASIBLE = 1e-11  # residual of the non-negative least-squares problem that counts as none
-_SUPPORT_THRESHOLDS = (1e-9, 1e-13)  # amplitudes above one of these are taps of the optimiser's vertex
+_SUPPORT_THRESHOLDS = (1e-9, 1e-7, 1e-13)  # magnitudes above one of these are taps
 _SAME_OBJECTIVE = 1e-9  # of the squared duration
-_SAME_DURATION = 0.02  # designs whose durations differ by less are equal, relative
+_LONGER = 4  # times the longest duration: how far a refusal looks for what would do
+_HINT_PERIODS = 400  # longest grid that a refusal searches, periods
 
 
 def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s: float = 0.25) -> Shaper:
@@ -51,18 +65,133 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
     Source: this project.
     """
     check_modes_and_times(modes, period_s=period_s, max_duration_s=max_duration_s)
+    search = _GridSearch(Conditions(zeros=tuple(map(Zero, modes))), period_s)
+    shaper = search.shortest(whole_periods(max_duration_s, period_s))
+    if shaper is None:
+        raise DesignError(_none_exists(modes, period_s, max_duration_s))
+    return shaper
+
+
+def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: float, *, title: str) -> Shaper:
+    """Shortest shaper with taps at multiples of a period that meets the conditions.
+
+    Among the shapers of the shortest duration, one without negative impulses has the least second central moment (the
+    contour cost; under a limit to 0.1 %), one with them the least sum of magnitudes.
+
+    Source: this project.
+    """
+    check_times(period_s=period_s, max_duration_s=max_duration_s)
+    search = _GridSearch(conditions, period_s)
     most = whole_periods(max_duration_s, period_s)
-    # A solution stays one with further taps at zero.
-    last = smallest_enough(lambda last: _non_negative_solution(modes, period_s, last) is not None, 1, most)
-    while last is not None and last <= most:
-        for vertex in _vertices(modes, period_s, last):
-            conditions = exact_conditions(modes, period_s, last)
-            for threshold in _SUPPORT_THRESHOLDS:
-                shaper = polished(vertex, conditions, period_s, threshold, signed=False)
-                if shaper is not None and max(shaper.residual_ratio(mode) for mode in modes) <= RESIDUAL_LIMIT:
+    shaper = search.shortest(most)
+    if shaper is not None:
+        return shaper
+    text = f"no {title} within {ms(max_duration_s)} on a {ms(period_s)} grid"
+    further = min(_LONGER * most, _HINT_PERIODS)
+    if further > most:
+        longer = search.shortest(further)
+        if longer is not None:
+            raise DesignError(f"{text}; the shortest lasts {ms(longer.duration_s)}")
+        text += f", nor within {ms(further * period_s)}"
+    raise DesignError(f"{text}; {_polynomial(conditions, period_s)}; try another period")
+
+
+def _polynomial(conditions: Conditions, period_s: float) -> str:
+    if not conditions.zeros:
+        return "there is no zero from which a polynomial could be made"
+    try:
+        shaper = Shaper([0.0], [1.0])
+        for zero in conditions.zeros:
+            for _ in range(zero.multiplicity):
+                shaper = _core.convolve(shaper, grid_polynomial([zero.mode], period_s))
+    except ShapegcodeError as error:
+        return f"nor is there a polynomial: {error}"
+    return f"the polynomial with its zeros lasts {ms(shaper.duration_s)} with sum|a| {shaper.abs_sum:.4g}"
+
+
+@dataclass(frozen=True)
+class Zero:
+    """A mode of which nothing may be left: `multiplicity` - 1 derivatives of the residual vanish with it."""
+
+    mode: _core.Mode
+    multiplicity: int = 1
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What a shaper must satisfy."""
+
+    zeros: tuple[Zero, ...] = ()  # met to rounding
+    bands: tuple[ModeBand, ...] = ()  # over which no more than the limit is left
+    limit: float = NO_RESIDUAL  # residual ratio
+    largest_tap: float | None = None  # None: no tap is negative; else: the largest magnitude of a tap, either sign
+
+
+class _GridSearch:
+    """The linear programs of one set of conditions; the planes that were found are good for every duration."""
+
+    def __init__(self, conditions: Conditions, period_s: float) -> None:
+        self._conditions, self._period_s = conditions, period_s
+        self._pool = CutPool.around(conditions.bands)
+
+    def shortest(self, most: int) -> Shaper | None:
+        """The shortest shaper of at most that many periods, or None."""
+        # A guess: half a cycle for each zero, a whole one for each limit without a zero in it.
+        cycles_s = sum(0.5 * zero.multiplicity / zero.mode.frequency_hz for zero in self._conditions.zeros)
+        cycles_s = cycles_s or sum(1.0 / band.mode.frequency_hz for band in self._conditions.bands)
+        start = max(1, math.ceil(cycles_s / self._period_s))
+        too_few = 0
+        if self._conditions.largest_tap is None:  # within less than half a cycle positive impulses do not cancel
+            half_cycles_s = (0.5 / zero.mode.frequency_hz for zero in self._conditions.zeros)
+            too_few = max((math.ceil(each / self._period_s - 1e-9) - 1 for each in half_cycles_s), default=0)
+        # A solution stays one with further taps at zero.
+        last = smallest_enough(lambda last: self._feasible(self._problem(last)) is not None, start, most, too_few)
+        while last is not None and last <= most:
+            problem = self._problem(last)
+            for taps, threshold in product(self._candidates(problem), _SUPPORT_THRESHOLDS):
+                shaper = polished(taps, problem.equalities, self._period_s, threshold, self._conditions.largest_tap)
+                if shaper is not None and self._meets(shaper):
                     return shaper
-        last += 1
-    raise DesignError(_none_exists(modes, period_s, max_duration_s))
+            last += 1  # what the linear program took for feasible was so within its tolerance only
+        return None
+
+    def _problem(self, last: int) -> TapProblem:
+        zeros, bands, largest = self._conditions.zeros, self._conditions.bands, self._conditions.largest_tap
+        modes, counts = [zero.mode for zero in zeros], [zero.multiplicity for zero in zeros]
+        equal, total = exact_conditions(modes, self._period_s, last, counts), None if largest is None else math.inf
+        return TapProblem(bands, self._period_s, last, equal, total, self._pool, largest=largest or math.inf)
+
+    def _feasible(self, problem: TapProblem) -> FloatArray | None:
+        with suppress(DesignError):
+            bounds = problem.least_worst(self._conditions.limit)
+            return bounds.taps if bounds is not None and bounds.upper <= self._conditions.limit else None
+        return None
+
+    def _candidates(self, problem: TapProblem) -> Iterator[FloatArray]:
+        """Taps of that many periods, the best first."""
+        feasible = self._feasible(problem)
+        if feasible is None:
+            return
+        inner = (1.0 - 0.4 * SAME_RESIDUAL) * self._conditions.limit  # room for the gap of the planes and for the proof
+
+        def cheapest(cost: FloatArray) -> FloatArray | None:
+            with suppress(DesignError):
+                return problem.cheapest(cost, inner)
+            return None
+
+        if self._conditions.largest_tap is None:
+            yield from lower_hull(cheapest, problem.last, SAME_RESIDUAL if problem.bands else 0.0)
+        elif (least := cheapest(np.ones(problem.last + 1))) is not None:
+            yield least
+        yield feasible
+
+    def _meets(self, shaper: Shaper) -> bool:
+        largest = self._conditions.largest_tap
+        return (
+            all(shaper.residual_ratio(zero.mode) <= RESIDUAL_LIMIT for zero in self._conditions.zeros)
+            and all(proven_worst(shaper, [each]) <= self._conditions.limit for each in self._conditions.bands)
+            and (largest is None or float(np.abs(shaper.amplitudes).max()) <= largest * (1.0 + RESIDUAL_LIMIT))
+        )
 
 
 def exact_conditions(
@@ -119,41 +248,6 @@ def refined(columns: FloatArray, right: FloatArray, taps: FloatArray) -> FloatAr
     for _ in range(3):  # the second removes what the first one's rounding left, the third nothing
         taps = taps + np.linalg.lstsq(columns, right - columns @ taps, rcond=1e-14)[0]
     return taps
-
-
-def _non_negative_solution(modes: Sequence[Mode], period_s: float, last: int) -> FloatArray | None:
-    """Taps at 0 ... `last` periods that satisfy every condition to rounding, by Lawson and Hanson's method, or None."""
-    matrix, right = exact_conditions(modes, period_s, last)
-    taps = non_negative_least_squares(matrix, right)
-    if taps is None:  # it went round in circles: the linear program decides
-        return Vertices(matrix, right)(np.zeros(last + 1))
-    return taps if float(np.linalg.norm(matrix @ taps - right)) <= _FEASIBLE else None
-
-
-class Vertices:
-    """Vertices of the taps ``x >= 0`` with ``matrix @ x == right``, each of least cost."""
-
-    def __init__(self, matrix: FloatArray, right: FloatArray) -> None:
-        count = matrix.shape[1]
-        self._program = LinearProgram(np.zeros(count), np.full(count, math.inf), (matrix, right))
-
-    def __call__(self, cost: FloatArray) -> FloatArray | None:
-        """The vertex that minimises ``cost @ x``; None: not found."""
-        self._program.set_cost(cost)
-        try:
-            return self._program.solve()
-        except DesignError:
-            return None
-
-
-def _vertices(modes: Sequence[Mode], period_s: float, last: int) -> Iterator[FloatArray]:
-    """Solutions worth polishing, the one with the least second central moment first."""
-    matrix, right = exact_conditions(modes, period_s, last)
-    yield from lower_hull(Vertices(matrix, right), last)
-    # a design at the edge of what is possible may lie within the linear program's tolerance
-    taps = _non_negative_solution(modes, period_s, last)
-    if taps is not None:
-        yield taps
 
 
 class _Corner(NamedTuple):
@@ -221,16 +315,24 @@ def _least_between(left: _Corner, right: _Corner) -> float:
 
 
 def polished(
-    taps: FloatArray, conditions: tuple[FloatArray, FloatArray], period_s: float, threshold: float, *, signed: bool
-) -> Shaper | None:
-    """Taps above a threshold, solved again to rounding; None if they then miss the sum 1 or change their sign."""
+    taps: FloatArray, conditions: tuple[FloatArray, FloatArray], period_s: float, threshold: float,
+    largest: float | None = None,
+) -> Shaper | None:  # fmt: skip
+    """Taps above a threshold, solved again to rounding; None if they then miss a condition or change their sign.
+
+    Without a largest magnitude no tap is negative; taps of that magnitude stay.
+    """
     matrix, right = conditions
     support = np.flatnonzero(np.abs(taps) > threshold)
-    amplitudes = refined(matrix[:, support], right, taps[support])
-    total = float(amplitudes.sum())
-    if abs(total - 1.0) > RESIDUAL_LIMIT or not (signed or np.all(amplitudes > 0.0)):
+    columns, amplitudes = matrix[:, support], taps[support]
+    free = np.ones(len(support), dtype=bool) if largest is None else np.abs(amplitudes) < largest - 1e-8
+    if largest is not None:
+        amplitudes[~free] = np.copysign(largest, amplitudes[~free])
+    amplitudes[free] = refined(columns[:, free], right - columns[:, ~free] @ amplitudes[~free], amplitudes[free])
+    off = np.abs(columns @ amplitudes - right).max()
+    if off > RESIDUAL_LIMIT or (largest is None and not np.all(amplitudes > 0.0)):
         return None
-    return Shaper(((support - support[0]) * period_s).tolist(), (amplitudes / total).tolist())
+    return Shaper(((support - support[0]) * period_s).tolist(), (amplitudes / amplitudes.sum()).tolist())
 
 
 def _none_exists(modes: Sequence[Mode], period_s: float, max_duration_s: float) -> str:

@@ -65,7 +65,6 @@ def selected(result: Recommendation) -> list[Design]:
 
 
 def _taps(each: Design) -> tuple[float, ...]:
-    """Times and amplitudes, to nine digits."""
     return tuple(float(f"{value:.9g}") for value in (*each.shaper.times_s, *each.shaper.amplitudes))
 
 

@@ -6,20 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from shapegcode._core import ArgumentError, DesignError, Shaper, grid_polynomial
+from shapegcode.shaping import solvers
 from shapegcode.shaping.bands import NARROW_PERCENT, Design, DesignOptions, ModeBand, evaluate, ms
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.robust import minimax_robust
-from shapegcode.shaping.solvers import (
-    hump_ei,
-    modified,
-    negative,
-    repeated,
-    simultaneous,
-    smooth,
-    solve_minimal,
-    specified,
-    user_taps,
-)
 
 _SAME_POLE = 1e-9  # relative
 _SLACK = 1e-9  # of a limit: forgives rounding
@@ -72,56 +62,56 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "zv", "zero vibration, one mode after the other",
         "Smith 1958; Park, Hong and Danielson 2009 (paper 002), eq. 1-3",
-        "any modes, damped or not; exact at the nominal frequencies only", True, True, repeated("ZV", 1),
+        "any modes, damped or not; exact at the nominal frequencies only", True, True, solvers.repeated("ZV", 1),
     ),
     Family(
         "zvd", "zero vibration and derivative", "Singer and Seering 1990",
         "any modes; double zeros at the nominal frequencies, twice as long as ZV", True, True,
-        repeated("ZVD", 2),
+        solvers.repeated("ZVD", 2),
     ),
     Family(
         "zvdd", "zero vibration and two derivatives", "Singer and Seering 1990",
         "any modes; triple zeros at the nominal frequencies, three times as long as ZV", True, True,
-        repeated("ZVDD", 3),
+        solvers.repeated("ZVDD", 3),
     ),
     Family(
         "mzv", "modified zero vibration", "the printer firmware Klipper",
         "any modes; zeros at each mode and at 5/3 of its damped frequency, half as long again as ZV", True, True,
-        modified,
+        solvers.modified,
     ),
     Family(
         "ei", "extra-insensitive, one hump", "Singhose, Seering and Singer 1994; damped: this project",
         "modes damped up to some .7; leaves the vibration limit at the nominal frequency", True, True,
-        hump_ei("EI", 1),
+        solvers.hump_ei("EI", 1),
     ),
     Family(
         "ei2", "extra-insensitive, two humps", "Singhose, Porter, Tuttle and Singer 1997; damped: this project",
         "modes damped up to some .45; zero at the nominal frequency, the vibration limit on both sides", True, True,
-        hump_ei("two-hump EI", 2),
+        solvers.hump_ei("two-hump EI", 2),
     ),
     Family(
         "ei3", "extra-insensitive, three humps", "Singhose, Porter, Tuttle and Singer 1997; damped: this project",
         "modes damped up to some .3; leaves the vibration limit at the nominal frequency", True, True,
-        hump_ei("three-hump EI", 3),
+        solvers.hump_ei("three-hump EI", 3),
     ),
     Family(
         "si", "specified insensitivity", "Singhose, Seering and Singer 1996; linear programs: this project",
         "any modes with their bands, all at once; leaves up to the vibration limit; without a grid its times lie "
-        "1/64 of the fastest period apart", True, True, specified,
+        "1/64 of the fastest period apart", True, True, solvers.specified,
     ),
     Family(
         "negative-zv", "unity-magnitude ZV with a negative impulse", "Singhose, Singer and Seering 1994",
-        "any modes; shorter than ZV, sum |a| 3 for one mode; excites faster modes", True, True, negative,
+        "any modes; shorter than ZV, sum |a| 3 for one mode; excites faster modes", True, True, solvers.negative,
     ),
     Family(
         "simultaneous", "shortest without negative impulses, all modes at once", "this project",
-        "any modes at continuous times; on a grid it is the family non-negative", True, False, simultaneous,
+        "any modes at continuous times; on a grid it is the family non-negative", True, False, solvers.simultaneous,
     ),
     Family(
         "minimal", "one impulse more than modes",
         "Park, Hong and Danielson 2009 (paper 002), eq. 4-17; searches of this project",
         "one to six modes, damped or not, at continuous times (on a grid the polynomial stands for it); exact at the "
-        "nominal frequencies only; impulses may be negative", True, False, solve_minimal,
+        "nominal frequencies only; impulses may be negative", True, False, solvers.solve_minimal,
     ),
     Family(
         "polynomial", "shortest exact shaper of a grid", "this project",
@@ -144,31 +134,31 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "smooth-zv", "polynomial kernel with a zero at the mode (Kalico's smooth_zv)", _KALICO,
         "any modes, best on a grid of four periods in a cycle or more; its samples are the impulses, none is negative; "
-        "exact at the nominal frequencies", False, True, smooth("smooth-zv", (1.0,), 0.8025),
+        "exact at the nominal frequencies", False, True, solvers.smooth("smooth-zv", (1.0,), 0.8025),
     ),
     Family(
         "smooth-mzv", "polynomial kernel with zeros at 1 and 5/3 times the mode (smooth_mzv)", _KALICO,
-        _SMOOTH, False, True, smooth("smooth-mzv", (1.0, 5.0 / 3.0), 0.95625),
+        _SMOOTH, False, True, solvers.smooth("smooth-mzv", (1.0, 5.0 / 3.0), 0.95625),
     ),
     Family(
         "smooth-ei", "polynomial kernel with zeros at 1 and 1.414 times the mode (smooth_ei)", _KALICO,
-        _SMOOTH, False, True, smooth("smooth-ei", (1.0, 1.41375), 1.06625),
+        _SMOOTH, False, True, solvers.smooth("smooth-ei", (1.0, 1.41375), 1.06625),
     ),
     Family(
         "smooth-ei2", "polynomial kernel with zeros at 1, 1.525 and 2.159 times the mode (smooth_2hump_ei)", _KALICO,
-        _SMOOTH, False, True, smooth("smooth-ei2", (1.0, 1.525, 2.159), 1.14875),
+        _SMOOTH, False, True, solvers.smooth("smooth-ei2", (1.0, 1.525, 2.159), 1.14875),
     ),
     Family(
         "smooth-si", "polynomial kernel with zeros at 1, 1.55 and 2.33 times the mode (smooth_si)", _KALICO,
-        _SMOOTH, False, True, smooth("smooth-si", (1.0, 1.5495, 2.32975), 1.245, at_least=True),
+        _SMOOTH, False, True, solvers.smooth("smooth-si", (1.0, 1.5495, 2.32975), 1.245, at_least=True),
     ),
     Family(
         "smooth-zvd-ei", "polynomial kernel with a double zero at the mode and one at 1.69 times it (smooth_zvd_ei)",
-        _KALICO, _SMOOTH, False, True, smooth("smooth-zvd-ei", (1.0, 1.0, 1.6875), 1.475),
+        _KALICO, _SMOOTH, False, True, solvers.smooth("smooth-zvd-ei", (1.0, 1.0, 1.6875), 1.475),
     ),
     Family(
         "taps", "impulses as given", "the user",
-        "evaluated as given; on a grid only if their times lie on it", True, True, user_taps,
+        "evaluated as given; on a grid only if their times lie on it", True, True, solvers.user_taps,
     ),
 )  # fmt: skip
 """Every family, in the order of tables."""
@@ -176,10 +166,10 @@ FAMILIES: tuple[Family, ...] = (
 
 def family_named(name: str) -> Family:
     """The row of that name."""
-    for row in FAMILIES:
-        if row.name == name:
-            return row
-    raise ArgumentError(f"{name!r} is no family of shapers: {', '.join(row.name for row in FAMILIES)}")
+    rows = {row.name: row for row in FAMILIES}
+    if name not in rows:
+        raise ArgumentError(f"{name!r} is no family of shapers: {', '.join(rows)}")
+    return rows[name]
 
 
 def distinct(bands: Sequence[ModeBand]) -> list[ModeBand]:

@@ -1,4 +1,4 @@
-"""A comparison of shapers and the one to take: figures, tables, the answer, the next step."""
+"""A comparison of shapers: how designs rank, which one to take and why in words; tables, the answer, the next step."""
 
 from __future__ import annotations
 
@@ -6,12 +6,136 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
+from shapegcode._core import ArgumentError
 from shapegcode.results.outcome import Plot
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
-from shapegcode.shaping.bands import Design, ModeBand, spoken
-from shapegcode.shaping.ranking import NO_RESIDUAL, is_within, recommend
+from shapegcode.shaping.bands import SAME, Design, ModeBand, ms, spoken
 from shapegcode.shaping.registry import FAMILIES
+
+NO_RESIDUAL = 1e-9  # a residual ratio below this is none: what is left is the rounding of the solver
+
+_CONVERTED = {"non-negative", "robust"}  # what a conversion takes by itself
+_FOR_GRIDS = {row.name for row in FAMILIES if not row.continuous}
+_DIGITS = 9  # designs that agree in so many digits are equally good
+_ROUNDING = 1e-6  # a design made for a limit may miss it by so much, relative
+
+
+def _merits(each: Design) -> tuple[float, float, float, float]:
+    """What is better small: duration, worst residual, contour cost (either sign), sum of magnitudes."""
+    values = (each.duration_s, max(each.worst_residual, NO_RESIDUAL), abs(each.variance_s2), each.abs_sum)
+    duration, residual, contour, magnitudes = (float(f"{value:.{_DIGITS}g}") for value in values)
+    return duration, residual, contour, magnitudes
+
+
+OBJECTIVES = {
+    "shortest": "the shortest",
+    "contour": "the one with the least contour cost",
+    "robust": "the one with the least worst residual",
+}
+"""Objectives by name, and how the reason calls the winner."""
+
+
+def _order(each: Design, objective: str) -> tuple[float, ...]:
+    """What is least in the design to take, then the family of which an equally good one is taken."""
+    duration, residual, contour, _ = _merits(each)
+    fewest_blocks = -(each.period_s or 0.0)  # the longest period
+    rank = 0.0 if each.family in _CONVERTED else 1.0 if each.family in _FOR_GRIDS else 2.0
+    if objective == "shortest":  # what is left is within the limit
+        return duration, fewest_blocks, rank, contour, residual
+    first, last = (contour, residual) if objective == "contour" else (residual, contour)
+    return first, duration, fewest_blocks, last, rank
+
+
+def pareto_front(designs: Sequence[Design]) -> list[bool]:
+    """For each design whether no other one is at least as good in everything and better in something.
+
+    Compared are duration, worst residual, magnitude of the contour cost and sum of the taps' magnitudes, each to nine
+    digits, a residual below 1e-9 as none. A design on a grid serves where continuous times are asked for, not the
+    other way round: so designs on grids are compared with each other only.
+    """
+    if not designs:
+        return []
+    merits = np.array([_merits(each) for each in designs])
+    on_grid = np.array([each.period_s is not None for each in designs])
+    front = []
+    for own, grid in zip(merits, on_grid, strict=True):
+        better = (merits <= own).all(axis=1) & (merits < own).any(axis=1)
+        front.append(not bool((better & (on_grid | ~grid)).any()))
+    return front
+
+
+def recommend(
+    designs: Sequence[Design], vibration_limit: float, objective: str = "shortest", allow_negative: bool = False
+) -> int:
+    """Index of the design to take.
+
+    Of the designs without negative impulses (of all with `allow_negative`, or where every design has some) those whose
+    worst residual is at most the limit compete for the objective, and of these, if there are any, those that cancel the
+    modes that state no band; if there is none within the limit, the one that leaves least is taken. Of equally short
+    ones on grids, to 2 %, the one with the longest period is taken, because it writes the fewest blocks; of equal ones
+    the family that a conversion takes by itself, then one that is made for grids.
+    """
+    if not designs:
+        raise ArgumentError("there is no design to choose from: 0 given")
+    indices, good = _competing(designs, vibration_limit, allow_negative)
+    aim = objective if good else "robust"
+    orders = {index: _order(designs[index], aim) for index in good or indices}
+    best = min(orders, key=orders.__getitem__)
+    if designs[best].period_s is None or (good and objective != "shortest"):
+        return best
+    most = (1.0 + SAME) * orders[best][0]
+    periods = {index: designs[index].period_s or 0.0 for index, order in orders.items() if order[0] <= most}
+    longest_s = max(periods.values())
+    return min((index for index in periods if periods[index] == longest_s), key=orders.__getitem__)
+
+
+def _competing(designs: Sequence[Design], limit: float, allow_negative: bool) -> tuple[list[int], list[int]]:
+    """Designs that may be taken; those within the limit, of them those that cancel the modes without a band."""
+    indices = [index for index, each in enumerate(designs) if allow_negative or not each.negative]
+    indices = indices or list(range(len(designs)))
+    good = [index for index in indices if is_within(designs[index], limit)]
+    return indices, [index for index in good if designs[index].exact] or good
+
+
+def is_within(each: Design, vibration_limit: float) -> bool:
+    """Whether the worst residual is at most the limit, but for rounding."""
+    return each.worst_residual <= vibration_limit * (1.0 + _ROUNDING)
+
+
+def reason_for(
+    designs: Sequence[Design], index: int, bands: Sequence[ModeBand], limit: float, objective: str, allow_negative: bool
+) -> str:
+    """Why `recommend` takes the design of that index, in a sentence."""
+    taken = designs[index]
+    indices, among = _competing(designs, limit, allow_negative)
+    good, leaves = len(among), _left(taken.worst_residual)
+    only_negative = not allow_negative and taken.negative
+    kind = "" if allow_negative or only_negative else "non-negative "
+    if good:
+        unstated = [band for band in bands if not band.uncertainty]
+        exactly = f" and which cancel{'' if good > 1 else 's'} {spoken(unstated)}" if unstated and taken.exact else ""
+        text = (
+            f"{OBJECTIVES[objective]} of {good} {kind}design{'' if good == 1 else 's'} whose worst residual over "
+            f"{spoken(bands)} stays within {_left(limit)}{exactly} (it leaves {leaves})"
+        )
+    else:
+        text = (
+            f"none of {len(indices)} {kind}design{'' if len(indices) == 1 else 's'} stays within {_left(limit)} "
+            f"over {spoken(bands)}; this one leaves least, {leaves}"
+        )
+        others = [each for each in designs if each.negative and is_within(each, limit)]
+        if others and not allow_negative:
+            other = min(others, key=lambda each: _order(each, "shortest"))
+            text += f"; with negative impulses {other.family} ({ms(other.duration_s)}) would leave less"
+    return text + ("; every design has negative impulses" if only_negative else "")
+
+
+def _left(ratio: float) -> str:
+    return "nothing" if ratio < NO_RESIDUAL else f"{_percent(ratio)} %"
+
 
 _MARK, _GRID_MARK = "=>", "->"
 _PARETO_OF_A_FAMILY = 3  # rows, beside the preferred one
@@ -141,9 +265,8 @@ class Recommendation(Result):
         return lines
 
     def _left(self, each: Design) -> str:
-        where = (
-            f"{'within the bands of' if any(band.uncertainty for band in self.modes) else 'of'} {spoken(self.modes)}"
-        )
+        among = "within the bands of" if any(band.uncertainty for band in self.modes) else "of"
+        where = f"{among} {spoken(self.modes)}"
         if each.worst_residual < NO_RESIDUAL:
             return f"nothing {where}"
         return f"at most {_percent(each.worst_residual)} % {where} (limit {_percent(self.vibration_limit)} %)"
@@ -196,9 +319,11 @@ class Recommendation(Result):
     def _designs_table(self, speed_mm_per_s: float, radius_mm: float, everything: bool) -> Table:
         indices = self.shown(everything=everything)
         rows = [self.designs[index] for index in indices]
-        marks = {id(self.designs[index]): self._mark(index) for index in indices}
+        marks = {id(self.design): _MARK}
+        if (on_grid := self.recommended_on_grid) is not None:
+            marks.setdefault(id(self.designs[on_grid]), _GRID_MARK)
         columns = (
-            Column("", value=lambda each: marks[id(each)], text=True),
+            Column("", value=lambda each: marks.get(id(each), ""), text=True),
             Column("family", text=True),
             Column("grid", "ms", lambda each: "any" if each.period_s is None else f"{each.period_s * 1e3:.4g}"),
             Column("lasts", "ms", lambda each: each.duration_s * 1e3, digits=2),
@@ -233,11 +358,6 @@ class Recommendation(Result):
     def plots(self) -> Mapping[str, Plot]:
         """Pareto front, sensitivity, impulses, steps, and for two modes the branches of minimal shapers."""
         return self._drawn_beside()
-
-    def _mark(self, index: int) -> str:
-        if index == self.recommended:
-            return _MARK
-        return _GRID_MARK if index == self.recommended_on_grid else ""
 
 
 def families_table() -> Table:

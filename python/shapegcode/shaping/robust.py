@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,8 +42,8 @@ _HINT_PERIODS = 500  # longest grid that a refusal searches, periods
 _NO_TAP = 1e-9  # smaller amplitudes are the solver's round-off
 _GROWTH = 1.4  # of the number of periods while it is searched
 _WHOLE = 1e-3  # cycles per period from a whole number
+# Where the best use of the last periods of a damped mode is to wait, a tap this large marks their end.
 _LAST_TAP = 1e-3
-"""Where the best use of the last periods of a damped mode is to wait, a tap this large marks their end."""
 _SAME_VARIANCE = 5e-3  # relative
 
 
@@ -125,7 +126,6 @@ def _hints(task: Task, limit: float, max_duration_s: float) -> str:
 
 
 def _other_period(task: Task, limit: float, max_duration_s: float) -> str:
-    """Which of some other periods does best within the duration."""
     shortest_s, least = math.inf, math.inf
     shortest_text, least_text = "", "no other period from half to twice as long has a design within that duration"
     for share in _OTHER_PERIODS:
@@ -185,10 +185,8 @@ class Task:
         check_modes_and_times(bands, period_s=period_s)
         if not (math.isfinite(max_abs_sum) and max_abs_sum >= 1.0):
             raise ArgumentError(f"max_abs_sum is {max_abs_sum}: must be finite and at least 1, the sum of the impulses")
-        bands = tuple(bands)
-        wide = [band for band in bands if band.uncertainty]
-        largest = None if non_negative else max_abs_sum
-        return cls(bands, period_s, largest, zeros_at_nominal, CutPool.around(wide), mirrored)
+        pool = CutPool.around([band for band in bands if band.uncertainty])
+        return cls(tuple(bands), period_s, None if non_negative else max_abs_sum, zeros_at_nominal, pool, mirrored)
 
     @property
     def wide(self) -> list[ModeBand]:
@@ -224,8 +222,8 @@ class Task:
         """The taps without round-off, their zeros solved again to rounding, judged; None if that breaks them."""
         if self.mirrored:
             taps = 0.5 * (taps + taps[::-1])
-        conditions, signed = self.conditions(len(taps) - 1), self.max_abs_sum is not None
-        shaper = polished(taps, conditions, self.period_s, _NO_TAP, signed=signed)
+        largest = None if self.max_abs_sum is None else math.inf
+        shaper = polished(taps, self.conditions(len(taps) - 1), self.period_s, _NO_TAP, largest)
         if shaper is None or any(shaper.residual_ratio(mode) > RESIDUAL_LIMIT * shaper.abs_sum for mode in self.exact):
             return None
         worst = proven_worst(shaper, self.bands)
@@ -236,7 +234,10 @@ def shortest_below(task: Task, limit: float, max_duration_s: float, *, least_cos
     """The shortest design whose worst residual is below the limit, of least contour cost or any one, or None."""
     most = task.periods(max_duration_s)
     if not task.wide and task.max_abs_sum is None and not task.mirrored:
-        return _exact(task, max_duration_s)
+        with suppress(DesignError):
+            shaper = shortest_non_negative(task.exact, task.period_s, max_duration_s)
+            return RobustDesign(shaper, task.period_s, proven_worst(shaper, task.bands), 0.0)
+        return None
     if unreachable(task):
         return None
     last = smallest_below(task, limit, most)
@@ -246,14 +247,6 @@ def shortest_below(task: Task, limit: float, max_duration_s: float, *, least_cos
             return found
         last += 1  # the taps did not survive full precision
     return None
-
-
-def _exact(task: Task, max_duration_s: float) -> RobustDesign | None:
-    try:
-        shaper = shortest_non_negative(task.exact, task.period_s, max_duration_s)
-    except DesignError:
-        return None
-    return RobustDesign(shaper, task.period_s, proven_worst(shaper, task.bands), 0.0)
 
 
 def best_within(task: Task, last: int) -> RobustDesign | None:
@@ -280,7 +273,6 @@ def best_within(task: Task, last: int) -> RobustDesign | None:
 
 
 def _below(task: Task, last: int, limit: float) -> Bounds | None:
-    """Taps within `last` periods whose worst residual is below the limit, or None."""
     # mirrored taps stay so with a zero at each end, so a period more helps them or the one before
     for periods in (last, last - 1) if task.mirrored and last else (last,):
         bounds = task.problem(periods).least_worst(limit)

@@ -11,27 +11,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.polynomial import legendre
 
-from shapegcode._core import (
-    ArgumentError,
-    DesignError,
-    MinimalShapers,
-    Mode,
-    Shaper,
-    convolve,
-    convolved_zv,
-    extra_insensitive,
-    minimal_shapers,
-    mzv,
-    mzv_second_zero,
-    negative_zv,
-    repeated_zv,
-)
+from shapegcode import _core
 from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import DesignOptions, ModeBand, mode_names, ms, on_grid
-from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, halved
-from shapegcode.shaping.grid_search import Conditions, ResidualLimit, Zero, shortest_on_grid
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, Conditions, Zero, halved, shortest_on_grid
 
-Solve = Callable[[Sequence[ModeBand], DesignOptions], Sequence[Shaper]]
+Solve = Callable[[Sequence[ModeBand], DesignOptions], Sequence[_core.Shaper]]
 """All shapers of a family for some bands, the preferred one first."""
 _STEPS_PER_PERIOD = 64  # of the fastest frequency: time grid of the SI shaper at continuous times
 _PER_PERIOD = (40, 80, 160, 320)  # steps of the time grid in a period of the fastest mode
@@ -51,13 +36,11 @@ _MOST_PERIODS = 100.0 - 1e-6  # of the fastest mode: the limit of minimal_shaper
 _PROVEN_MODES = 3  # more modes take too many boxes for a proof; the starts alone search them
 
 
-def _one_after_the_other(of_one: Callable[[Mode, DesignOptions], Shaper]) -> Solve:
-    """The design of one mode, convolved over all."""
-
-    def solve(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+def _one_after_the_other(of_one: Callable[[_core.Mode, DesignOptions], _core.Shaper]) -> Solve:
+    def solve(bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:
         shaper = of_one(bands[0].mode, options)
         for band in bands[1:]:
-            shaper = convolve(shaper, of_one(band.mode, options))
+            shaper = _core.convolve(shaper, of_one(band.mode, options))
         return [shaper]
 
     return solve
@@ -65,20 +48,16 @@ def _one_after_the_other(of_one: Callable[[Mode, DesignOptions], Shaper]) -> Sol
 
 def _defined(
     name: str,
-    continuous: Callable[[Mode, DesignOptions], Shaper],
-    conditions: Callable[[Mode, DesignOptions], Conditions],
+    continuous: Callable[[_core.Mode, DesignOptions], _core.Shaper],
+    conditions: Callable[[_core.Mode, DesignOptions], Conditions],
 ) -> Solve:
     """A closed form at continuous times; on a grid the shortest taps that meet the conditions that define it."""
 
-    def of_one(mode: Mode, options: DesignOptions) -> Shaper:
+    def of_one(mode: _core.Mode, options: DesignOptions) -> _core.Shaper:
         if options.period_s is None:
             return continuous(mode, options)
-        return shortest_on_grid(
-            conditions(mode, options),
-            options.period_s,
-            options.max_duration_s,
-            title=f"{name} for {mode_names([mode])}",
-        )
+        title, longest_s = f"{name} for {mode_names([mode])}", options.max_duration_s
+        return shortest_on_grid(conditions(mode, options), options.period_s, longest_s, title=title)
 
     return _one_after_the_other(of_one)
 
@@ -87,7 +66,7 @@ def repeated(name: str, zeros: int) -> Solve:
     """ZV, ZVD, ZVDD ...: that many zeros at each mode; on a grid the shortest non-negative impulses that have them."""
     return _defined(
         name,
-        lambda mode, _options: repeated_zv(mode, zeros),
+        lambda mode, _options: _core.repeated_zv(mode, zeros),
         lambda mode, _options: Conditions(zeros=(Zero(mode, zeros),)),
     )
 
@@ -95,62 +74,58 @@ def repeated(name: str, zeros: int) -> Solve:
 def hump_ei(name: str, humps: int) -> Solve:
     """EI with that many humps; on a grid its zeros, and its residual between the outermost ones."""
 
-    def conditions(mode: Mode, options: DesignOptions) -> Conditions:
-        zeros_hz = extra_insensitive(mode, options.vibration_limit, humps).zeros_hz
-        return Conditions(
-            zeros=tuple(Zero(Mode(frequency_hz, mode.damping_ratio)) for frequency_hz in zeros_hz),
-            limits=(ResidualLimit(mode, zeros_hz[0], zeros_hz[-1], options.vibration_limit),),
-        )
+    def conditions(mode: _core.Mode, options: DesignOptions) -> Conditions:
+        zeros_hz = _core.extra_insensitive(mode, options.vibration_limit, humps).zeros_hz
+        zeros = tuple(Zero(_core.Mode(frequency_hz, mode.damping_ratio)) for frequency_hz in zeros_hz)
+        low_hz, high_hz = zeros_hz[0], zeros_hz[-1]
+        middle = _core.Mode(0.5 * (low_hz + high_hz), mode.damping_ratio)
+        return Conditions(zeros, (ModeBand(middle, (high_hz - low_hz) / (high_hz + low_hz)),), options.vibration_limit)
 
     return _defined(
-        name, lambda mode, options: extra_insensitive(mode, options.vibration_limit, humps).shaper, conditions
+        name, lambda mode, options: _core.extra_insensitive(mode, options.vibration_limit, humps).shaper, conditions
     )
 
 
 modified = _defined(
     "MZV",
-    lambda mode, _options: mzv(mode),
-    lambda mode, _options: Conditions(zeros=(Zero(mode), Zero(mzv_second_zero(mode)))),
+    lambda mode, _options: _core.mzv(mode),
+    lambda mode, _options: Conditions(zeros=(Zero(mode), Zero(_core.mzv_second_zero(mode)))),
 )
 """MZV; on a grid the shortest non-negative impulses with its two zeros."""
 
 negative = _defined(
     "negative ZV",
-    lambda mode, _options: negative_zv(mode),
+    lambda mode, _options: _core.negative_zv(mode),
     lambda mode, _options: Conditions(zeros=(Zero(mode),), largest_tap=1.0),
 )
 """Unity-magnitude ZV; on a grid the shortest taps between -1 and 1."""
 
 
-def specified(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+def specified(bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:
     """SI: the shortest non-negative impulses that leave at most the vibration limit over every band."""
-    conditions = Conditions(limits=tuple(_limit(band, options.vibration_limit) for band in bands))
-    period_s = options.period_s
+    limit, period_s = options.vibration_limit, options.period_s
+    if not 0.0 < limit < 1.0:
+        raise _core.ArgumentError(f"the vibration limit is {limit:.4g}: it must be above 0 and below 1")
     if period_s is None:
-        period_s = 1.0 / (_STEPS_PER_PERIOD * max(each.highest_hz for each in conditions.limits))
-    title = f"SI shaper with {options.vibration_limit:.4g} left for {mode_names([band.mode for band in bands])}"
+        period_s = 1.0 / (_STEPS_PER_PERIOD * max(band.shifted(1.0).frequency_hz for band in bands))
+    title = f"SI shaper with {limit:.4g} left for {mode_names([band.mode for band in bands])}"
+    conditions = Conditions(bands=tuple(bands), limit=limit)
     return [shortest_on_grid(conditions, period_s, options.max_duration_s, title=title)]
 
 
-def _limit(band: ModeBand, limit: float) -> ResidualLimit:
-    if not 0.0 < limit < 1.0:
-        raise ArgumentError(f"the vibration limit is {limit:.4g}: it must be above 0 and below 1")
-    return ResidualLimit(band.mode, band.shifted(-1.0).frequency_hz, band.shifted(1.0).frequency_hz, limit)
-
-
-def simultaneous(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+def simultaneous(bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:
     """Shortest non-negative impulses at continuous times that cancel all modes at once."""
     return [simultaneous_zv([band.mode for band in bands], options.max_duration_s)]
 
 
-def user_taps(_bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+def user_taps(_bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:
     """The taps that were given, on the grid if there is one."""
     if options.taps is None:
-        raise ArgumentError("the family taps judges impulses that are given: none are")
+        raise _core.ArgumentError("the family taps judges impulses that are given: none are")
     return [options.taps if options.period_s is None else on_grid(options.taps, options.period_s)]
 
 
-def simultaneous_zv(modes: Sequence[Mode], max_duration_s: float) -> Shaper:
+def simultaneous_zv(modes: Sequence[_core.Mode], max_duration_s: float) -> _core.Shaper:
     """Shortest shaper with non-negative impulses at continuous times that cancels every mode."""
     fastest_hz = max(mode.frequency_hz for mode in modes)
     title = f"simultaneous shaper without negative impulses for {mode_names(modes)}"
@@ -160,21 +135,21 @@ def simultaneous_zv(modes: Sequence[Mode], max_duration_s: float) -> Shaper:
         # the exact solution may be shorter than that of the grid by a step or two
         try:
             start = shortest_on_grid(conditions, step_s, max_duration_s + 2.0 * step_s, title=title)
-        except DesignError as error:
-            one_by_one_s = convolved_zv(modes).duration_s
-            raise DesignError(
+        except _core.DesignError as error:
+            one_by_one_s = _core.convolved_zv(modes).duration_s
+            raise _core.DesignError(
                 f"no {title} within {ms(max_duration_s)}; one ZV after the other lasts {ms(one_by_one_s)}"
             ) from error
         shaper = _polished(*_merged(start, _NEIGHBOURS * step_s), modes)
         if shaper is not None and shaper.duration_s <= max_duration_s * (1.0 + 1e-9):
             return shaper
-    raise DesignError(
+    raise _core.DesignError(
         f"no {title} within {ms(max_duration_s)}: on a grid of {1e3 * step_s:.3g} ms there is one of "
         f"{ms(start.duration_s)}, but no exact one was found near it"
     )
 
 
-def _merged(shaper: Shaper, distance_s: float) -> tuple[FloatArray, FloatArray]:
+def _merged(shaper: _core.Shaper, distance_s: float) -> tuple[FloatArray, FloatArray]:
     """Times and amplitudes with neighbouring taps as one, at their mean time."""
     groups: list[list[int]] = []
     for index, time_s in enumerate(shaper.times_s):
@@ -187,7 +162,7 @@ def _merged(shaper: Shaper, distance_s: float) -> tuple[FloatArray, FloatArray]:
     return times - times[0], amplitudes
 
 
-def _polished(times_s: FloatArray, amplitudes: FloatArray, modes: Sequence[Mode]) -> Shaper | None:
+def _polished(times_s: FloatArray, amplitudes: FloatArray, modes: Sequence[_core.Mode]) -> _core.Shaper | None:
     """Newton on all amplitudes and times; None if it ends at no non-negative shaper that cancels the modes."""
     poles = np.array([mode.pole for mode in modes])
     scale = float(np.abs(poles).max())
@@ -213,7 +188,7 @@ def _polished(times_s: FloatArray, amplitudes: FloatArray, modes: Sequence[Mode]
     _, times_s, amplitudes = best
     if np.any(np.diff(times_s) <= 0.0) or float(amplitudes.min()) < _SMALLEST_TAP:
         return None
-    shaper = Shaper(times_s.tolist(), (amplitudes / amplitudes.sum()).tolist())
+    shaper = _core.Shaper(times_s.tolist(), (amplitudes / amplitudes.sum()).tolist())
     return shaper if max(shaper.residual_ratio(mode) for mode in modes) <= _RESIDUAL else None
 
 
@@ -223,7 +198,7 @@ def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bo
     Source: D. Butyugin's smoothers of the printer firmware Kalico; their derivation on a grid: this project.
     """
 
-    def of_one(mode: Mode, options: DesignOptions) -> Shaper:
+    def of_one(mode: _core.Mode, options: DesignOptions) -> _core.Shaper:
         period_s = options.grid_period_s
         usual = periods / (mode.frequency_hz * period_s)
         # one step more than unknowns: the two ends carry no sample
@@ -231,7 +206,9 @@ def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bo
         most = max(2 * fewest, int(_FURTHEST * usual))
         title = f"{name} for {mode_names([mode])} on a {ms(period_s)} grid"
         if usual > _MOST_SAMPLES:
-            raise DesignError(f"{title} would take {usual:.0f} samples: at most {_MOST_SAMPLES}; take a longer period")
+            raise _core.DesignError(
+                f"{title} would take {usual:.0f} samples: at most {_MOST_SAMPLES}; take a longer period"
+            )
 
         def taps(steps: int) -> FloatArray | None:
             return _samples(mode, ratios, period_s, steps)
@@ -239,11 +216,11 @@ def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bo
         steps = _first(lambda count: taps(count) is not None, fewest, most, max(1, int(usual) // _STRIDES))
         found = None if steps is None else taps(steps)
         if found is None:
-            raise DesignError(
+            raise _core.DesignError(
                 f"no {title} up to {ms(most * period_s)}: no polynomial of degree {2 * len(ratios) + 2} without "
                 f"negative samples has its zeros there; {_other_period(max(ratios) * mode.frequency_hz, period_s)}"
             )
-        return Shaper((np.arange(len(found)) * period_s).tolist(), found.tolist())
+        return _core.Shaper((np.arange(len(found)) * period_s).tolist(), found.tolist())
 
     return _one_after_the_other(of_one)
 
@@ -256,14 +233,14 @@ def _first(good: Callable[[int], bool], fewest: int, most: int, stride: int) -> 
     return halved(good, max(count - stride, fewest - 1), count)
 
 
-def _samples(mode: Mode, ratios: tuple[float, ...], period_s: float, steps: int) -> FloatArray | None:
+def _samples(mode: _core.Mode, ratios: tuple[float, ...], period_s: float, steps: int) -> FloatArray | None:
     """The kernel's samples between its ends, `steps` periods apart; None if one is negative or a zero is missed."""
     x = 2.0 * np.arange(1, steps) / steps - 1.0
     count = 2 * len(ratios) + 1
     basis = legendre.legvander(x, count - 1) * (1.0 - x * x)[:, None]
     rows = [np.ones(len(x))]
     for index, ratio in enumerate(ratios):
-        pole = Mode(ratio * mode.frequency_hz, mode.damping_ratio).pole
+        pole = _core.Mode(ratio * mode.frequency_hz, mode.damping_ratio).pole
         # what each sample leaves at the last one; a double zero cancels the derivative too
         terms = np.exp((pole.real * (len(x) - 1 - np.arange(len(x))) + 1j * pole.imag * np.arange(len(x))) * period_s)
         terms = terms * x ** ratios[:index].count(ratio)
@@ -281,13 +258,12 @@ def _samples(mode: Mode, ratios: tuple[float, ...], period_s: float, steps: int)
 
 
 def _other_period(highest_hz: float, period_s: float) -> str:
-    """What to do where there is no kernel."""
     if 2.0 * highest_hz * period_s > 1.0:
         return f"a period below {ms(0.5 / highest_hz)} resolves its highest zero, {highest_hz:.4g} Hz"
     return "it is for modes that are damped less"
 
 
-def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:
     """Minimal shapers of the bands' nominal modes: those without negative impulses first, each part by duration.
 
     Searched up to the duration of the convolved ZV, and, only if there is none, up to twice that; never beyond
@@ -295,18 +271,18 @@ def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[Sha
     """
     modes = [band.mode for band in bands]
     longest_s = min(options.max_duration_s, _MOST_PERIODS / max(mode.frequency_hz for mode in modes))
-    usual_s = convolved_zv(modes).duration_s
+    usual_s = _core.convolved_zv(modes).duration_s
     boxes = {} if len(modes) <= _PROVEN_MODES else {"max_boxes": 0}
     for span in _SPANS:
-        found = minimal_shapers(modes, min(span * usual_s, longest_s), max_abs_sum=options.max_abs_sum, **boxes)
+        found = _core.minimal_shapers(modes, min(span * usual_s, longest_s), max_abs_sum=options.max_abs_sum, **boxes)
         if found.shapers or found.max_duration_s >= longest_s:
             break
     if not found.shapers:
-        raise DesignError(_none_found(modes, found))
+        raise _core.DesignError(_none_found(modes, found))
     return sorted(found.shapers, key=lambda shaper: shaper.has_negative)
 
 
-def _none_found(modes: Sequence[Mode], found: MinimalShapers) -> str:
+def _none_found(modes: Sequence[_core.Mode], found: _core.MinimalShapers) -> str:
     names = ", ".join(f"{mode.frequency_hz:g} Hz" for mode in modes)
     what = (
         f"no minimal shaper of {names} lasts up to {ms(found.max_duration_s)} with sum|a| up to {found.max_abs_sum:g}"

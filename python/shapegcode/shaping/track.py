@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, Shaper, VaryingFir
 from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import check_times, whole_periods
-from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, Vertices, refined, shortest_non_negative
+from shapegcode.shaping.cutting_planes import LinearProgram
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, refined, shortest_non_negative
 
 _LOOKS = 16  # positions between two nodes at which the residual is looked at
 _SUPPORT = 1e-9  # amplitudes above this are taps
@@ -26,6 +27,11 @@ _SAME_MEAN = 1e-9  # periods
 NodeDesign = Callable[[Sequence[Mode]], Shaper]
 _MEANS = 9  # mean delays that are compared
 _POINT = 1e-8  # periods: means that differ by less are one
+
+
+def shaper_fir(shaper: Shaper, period_s: float) -> Fir:
+    """A shaper in whole periods of its grid."""
+    return Fir([round(time / period_s) for time in shaper.times_s], list(shaper.amplitudes))
 
 
 @dataclass(frozen=True)
@@ -66,12 +72,7 @@ class ShaperTrack:
     @cached_property
     def filters(self) -> VaryingFir:
         """The shapers in whole periods."""
-        return VaryingFir(
-            [
-                Fir([round(time / self.period_s) for time in node.shaper.times_s], list(node.shaper.amplitudes))
-                for node in self.nodes
-            ]
-        )
+        return VaryingFir([shaper_fir(node.shaper, self.period_s) for node in self.nodes])
 
     def following(self, offset_mm: float = 0.0) -> FollowingFir:
         """The filter that follows the axis."""
@@ -143,7 +144,7 @@ def taps_of_mean(
     if mean_s is not None:
         matrix, right = np.vstack([matrix, cost]), np.append(right, mean_s / period_s / periods)
         cost = steps**2 / periods**2
-    taps = Vertices(matrix, right)(cost)
+    taps = _vertices(matrix, right, cost)[0]
     if taps is None:
         return None
     support = np.flatnonzero(taps > _SUPPORT)
@@ -151,6 +152,20 @@ def taps_of_mean(
     if not (np.all(taps > 0.0) and abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT):
         return None
     return support, taps / taps.sum()
+
+
+def _vertices(matrix: FloatArray, right: FloatArray, *costs: FloatArray) -> list[FloatArray | None]:
+    """The taps without negative ones that meet the conditions at each least cost; None: there are none."""
+    count = matrix.shape[1]
+    program = LinearProgram(np.zeros(count), np.full(count, math.inf), (matrix, right))
+    found: list[FloatArray | None] = []
+    for cost in costs:
+        program.set_cost(cost)
+        try:
+            found.append(program.solve())
+        except DesignError:
+            found.append(None)
+    return found
 
 
 def _conditions(modes: Sequence[Mode], period_s: float, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -185,8 +200,7 @@ def mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[fl
     """Least and largest mean delay of non-negative impulses, in periods."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
-    vertex = Vertices(matrix, right)
-    least, largest = vertex(steps / periods), vertex(-steps / periods)
+    least, largest = _vertices(matrix, right, steps / periods, -steps / periods)
     if least is None or largest is None:
         return math.inf, -math.inf
     return float(steps @ least) + _SAME_MEAN, float(steps @ largest) - _SAME_MEAN

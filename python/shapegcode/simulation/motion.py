@@ -1,11 +1,22 @@
-"""What stays of a motion that passes by: its largest values, and envelopes for pictures. Memory is bounded."""
+"""A motion that passes by: its largest values and envelopes are kept, and it is written to files piece by piece."""
 
 from __future__ import annotations
 
+import contextlib
+import shutil
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import BinaryIO
+
 import numpy as np
 
+from shapegcode import _core
+from shapegcode.io.data_file import named_errors, replaced_file
 from shapegcode.io.units import FloatArray
-from shapegcode.model.stream import Chunk
+from shapegcode.model.stream import KINDS, Chunk
 from shapegcode.results.outcome import Xyz
 from shapegcode.simulation.result import Motion
 
@@ -13,32 +24,29 @@ _BUCKETS = 4000
 
 
 class MotionEnvelope:
-    """Minimum and maximum of several curves over equal intervals of samples, as short as the number of intervals
-    allows."""
+    """Minimum and maximum of several curves over equal intervals of samples, as short as their number allows."""
 
     def __init__(self, most: int = _BUCKETS) -> None:
         """At most *most* intervals, 2 or more."""
         self._most = most
-        self._low: FloatArray | None = None
-        self._high: FloatArray | None = None
-        self._rest: FloatArray | None = None
+        self._low = self._high = self._rest = np.empty((0, 0))
         self.samples_per_bucket = 1
 
     def add(self, values: FloatArray) -> None:
         """Further samples, (k, curves)."""
-        rest = values if self._rest is None else np.concatenate([self._rest, values])
+        if not self._rest.shape[1]:
+            self._low = self._high = self._rest = np.empty((0, values.shape[1]))
+        rest = np.concatenate([self._rest, values])
         whole = len(rest) // self.samples_per_bucket
         body = rest[: whole * self.samples_per_bucket].reshape(whole, self.samples_per_bucket, rest.shape[1])
         self._rest = rest[whole * self.samples_per_bucket :].copy()
-        low, high = body.min(axis=1), body.max(axis=1)
-        self._low = low if self._low is None else np.concatenate([self._low, low])
-        self._high = high if self._high is None else np.concatenate([self._high, high])
+        self._low = np.concatenate([self._low, body.min(axis=1)])
+        self._high = np.concatenate([self._high, body.max(axis=1)])
         while len(self._low) > self._most:
             self._merge()
 
     def _merge(self) -> None:
         """Join pairs of intervals; an odd last one goes back to the waiting samples."""
-        assert self._low is not None and self._high is not None and self._rest is not None
         pairs = len(self._low) // 2
         if len(self._low) % 2:
             # Its two extremes stand for it until its stretch is full.
@@ -51,7 +59,7 @@ class MotionEnvelope:
 
     def result(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Middle of each interval in samples since the first, (n,); minimum and maximum, (n, curves)."""
-        if self._low is None or self._high is None or self._rest is None:
+        if not self._rest.shape[1]:
             raise ValueError("no sample: an envelope needs one or more")
         low, high = self._low, self._high
         starts = np.arange(len(low), dtype=np.float64) * self.samples_per_bucket
@@ -70,26 +78,20 @@ class MotionRecorder:
     def __init__(self, period_s: float) -> None:
         """Of a motion whose samples are one period apart."""
         self._period_s = period_s
-        self._begin_s = 0.0
-        self._end_s = 0.0
-        self._samples = 0
+        self._begin_s = self._end_s = 0.0
+        self.samples = 0  # that have passed
         self._largest: dict[str, FloatArray] = {}
         self._velocity: FloatArray | None = None
         self._envelope = MotionEnvelope()
 
-    @property
-    def samples(self) -> int:
-        """That have passed."""
-        return self._samples
-
     def add(self, chunk: Chunk) -> None:
         """Further samples."""
-        if not self._samples:
+        if not self.samples:
             self._begin_s = float(chunk.time_s[0])
         before = chunk.velocity_mm_per_s[:1] if self._velocity is None else self._velocity
         acceleration = np.diff(np.concatenate([before, chunk.velocity_mm_per_s]), axis=0) / self._period_s
         self._velocity = chunk.velocity_mm_per_s[-1:].copy()
-        self._samples += len(chunk)
+        self.samples += len(chunk)
         self._end_s = float(chunk.time_s[-1])
         self._note("largest_speed_mm_per_min", chunk.velocity_mm_per_s * 60.0)
         self._note("largest_acceleration_mm_per_s2", acceleration)
@@ -120,7 +122,7 @@ class MotionRecorder:
         return Motion(
             lines=lines,
             every=every,
-            samples=self._samples,
+            samples=self.samples,
             end_s=self._end_s,
             program=program,
             times_s=self._begin_s + middles * self._period_s,
@@ -130,3 +132,89 @@ class MotionRecorder:
             npz=npz,
             **{name: Xyz(*map(float, values)) for name, values in self._largest.items()},
         )
+
+
+_COPY_BYTES = 1 << 20
+_ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same motion gives the same bytes
+
+
+WriteMotion = Callable[[Chunk], None]  # appends the rows of a chunk to a file
+
+
+def _csv(stream: BinaryIO) -> WriteMotion:
+    has_head = False
+
+    def write(chunk: Chunk) -> None:
+        nonlocal has_head
+        columns = chunk.columns()
+        if not has_head:
+            has_head = True
+            stream.write((",".join(["kind", *columns]) + "\n").encode())
+        table = np.column_stack([column.astype(np.float64) for column in columns.values()])
+        stream.write(_core.csv_rows(chunk.kind, KINDS, table))
+
+    return write
+
+
+class _Npz:
+    """One temporary file per column, put together at the end: an archive holds them one after the other."""
+
+    def __init__(self, folder: Path | None, files: contextlib.ExitStack) -> None:
+        self._folder = folder
+        self._files = files
+        self._columns: dict[str, tuple[BinaryIO, np.dtype[np.generic]]] = {}
+        self._rows = 0
+
+    def write(self, chunk: Chunk) -> None:
+        for name, column in {**chunk.columns(), "kind": chunk.kind}.items():
+            if name not in self._columns:
+                # The stack closes it, and then it is gone.
+                file = self._files.enter_context(tempfile.TemporaryFile(dir=self._folder))  # noqa: SIM115
+                self._columns[name] = (file, column.dtype)
+            self._columns[name][0].write(np.ascontiguousarray(column).data)
+        self._rows += len(chunk)
+
+    def finish(self, stream: BinaryIO) -> None:
+        with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
+            for name, (file, dtype) in self._columns.items():
+                file.seek(0)
+                with archive.open(_member(name), "w", force_zip64=True) as member:
+                    _header(member, dtype, (self._rows,))
+                    shutil.copyfileobj(file, member, _COPY_BYTES)
+            names = np.array(KINDS)
+            with archive.open(_member("kind_names"), "w") as member:
+                _header(member, names.dtype, names.shape)
+                member.write(names.tobytes())
+
+
+def _member(name: str) -> zipfile.ZipInfo:
+    return zipfile.ZipInfo(f"{name}.npy", date_time=_ZIP_DATE)
+
+
+def _header(stream: object, dtype: np.dtype[np.generic], shape: tuple[int, ...]) -> None:
+    description: dict[str, object] = {
+        "descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape,
+    }  # fmt: skip
+    np.lib.format.write_array_header_1_0(stream, description)  # type: ignore[arg-type]
+
+
+@contextlib.contextmanager
+def csv_file(path: str | Path) -> Iterator[WriteMotion]:
+    """A CSV file of `kind` and `Chunk.columns`, their names first, shortest numbers; ``-`` is standard output."""
+    if path == "-":
+        yield _csv(sys.stdout.buffer)
+        sys.stdout.buffer.flush()
+        return
+    with named_errors(path), replaced_file(path) as stream:
+        yield _csv(stream)
+
+
+@contextlib.contextmanager
+def npz_file(path: str | Path) -> Iterator[WriteMotion]:
+    """A NumPy archive of `Chunk.columns`, `kind` and its names; it takes twice the room in its folder meanwhile."""
+    target = Path(path).resolve()
+    with named_errors(path), contextlib.ExitStack() as files, replaced_file(path) as stream:
+        # Beside the file, where there is room for it; not beside a device.
+        npz = _Npz(target.parent if target.is_file() or not target.exists() else None, files)
+        yield npz.write
+        npz.finish(stream)

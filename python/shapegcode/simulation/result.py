@@ -195,16 +195,15 @@ class Simulation(Result):
         if self.verdict is not None:
             return f"{takes}; {self._judged_answer(self.verdict)}"
         axis = max("xyz", key=lambda each: self.residual_vibration_um[each])
+        contour_um = self.contour_error_um.response.max
         return (
             f"{takes}, {self.cutting_time_s:.2f} s of it in cutting regions; {_NAMES[self.plant][0]} "
-            f"{axis.upper()} {self.residual_vibration_um[axis]:.2f} µm, contour error {self._contour.max:.2f} µm "
-            f"{'against its own blocks ' if self.shaped and self._own_path else ''}"
-            f"({self.plant} plant)"
+            f"{axis.upper()} {self.residual_vibration_um[axis]:.2f} µm, contour error {contour_um:.2f} µm "
+            f"{'against its own blocks ' if self.shaped and self._own_path else ''}({self.plant} plant)"
         )
 
     @staticmethod
     def _judged_answer(verdict: ProgramFigures) -> str:
-        """The figures of `convert`, and the worst cut that misses a limit."""
         out = [cut for cut in verdict.all_cuts if cut.misses]
         residual = verdict.residual_vibration_um
         axis = max("xyz", key=lambda each: residual.original[each])
@@ -221,10 +220,6 @@ class Simulation(Result):
         return self.measured_against == self.program
 
     @property
-    def _contour(self) -> ContourError:
-        return self.contour_error_um.response
-
-    @property
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
         if self.shaped and self._own_path:
@@ -237,7 +232,7 @@ class Simulation(Result):
         """Time, vibration after a stop and contour error of the machine table."""
         from shapegcode.results.page.model import Figure
 
-        residual, _ = _NAMES[self.plant]
+        (residual, _), contour_um = _NAMES[self.plant], self.contour_error_um.response.max
         vibrations = [
             Figure(f"{residual} {axis.upper()}", "µm", None, self.residual_vibration_um[axis], 2,
                    key_after=f"residual_vibration_um.{axis}")
@@ -246,7 +241,7 @@ class Simulation(Result):
         return (
             Figure("cycle time", "s", None, self.cycle_time_s, 2, key_after="cycle_time_s"),
             *vibrations,
-            Figure(CONTOURS["response"], "µm", None, self._contour.max, 2, key_after="contour_error_um.response.max"),
+            Figure(CONTOURS["response"], "µm", None, contour_um, 2, key_after="contour_error_um.response.max"),
         )
 
     def tables(self) -> list[Table]:
@@ -274,7 +269,6 @@ class Simulation(Result):
         return Table("", columns, rows)
 
     def _parts(self) -> Iterator[tuple[Simulation | ShapedFigures, str]]:
-        """The figures of all regions, and of the shaped ones where others are beside them."""
         yield self, ""
         if self.of_shaped is not None and self.of_shaped.regions < len(self.regions):
             yield self.of_shaped, f", {self.of_shaped.regions} shaped regions alone"

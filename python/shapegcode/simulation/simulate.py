@@ -20,8 +20,7 @@ from shapegcode.model.stream import stream
 from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions
 from shapegcode.results.outcome import ContourError, Tracks, Xyz, largest_xyz_um
-from shapegcode.simulation.files import csv_file, npz_file
-from shapegcode.simulation.motion import MotionRecorder
+from shapegcode.simulation.motion import MotionRecorder, csv_file, npz_file
 from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation
 from shapegcode.verdict.judge import judge_program
 
@@ -111,7 +110,9 @@ def simulate(
         of_shaped += figures if as_shaped and not region.was_rapid else []
         on_progress(done, len(program.regions))
     own, cuts = [run.figures for run in runs], [run for run in runs if run.shaped and not run.was_rapid]
-    cutting_s = math.fsum(run.time_s for run in runs)
+    shaped_figures = None
+    if cuts:
+        shaped_figures = ShapedFigures(len(cuts), math.fsum(run.time_s for run in cuts), **_largest(of_shaped))
     warnings = [*program.warnings, *machine_warnings(machine), *region_range_warnings(program.regions, machine)]
     if shaped is None:
         warnings += [why for _, why in shaped_warnings(program, machine)]
@@ -122,16 +123,14 @@ def simulate(
         shaped=any(run.shaped for run in runs),
         measured_against=(against or program).source,
         cycle_time_s=_core.time_program(program.core, fanuc_model(machine, shaped=shaped)).total_s,
-        cutting_time_s=cutting_s,
+        cutting_time_s=math.fsum(run.time_s for run in runs),
         **_largest(simulated),
         settling_time_s=_settling_s(simulated, band_um),
         settling_band_um=band_um,
         settling_limit_s=limit_s,
         orbit_error_percent=tuple(error for figures in own for error in figures.orbit_error_percent),
         response_orbit_error_percent=tuple(error for figures in own for error in figures.response_orbit_error_percent),
-        of_shaped=ShapedFigures(len(cuts), math.fsum(run.time_s for run in cuts), **_largest(of_shaped))
-        if cuts
-        else None,
+        of_shaped=shaped_figures,
         verdict=verdict,
         regions=tuple(runs),
         warnings=tuple(warnings),

@@ -98,7 +98,6 @@ class LimitCheck:
         return self.value_um > self.limit_um * (1.0 + 1e-9)
 
     def __str__(self) -> str:
-        """For people, with both values."""
         return f"{self.figure} {self.value_um:.{self.decimals}f} um, limit {self.limit_um:.{self.decimals}f} um"
 
 
@@ -203,11 +202,11 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
             for axis in "xyz"
             if any(case.residual_um[axis] >= _SWINGS_UM for case in cases)
         ),
-        Column("command", value=lambda case: _micrometres(case.contour_error_um.command)),
-        Column("resp.", value=lambda case: _micrometres(case.contour_error_um.response)),
-        Column("s", value=lambda case: "-" if case.time_s is None else f"{case.time_s:.2f}"),
+        Column("command", value=lambda case: _known(case.contour_error_um.command, 1)),
+        Column("resp.", value=lambda case: _known(case.contour_error_um.response, 1)),
+        Column("s", value=lambda case: _known(case.time_s, 2)),
         Column("of limit", value=lambda case: _share(case.share_of_limit)),
-        Column("verdict", value=lambda case: _verdict(case) + (" <- worst" if case is worst else ""), left=True),
+        Column("verdict", value=lambda case: _verdict(case, case is worst), left=True),
     )
     shown = sum(not case.counts for case in cases)
     brackets = "; those in brackets are only shown" if shown else ""
@@ -225,34 +224,27 @@ def unbroken(text: str) -> str:
     return _NUMBER.sub(rf"\1{NO_BREAK}\2", text)
 
 
-def _micrometres(value: float | None) -> str:
-    return "-" if value is None else f"{value:.1f}"
+def _known(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
 
 
 def _share(share: float | None) -> str:
-    """Of the limit in percent; a limit of zero leaves no share."""
     return "no limit but 0" if share is None else f"{share * 100:.0f} %"
 
 
-def _verdict(case: CaseVerdict) -> str:
+def _verdict(case: CaseVerdict, worst: bool) -> str:
     word = "within" if case.within else "OUT"
-    return word if case.counts else f"({word.lower()})"
+    return (word if case.counts else f"({word.lower()})") + (" <- worst" if worst else "")
 
 
 def _style(case: CaseVerdict, worst: bool) -> str:
-    if not case.counts:
-        return "dim"
     colour = "" if case.within else "red"
-    return f"bold {colour}".strip() if worst else colour
+    return "dim" if not case.counts else f"bold {colour}".strip() if worst else colour
 
 
-@dataclass(frozen=True)
-class SimulatedCase:
-    """An operating condition that was simulated."""
-
-    run: _core.SimulationFigures  # its figures
-    # how much longer all blocks take in it than at 100 %, before any filter, where only their end was simulated; else 0
-    cut_s: float
+# An operating condition that was simulated: its figures; how much longer all blocks take in it than at 100 %, before
+# any filter, where only their end was simulated, else 0.
+SimulatedCase = tuple[_core.SimulationFigures, float]
 
 
 @dataclass(frozen=True)
@@ -269,8 +261,7 @@ class CaseSimulation:
     increment_mm: float  # least increment of the text
 
     def nominal(self, rule: _core.BlockEnd) -> _core.SimulationFigures:
-        """Simulate the blocks at 100 %; with the control's own block timing also a buffer underrun where a stop excites
-        most."""
+        """Simulate the blocks at 100 %; with the control's own block timing also an underrun where it excites most."""
         own = rule == self.model.own_rule
         return self.model.simulate_emitted(
             self.blocks, self.path, rule, offset=self.offset,
@@ -281,8 +272,7 @@ class CaseSimulation:
 
     def planned(self) -> _core.SimulationFigures | None:
         """Simulate with the look-ahead left on; None if no case needs it."""
-        wanted = any(case.look_ahead for case in self.cases)
-        if not wanted:
+        if not any(case.look_ahead for case in self.cases):
             return None
         return self.model.simulate_planned(self.blocks, self.path, offset=self.offset, tracker=self.tracker)
 
@@ -291,7 +281,6 @@ class CaseSimulation:
         return case.override != 1.0 and case.mode is None and self.model.bounds_deviations
 
     def _whole(self, case: Case) -> bool:
-        """Whether a case needs a simulation of the whole region for itself."""
         if self.model.always_plans and case.override != 1.0:
             return True
         # Behind feed drives each would take a quarter of a conversion: what is only shown makes do with the residual.
@@ -319,11 +308,10 @@ class CaseSimulation:
             if not whole and case.override != 1.0:
                 # That at 100 % is taken off it: worked out here, where others need not wait for it.
                 cut_s = self._cut_s(case.override) - self._own_cut_s
-            simulated[case.name] = SimulatedCase(run, cut_s)
+            simulated[case.name] = run, cut_s
         return simulated
 
     def _cut_s(self, override: float) -> float:
-        """How long all blocks take at a feed override, before any filter."""
         return _core.simulated_duration_s(self.blocks, self.model.period_s, self.model.own_rule, override)
 
     @cached_property
@@ -351,13 +339,13 @@ class CaseSimulation:
         return tuple(figures)
 
     def _other(self, case: Case, simulated: SimulatedCase, own: _core.SimulationFigures) -> CaseFigures:
-        run, whole = simulated.run, self._whole(case)
+        (run, cut_s), whole = simulated, self._whole(case)
         if case.override == 1.0:  # the set-points are those of the nominal case, only the table is another
             response = Deviation.of([run.response]) if whole else None
             return CaseFigures(run.residual_mm, Deviation.of([own.command]), response, own.duration_s)
         if whole:
             return case_figures(run)
-        time_s = own.duration_s + simulated.cut_s
+        time_s = own.duration_s + cut_s
         if not self._beside(case):
             return CaseFigures(run.residual_mm, None, None, time_s)
         largest = next(each for each in own.other_overrides if each.override_ratio == case.override)
@@ -374,8 +362,7 @@ def case_figures(run: _core.SimulationFigures, *, contour: bool = True, response
 
 
 def _starved(run: _core.SimulationFigures, waited_s: float) -> CaseFigures:
-    """The worst of all positions of the underrun; at the end of the region the vibration is that without one, unless it
-    is nearby."""
+    """The worst of all positions of the underrun; behind the region the vibration is mostly that without one."""
     runs: list[_core.SimulationFigures | _core.StarvedFigures] = [run, *run.starved]
     return CaseFigures(
         np.max([each.residual_mm for each in runs], axis=0),

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from shapegcode import _core
 from shapegcode.program import Program
 from shapegcode.results.json import OldNames, sparse
 from shapegcode.results.outcome import ContourError, Pair, Tracks, Xyz
+
+_LEAST_BETTER = 0.3  # share by which a figure must fall to count as a benefit
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,6 @@ class FeedExcess:
     line: int  # that programs this feed, of the original
 
     def __str__(self) -> str:
-        """For people."""
         return (
             f"runs at {self.speed_mm_per_min:.1f} mm/min where line {self.line} programs "
             f"{self.programmed_mm_per_min:.1f}, {(self.ratio - 1.0) * 100.0:.0f} % faster"
@@ -177,11 +178,20 @@ class RegionVerdict:
     misses: tuple[str, ...]  # every tolerance that it leaves, in words
     worse: tuple[str, ...] = ()  # those of them in which it is worse than the original
 
-    def over_limit(self) -> Iterator[tuple[float, float]]:
-        """Residual and limit of every axis that leaves its limit, um."""
-        for left, limit in zip(self.residual_vibration_um.emitted, self.residual_limit_um, strict=True):
-            if left > limit:
-                yield left, limit
+    def is_benefit(self, contour_limit_um: float, least_gain_um: float) -> bool:
+        """Whether a figure that missed its limit, or vibrates, falls by the least gain and by 30 % or to the limit."""
+        pairs = [(self.original_contour_error_um, self.contour_error_um, contour_limit_um, contour_limit_um)]
+        residual = self.residual_vibration_um
+        pairs += [
+            (before, after, limit, min(limit, least_gain_um))
+            for before, after, limit in zip(residual.original, residual.emitted, self.residual_limit_um, strict=True)
+        ]
+        return any(
+            before > threshold
+            and before - after >= least_gain_um
+            and (after <= (1.0 - _LEAST_BETTER) * before or (before > limit >= after))
+            for before, after, limit, threshold in pairs
+        )
 
 
 @dataclass(frozen=True, repr=False)

@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import compress, count
 from typing import TypeVar
 
 import numpy as np
@@ -77,6 +77,22 @@ class RegionFigures:
         """Until the set-points rest, the slower of both rules."""
         return max(run.duration_s for run in self.emitted)
 
+    @property
+    def gain_um(self) -> float:
+        """What shaping gained: the larger fall of the two figures, the emitted one in the worse rule."""
+        after = np.max([_figures_um(run) for run in self.emitted], axis=0)
+        return max(0.0, float(np.max(np.asarray(_figures_um(self.original)) - after)))
+
+
+def _figures_um(simulated: _core.SimulationFigures) -> tuple[float, float]:
+    """Residual vibration of the worst axis, contour error of the machine table."""
+    return float(np.max(simulated.residual_mm)) * 1e3, simulated.response.max_abs_mm * 1e3
+
+
+def most_to_gain_um(original: _core.SimulationFigures) -> float:
+    """The most that shaping can gain: what is there."""
+    return max(_figures_um(original))
+
 
 @dataclass(frozen=True)
 class PendingSimulations:
@@ -93,16 +109,12 @@ class Judge:
     """Simulates emitted regions in every case and holds them against the machine's tolerances."""
 
     def __init__(self, model: MachineModel, cases: Sequence[Case] | None = None) -> None:
-        self._machine = model.machine
-        self._model = model
+        self._machine, self._model = model.machine, model
+        # In the order of `RegionFigures.cases`; rules of block timing: the controller's own, and in that of `emitted`.
         self.cases = stated_cases(model.machine) if cases is None else list(cases)
-        """In the order of `RegionFigures.cases`."""
-        self.own_rule = model.own_rule
-        """The controller's own rule of block timing."""
-        self.rules = model.block_rules
-        """The rules of block timing of `RegionFigures.emitted`."""
+        self.own_rule, self.rules = model.own_rule, model.block_rules
+        # What the contour tolerance is about.
         self.target: Target = "response" if model.machine.shaping.contour == "response" else "command"
-        """What the contour tolerance is about."""
 
     def measure(
         self,
@@ -181,9 +193,8 @@ class Judge:
         self, figures: Sequence[RegionFigures], placed: Sequence[Placed], block_period_s: float
     ) -> tuple[RegionVerdict, ...]:
         """Every cut beside its limits."""
-        return tuple(
-            self._verdict(region, place, block_period_s) for region, place in zip(figures, placed, strict=True)
-        )
+        pairs = zip(figures, placed, strict=True)
+        return tuple(self._verdict(region, place, block_period_s) for region, place in pairs)
 
     def summarise(
         self,
@@ -229,12 +240,10 @@ class Judge:
         )
 
     def _at_override(self, ratio: float) -> list[Case]:
-        """The conditions at a feed override; the nominal ones where it is locked."""
         turned = [case for case in self.cases if case.override == ratio and case.mode is None]
         return turned or [case for case in self.cases if case.nominal]
 
     def _residual_um(self, figures: Sequence[RegionFigures], cases: Iterable[Case]) -> Xyz[float]:
-        """Maximum of the shaped cuts in some conditions."""
         ranks = [self.cases.index(case) for case in cases]
         simulated = [region.cases[rank] for region in figures if region.is_shaped for rank in ranks]
         return largest_xyz_um(each.residual_mm for each in simulated if each is not None)
@@ -247,10 +256,8 @@ class Judge:
     def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
         """Limit of a region: its residual compared with that of the original as programmed, in every case."""
         tolerance, floor_um = self._machine.tolerance, residual_floor_um(place.region, self._machine)
-        before_um = figures.original.residual_mm * 1e3
-        return RegionLimits(
-            np.maximum(tolerance.residual_ratio * before_um, floor_um), tolerance.contour_um, self.target
-        )
+        limit_um = np.maximum(tolerance.residual_ratio * (figures.original.residual_mm * 1e3), floor_um)
+        return RegionLimits(limit_um, tolerance.contour_um, self.target)
 
     def _verdict(self, figures: RegionFigures, place: Placed, block_period_s: float) -> RegionVerdict:
         limits = self.limits(figures, place)
@@ -305,7 +312,6 @@ def residual_floor_um(region: _core.Region, machine: Machine) -> float:
 def _case_verdict(
     case: Case, rows: Sequence[tuple[CaseFigures, RegionLimits, tuple[int, int]]], material_side: str | None
 ) -> CaseVerdict:
-    """All regions in one case."""
     checks = [(each, where) for run, limit, where in rows for each in judge_region(run, limit)]
     worst, where = max(checks, key=lambda pair: pair[0].share)
     simulated = [run for run, _, _ in rows]
@@ -340,7 +346,6 @@ def _case_verdict(
 
 
 def _largest(deviations: Iterable[Deviation | None]) -> Deviation | None:
-    """Of all regions; None if one was not measured."""
     rows = list(deviations)
     measured = [each for each in rows if each is not None]
     return Deviation.largest(measured) if rows and len(measured) == len(rows) else None
@@ -361,9 +366,6 @@ def _haste(figures: RegionFigures, place: Placed, block_period_s: float) -> list
     ]
 
 
-T = TypeVar("T")
-
-
 def judge_program(
     emitted: Program,
     original: Program,
@@ -382,14 +384,12 @@ def judge_program(
             pool.submit(model.simulate_original, place.region.path, offset=model.offset(place.region))
             for place in placed
         ]
-
-        def of(wanted: bool, rows: Sequence[T]) -> list[T]:
-            return [row for row, each in zip(rows, is_shaped, strict=True) if each == wanted]
-
-        simulated = iter(judge.measure(emitted, of(True, placed), of(True, originals), pool))
+        shaped_cuts = [*compress(placed, is_shaped)], [*compress(originals, is_shaped)]
+        simulated = iter(judge.measure(emitted, *shaped_cuts, pool))
         unchanged = [
             pool.submit(simulate_unchanged, judge, model, mine, region, original.result())
-            for (mine, region), original in zip(of(False, pairs), of(False, originals), strict=True)
+            for (mine, region), original, each in zip(pairs, originals, is_shaped, strict=True)
+            if not each
         ]
         left = iter(run.result() for run in unchanged)
         figures = [next(simulated if each else left) for each in is_shaped]

@@ -15,12 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.budget import Budget, measure_load
-from shapegcode.conversion.rapids.candidates import NO_CUT, find_gaps
-from shapegcode.conversion.rapids.plant import NO_GAIN, Choice, OpenGap, RapidPlant
+from shapegcode.conversion.budget import Budget
+from shapegcode.conversion.rapids.gaps import NO_CUT, NO_GAIN, Choice, OpenGap, RapidPlant, find_gaps
 from shapegcode.conversion.tables import RapidMove, RapidsOutcome
 from shapegcode.conversion.whole_text import read_back
-from shapegcode.conversion.write import EmittedRegion, RegionWriter
+from shapegcode.conversion.write import EmittedRegion, RegionWriter, measure_load
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, written_increment_mm
@@ -66,8 +65,6 @@ def shape_rapids(
 
 
 class _RapidShaper:
-    """Replaces the rapids of one emitted program by shaped moves."""
-
     def __init__(
         self, emitted: Program, placed: Sequence[Placed], model: MachineModel, grid: Grid, pool: Executor
     ) -> None:
@@ -78,7 +75,6 @@ class _RapidShaper:
         self.plant = RapidPlant(model)
 
     def shaped(self, budget: Budget | None) -> ShapedRapids:
-        """The text with those rapids replaced that are worth it."""
         kept: Counter[str] = Counter()
         gaps = find_gaps(self.emitted, self.machine)
         open_gaps: list[OpenGap] = []
@@ -127,7 +123,6 @@ class _RapidShaper:
         return ShapedRapids(read, spliced.placed, outcome, _warnings(outcome, self.machine), extra_s)
 
     def _write(self, choice: Choice) -> EmittedRegion:
-        """Put the lines that replace a rapid into its text."""
         region = choice.region
         limits = self.model.limits()
         # Ends of blocks are rounded, and F is rounded up: at the clamp itself a block would last a tick too long.
@@ -140,11 +135,10 @@ class _RapidShaper:
         # In G95 a dwell may count revolutions.
         lines += ["G94", _STOP] if region.entry.feed_mode != 94 else [_STOP]
         end = self.emitted.core.line_end.encode()
-        choice.text = b"".join(line.encode("latin-1") + end for line in lines) + shaped.text.joined()
+        choice.text = b"".join([*(line.encode("latin-1") + end for line in lines), *shaped.text.parts()])
         return shaped
 
     def _judge(self, choices: Sequence[Choice]) -> None:
-        """Simulate every replacement as the text has it."""
         spliced = splice(self.emitted.core.text, self.placed, choices)
         emitted = read_back([spliced.text], spliced.everything, self.machine)
         stops_s = _STOP_S + self.machine.emission.prefill_dwell_s
@@ -171,7 +165,6 @@ def _without_contour(model: MachineModel) -> MachineModel:
 
 
 def _save_bytes(gaps: Sequence[OpenGap], room: int, kept: Counter[str]) -> None:
-    """Keep the rapids of the gaps that save least per byte until the rest fits into the room."""
     order = sorted((gap for gap in gaps if gap.extra_bytes() > 0), key=lambda gap: gap.saved_s() / gap.extra_bytes())
     needed = sum(gap.extra_bytes() for gap in gaps)
     for gap in order:
@@ -199,7 +192,6 @@ def _move(choice: Choice, place: Placed, placed: Sequence[Placed]) -> RapidMove:
 
 
 def _warnings(outcome: RapidsOutcome, machine: Machine) -> list[str]:
-    """What is different where rapids became cutting moves; empty where none did."""
     if not outcome.shaped:
         return []
     fastest = ", ".join(
