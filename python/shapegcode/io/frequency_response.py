@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
+from shapegcode.io.columns import words_of
 from shapegcode.io.record import Quantity, ReadOptions, stated_unit
 from shapegcode.io.units import FloatArray, Unit, find_unit
 
@@ -18,14 +19,9 @@ ComplexArray = npt.NDArray[np.complex128]
 FEWEST_LINES = 16
 _RESPONSES: tuple[Quantity, ...] = ("acceleration", "velocity", "displacement")
 _NAMES: dict[str, Quantity] = {
-    "receptance": "displacement",
-    "compliance": "displacement",
-    "flexibility": "displacement",
-    "admittance": "displacement",
-    "mobility": "velocity",
-    "accelerance": "acceleration",
-    "inertance": "acceleration",
-}
+    "receptance": "displacement", "compliance": "displacement", "flexibility": "displacement",
+    "admittance": "displacement", "mobility": "velocity", "accelerance": "acceleration", "inertance": "acceleration",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +52,8 @@ class FrequencyResponse:
 
     def __post_init__(self) -> None:
         count = len(self.frequency_hz)
-        for what, values in (
-            ("frequencies", self.frequency_hz),
-            ("lines", self.response),
-            ("coherence", self.coherence),
-        ):
+        named = {"frequencies": self.frequency_hz, "lines": self.response, "coherence": self.coherence}
+        for what, values in named.items():
             if values is None:
                 continue
             bad = np.flatnonzero(~np.isfinite(values))
@@ -140,17 +133,11 @@ def ratio_unit(text: str) -> tuple[Unit, float] | None:
     return unit, unit.factor / force.factor
 
 
-def quantity_of_name(text: str) -> Quantity | None:
-    """What a name such as "Receptance" or "accelerance" says."""
-    words = re.findall(r"[^\W\d_]+", text.lower())
-    return next((_NAMES[word] for word in words if word in _NAMES), None)
-
-
 def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, float, list[str]]:
     """Quantity and factor to SI of a response over force, by options, unit or name."""
     force = stated_unit(options.force_unit, ("force",))
     over = options.force_scale or (1.0 if force is None else force.factor)
-    named = options.quantity or quantity_of_name(label)
+    named = options.quantity or next((_NAMES[word] for word in words_of(label) if word in _NAMES), None)
     stated = stated_unit(options.response_unit, _RESPONSES)
     if options.response_scale is not None:
         if named is None:

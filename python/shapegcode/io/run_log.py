@@ -99,7 +99,12 @@ def iter_run_logs(
     unit = None if feed_unit is None else stated_feed_unit(feed_unit)
     kind = _format(path, format)
     names = (program_name,) if isinstance(program_name, str) else tuple(program_name or ())
-    runs = _runs(path, kind, table, unit, max_values)
+    if kind == "edge":
+        runs = edge_runs(path)
+    else:
+        cutter = RunCutter(str(path), table, unit, max_values)
+        events = {"shdr": shdr_events, "mtconnect": mtconnect_events, "csv": table_events}[kind]
+        runs = cutter.runs(events(path, table, cutter.notes))
     others: list[str] = []
     found = False
     for run in runs:
@@ -110,14 +115,6 @@ def iter_run_logs(
             others.append(run.program)
     if not found:
         raise RecordError(f"{path}: no run of {' or '.join(names)}; the log names {', '.join(others)}")
-
-
-def _runs(path: Path, kind: LogFormat, table: ItemTable, unit: str | None, max_values: int) -> Iterator[RunLog]:
-    if kind == "edge":
-        return edge_runs(path)
-    cutter = RunCutter(str(path), table, unit, max_values)
-    events = {"shdr": shdr_events, "mtconnect": mtconnect_events, "csv": table_events}[kind]
-    return cutter.runs(events(path, table, cutter.notes))
 
 
 def _format(path: Path, stated: LogFormat | None) -> LogFormat:
