@@ -10,6 +10,12 @@ from pydantic import Field, model_validator
 from shapegcode.errors import ArgumentError
 from shapegcode.settings.keys import Bool, Float, InlineTable, NonNegative, Positive, Text, TomlTable, key, toml
 
+_Ratio = Annotated[NonNegative, Field(lt=1)]
+_Percent = Annotated[NonNegative, Field(lt=100)]
+_Hertz = Annotated[Positive, Field(le=10_000)]
+_Speed = Annotated[Positive, Field(ge=1, le=10_000_000)]
+_MAX_MODES = 200  # identification finds 40 at most
+
 
 class Drive(TomlTable):
     """Feed drive of an axis, for the simulation with friction."""
@@ -24,9 +30,7 @@ class Drive(TomlTable):
     stiffness_n_per_um: Positive = key(
         "axial stiffness from motor to table: screw, nut, bearings and coupling in series"
     )
-    damping_ratio: Annotated[NonNegative, Field(lt=1)] = key(
-        "damping ratio of motor against table on that stiffness", assumed=0.05
-    )
+    damping_ratio: _Ratio = key("damping ratio of motor against table on that stiffness", assumed=0.05)
     backlash_um: NonNegative = key(
         "free travel between motor and table (a ball bar shows it together with the elastic windup of the screw); 0: "
         "none",
@@ -84,20 +88,15 @@ class Drive(TomlTable):
     def _friction_is_complete(self) -> Drive:
         if self.friction_model == "viscous":
             return self
-        for name in ("friction_coulomb_n", "friction_static_n"):
-            if getattr(self, name) is None:
-                raise ValueError(f'friction_model is "{self.friction_model}": needs {name}')
-        assert self.friction_coulomb_n is not None
-        assert self.friction_static_n is not None
-        if self.friction_static_n < self.friction_coulomb_n:
+        sliding, static = self.friction_coulomb_n, self.friction_static_n
+        if sliding is None or static is None:
+            name = "friction_coulomb_n" if sliding is None else "friction_static_n"
+            raise ValueError(f'friction_model is "{self.friction_model}": needs {name}')
+        if static < sliding:
             raise ValueError(
-                f"friction_static_n is {toml(self.friction_static_n)}: must not be below "
-                f"friction_coulomb_n, {toml(self.friction_coulomb_n)} (unit: N)"
+                f"friction_static_n is {toml(static)}: must not be below friction_coulomb_n, {toml(sliding)} (unit: N)"
             )
         return self
-
-
-_MAX_MODES = 200  # identification finds 40 at most
 
 
 class FrequencyOver(InlineTable):
@@ -108,10 +107,8 @@ class FrequencyOver(InlineTable):
         "positions of the axis, ascending, in the machine's coordinates", default=None
     )
     mass_kg: tuple[NonNegative, ...] | None = key("masses of the part, ascending", default=None)
-    frequency_hz: tuple[Annotated[Positive, Field(le=10_000)], ...] = key("natural frequencies, one per row")
-    damping_ratio: tuple[Annotated[NonNegative, Field(lt=1)], ...] | None = key(
-        "damping ratios, one per row", default=None
-    )
+    frequency_hz: tuple[_Hertz, ...] = key("natural frequencies, one per row")
+    damping_ratio: tuple[_Ratio, ...] | None = key("damping ratios, one per row", default=None)
 
     @model_validator(mode="after")
     def _is_a_table(self) -> FrequencyOver:
@@ -170,10 +167,8 @@ class Direction(InlineTable):
 class AxisMode(TomlTable):
     """One vibration mode of an axis, excited by the motion of that axis."""
 
-    frequency_hz: Annotated[Positive, Field(le=10_000)] = key(
-        "natural frequency; from a tap test, or from the decay after a rapid stop"
-    )
-    damping_ratio: Annotated[NonNegative, Field(lt=1)] = key("damping ratio (1 = critically damped)")
+    frequency_hz: _Hertz = key("natural frequency; from a tap test, or from the decay after a rapid stop")
+    damping_ratio: _Ratio = key("damping ratio (1 = critically damped)")
     participation: Annotated[Positive, Field(le=1000)] = key(
         "share of this mode in the axis's deflection; several modes of one axis need not add up to 1",
         unit="1",
@@ -189,12 +184,12 @@ class AxisMode(TomlTable):
         "tool by 0.3 mm in Z for every mm in Y; left out: its axis alone. participation counts for all of it",
         default=None,
     )
-    frequency_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
+    frequency_uncertainty_percent: _Percent | None = key(
         "uncertainty of the frequency, up and down (position of the table, mass of the workpiece); left out: not "
         "known. With no value, or up to 0.2 %, the shaper is designed for the nominal frequency only",
         default=None,
     )
-    damping_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
+    damping_uncertainty_percent: _Percent | None = key(
         "uncertainty of the damping ratio, up and down, relative; left out: not known, and the ratio is taken as exact",
         default=None,
     )
@@ -248,10 +243,8 @@ def _along(axis: int) -> tuple[float, float, float]:
 class Axis(TomlTable):
     """Limits of one axis; all three tables are required."""
 
-    max_feed_mm_per_min: Annotated[Positive, Field(ge=1, le=10_000_000)] = key(
-        "largest cutting feed of this axis", fanuc="1430"
-    )
-    rapid_mm_per_min: Annotated[Positive, Field(ge=1, le=10_000_000)] = key("rapid traverse (G00)", fanuc="1420")
+    max_feed_mm_per_min: _Speed = key("largest cutting feed of this axis", fanuc="1430")
+    rapid_mm_per_min: _Speed = key("rapid traverse (G00)", fanuc="1420")
     max_acceleration_mm_s2: Annotated[Positive, Field(ge=1, le=1_000_000)] = key(
         "largest acceleration while cutting", fanuc="1660"
     )

@@ -32,6 +32,11 @@ PLANNER_NAMES = {"fanuc": "FANUC", "linuxcnc": "LinuxCNC", "klipper": "Klipper",
 
 _NO_MEMORY_LIMIT = 4 * 10**9  # bytes
 
+Code = Annotated[int, Strict(), Field(ge=0, le=99_999_999)]
+Seconds = Annotated[NonNegative, Field(le=3600)]
+_Time = Annotated[NonNegative, Field(le=10)]
+_Decimals = Annotated[int, Strict(), Field(ge=0, le=6)]
+
 
 class LinuxcncPlanner(TomlTable):
     """What the INI file and the program say of the motion; its period is interpolation_period_s."""
@@ -147,13 +152,13 @@ class Controller(TomlTable):
         '"jerk_limited": by the acceleration and jerk of the axes',
         assumed="constant_time",
     )
-    time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
+    time_constant_s: _Time = key(
         "duration of a speed change (look-ahead, constant time), or length of the moving average or time constant "
         "of the exponential (after interpolation)",
         fanuc="1622, 1771",
         assumed=0.05,
     )
-    bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
+    bell_time_s: _Time = key(
         "time over which the acceleration itself is built up; length of the second moving average; 0: none",
         fanuc="1772",
         assumed=0.0,
@@ -164,7 +169,7 @@ class Controller(TomlTable):
         fanuc="1610#0, #1",
         assumed="linear",
     )
-    look_ahead_filter_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
+    look_ahead_filter_time_constant_s: _Time = key(
         "length of the moving average after interpolation in look-ahead mode; 0: none", fanuc="1769", assumed=0.0
     )
     corner_rule: Literal["speed_difference", "junction_deviation", "stops"] = key(
@@ -212,7 +217,7 @@ class Controller(TomlTable):
     rapid_time_constant_s: AxisTimes = key(
         "time in which a rapid reaches its speed. One number, or x, y, z", fanuc="1620, 1773", assumed=0.15
     )
-    rapid_bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
+    rapid_bell_time_s: _Time = key(
         "time over which the acceleration of a rapid is built up; 0: none", fanuc="1621, 1774", assumed=0.0
     )
     in_position_s: AxisValues = key(
@@ -238,13 +243,13 @@ class Controller(TomlTable):
         fanuc="2005#1, 2068, 2092",
         assumed=0.0,
     )
-    shaped_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
+    shaped_time_constant_s: _Time = key(
         "length of the controller's own moving average after interpolation while a shaped program runs (it "
         "smooths the shaped blocks once more); 0: off",
         fanuc="1622, 1769",
         assumed=0.0,
     )
-    shaped_bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
+    shaped_bell_time_s: _Time = key(
         "length of its second moving average, where it builds up the acceleration as a bell; 0: none",
         fanuc="1622 with 1610#1",
         assumed=0.0,
@@ -282,14 +287,10 @@ class Controller(TomlTable):
         fanuc="3401#0",
         default=False,
     )
-    feed_decimals_mm: Annotated[int, Strict(), Field(ge=0, le=6)] = key(
-        "decimals of an F word in mm/min", unit="digits", assumed=1
-    )
-    feed_decimals_inch: Annotated[int, Strict(), Field(ge=0, le=6)] = key(
-        "decimals of an F word in inch/min", unit="digits", assumed=2
-    )
+    feed_decimals_mm: _Decimals = key("decimals of an F word in mm/min", unit="digits", assumed=1)
+    feed_decimals_inch: _Decimals = key("decimals of an F word in inch/min", unit="digits", assumed=2)
     minimum_feed_mm_per_min: Positive = key("smallest feed written in a block", assumed=1.0)
-    no_buffer_m_codes: tuple[Annotated[int, Strict(), Field(ge=0, le=99_999_999)], ...] = key(
+    no_buffer_m_codes: tuple[Code, ...] = key(
         "M codes at which the controller stops reading ahead, besides M00, M01, M02 and M30",
         fanuc="3411-3432",
         default=(),
@@ -396,13 +397,10 @@ class FeedControl(TomlTable):
     )
 
 
-Seconds = Annotated[NonNegative, Field(le=3600)]
-
-
 class MCodeTimes(InlineTable):
     """Times of single M codes."""
 
-    code: tuple[Annotated[int, Strict(), Field(ge=0, le=99_999_999)], ...] = key("M codes")
+    code: tuple[Code, ...] = key("M codes")
     s: tuple[Seconds, ...] = key("their times", unit="s")
 
     @model_validator(mode="after")
