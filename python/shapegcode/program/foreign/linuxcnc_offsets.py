@@ -69,14 +69,11 @@ class Offsets:
                     raise ValueError(
                         "G53 G1: a cutting move in machine coordinates needs the work offset (input.work_offsets)"
                     )
-                self._machine(values)
+                self._in_absolute(f"G53G00{words_of(values)}")
+                self._forget(given_axes(values))
                 return {}
             found[AXES[axis]] = values[AXES[axis]] - sum(part or 0.0 for part in parts) / state.unit_mm
         return found
-
-    def _machine(self, values: Mapping[str, float]) -> None:
-        self._in_absolute(f"G53G00{words_of(values)}")
-        self._forget(given_axes(values))
 
     def _forget(self, axes: Sequence[int]) -> None:
         for axis in axes:

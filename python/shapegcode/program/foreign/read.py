@@ -8,13 +8,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from shapegcode.errors import ProgramError, located_error
 from shapegcode.io.data_file import read_file
-
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
+from shapegcode.machine import Machine
 
 _MAX_CALLED_BYTES = 10_000_000
 MAX_DIGITS = 8
@@ -159,6 +157,8 @@ _PERCENT = re.compile(rb"(?m)^[ \t]*%[ \t\r]*$")
 _WRITTEN_FOR = re.compile(rb"(?m)^[ \t]*[;(] ?DIALECT (KLIPPER|ISG)\b")
 COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
 
+_PATH_TOLERANCE = "tolerance of the path; FANUC's G64 has no P"
+_DWELLS = (b"G4F", b"G04F", b"G4 ", b"G04 ")
 _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ...] = (
     (
         "linuxcnc",
@@ -171,12 +171,7 @@ _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ..
     ),
     ("linuxcnc", (b"#<",), re.compile(rb"#<[^>\n]+>"), "named parameter"),
     ("linuxcnc", (b"G90.1", b"G91.1"), re.compile(rb"G9[01]\.1(?!\d)"), "centres of arcs"),
-    (
-        "linuxcnc",
-        (b"G64", b"G064"),
-        re.compile(rb"G0*64[ \t]*P[ \t]*[\d.]+"),
-        "tolerance of the path; FANUC's G64 has no P",
-    ),
+    ("linuxcnc", (b"G64", b"G064"), re.compile(rb"G0*64[ \t]*P[ \t]*[\d.]+"), _PATH_TOLERANCE),
     ("linuxcnc", (b"G59.",), re.compile(rb"G59\.[123](?!\d)"), "work coordinate system 7 to 9"),
     ("linuxcnc", (b"G38.",), re.compile(rb"G38\.[2-5](?!\d)"), "straight probe"),
     ("haas", (b"G154",), re.compile(rb"G154[ \t]*P[ \t]*\d+"), "additional work offset"),
@@ -186,12 +181,7 @@ _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ..
     ("haas", (b"G150",), re.compile(rb"G150(?!\d)"), "general pocket milling"),
     ("siemens", (b"CR",), re.compile(rb"(?<![A-Z])CR[ \t]*="), "radius of an arc"),
     ("siemens", (b"MSG",), re.compile(rb"(?<![A-Z])MSG(?=\s|\()"), "message"),
-    (
-        "siemens",
-        (b"G4F", b"G04F", b"G4 ", b"G04 "),
-        re.compile(rb"G0*4[ \t]*F[ \t]*[\d.]+"),
-        "dwell in seconds; FANUC's F is a feed",
-    ),
+    ("siemens", _DWELLS, re.compile(rb"G0*4[ \t]*F[ \t]*[\d.]+"), "dwell in seconds; FANUC's F is a feed"),
     ("siemens", (b"%_N_",), re.compile(rb"%_N_\w+"), "name of a program"),
     ("siemens", (b"=",), re.compile(rb"(?<![A-Z])R\d+[ \t]*="), "R parameter"),
     ("siemens", (b"AC", b"IC"), re.compile(rb"=[ \t]*[AI]C(?![A-Z])"), "absolute or incremental word"),
@@ -237,7 +227,8 @@ def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]
     Only words that a control alone knows count; the first 64 KiB are looked at, comments left out.
     """
     code = re.sub(rb";[^\n]*", b"", COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
-    code = code[: _end(code)]
+    ends = [match.end() for match in _PERCENT.finditer(code)] if b"%" in code else []
+    code = code[: ends[1]] if len(ends) > 1 else code  # no control reads beyond its second `%` line
     signs = [(each[0], *each[2:]) for each in _SIGNS if any(hint in code for hint in each[1])]
     found = _first_signs(code, signs)
     if found or of_fanuc:
@@ -271,30 +262,12 @@ def doubtful_word(text: bytes) -> tuple[int, str] | None:
         return None
     match = min(found, key=lambda each: each.start())
     value = int(match[1])
-    dwells = match.re is _SHORT_DWELL
     sentence = (
         f"G04 P{value} is read as {value} ms (FANUC, Haas); on LinuxCNC it is {value} s"
-        if dwells
+        if match.re is _SHORT_DWELL
         else f"P{value} of an arc is not read, as FANUC knows none; on LinuxCNC the arc has {value} turns"
     )
     return code.count(b"\n", 0, match.start()) + 1, f"{sentence}: state which with controller.dialect"
-
-
-def words_behind_semicolon(text: bytes) -> int | None:
-    """The first line with words behind a semicolon, which is a comment for other controls and a block for FANUC."""
-    if b";" not in text:
-        return None
-    match = next((each for each in _BEHIND_SEMICOLON.finditer(text) if each[1]), None)
-    return None if match is None else text.count(b"\n", 0, match.start()) + 1
-
-
-def _end(code: bytes) -> int:
-    """End of a program: no control reads beyond its second `%` line."""
-    ends = [match.end() for match in _PERCENT.finditer(code)] if b"%" in code else []
-    return ends[1] if len(ends) > 1 else len(code)
-
-
-Reader = Callable[..., ForeignProgram]
 
 
 def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | None) -> ForeignProgram | None:
@@ -309,18 +282,20 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
         return None
     text = data.removeprefix(BOM_UTF8).decode("latin-1")
     # Loaded when a program of its dialect is read: most are FANUC's.
-    read: Reader = getattr(import_module(f"shapegcode.program.foreign.{dialect}"), f"read_{dialect}")
+    read: Callable[..., ForeignProgram] = getattr(
+        import_module(f"shapegcode.program.foreign.{dialect}"), f"read_{dialect}"
+    )
     program = read(text, file=source, machine=machine, folder=folder)
     return replace(program, reason=reason)
 
 
 def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
     """A semicolon ends a block for FANUC, and begins a comment for other controls."""
-    line = words_behind_semicolon(data)
-    if line is not None:
+    found = next((each for each in _BEHIND_SEMICOLON.finditer(data) if each[1]), None) if b";" in data else None
+    if found is not None:
         raise refusal(
             source,
-            line,
+            data.count(b"\n", 0, found.start()) + 1,
             "words behind `;`: FANUC begins a block there, LinuxCNC, a Haas and a Sinumerik have a comment; write a "
             "line end or ( ), or state the control: --set controller.dialect=linuxcnc, haas or siemens",
         )

@@ -241,9 +241,8 @@ class SiemensPath:
         for axis, (value, incremental, column) in given.axes.items():
             if incremental and self.shifted[axis]:
                 setting = "whether the control adds that depends on a setting (SD42440, SD42442)"
-                wanted = "it must be programmed absolutely before"
-                name = "XYZ"[axis]
-                raise WordError(f"{name} incrementally behind a change of its offset: {setting}; {wanted}", column)
+                what = f"{'XYZ'[axis]} incrementally behind a change of its offset: {setting}"
+                raise WordError(f"{what}; it must be programmed absolutely before", column)
             target[axis] = here[axis] + value if incremental else value
             if not incremental:
                 self.shifted[axis] = False
@@ -331,7 +330,12 @@ class SiemensPath:
         first, second, _ = PLANES[modes.plane]
         tolerance = self.machine.controller.arc_radius_tolerance_mm
         if modes.motion == "CIP":
-            return arcs.through(here, self._middle(given, here), target)
+            middle = here.copy()
+            for axis, (value, incremental, _) in given.middle.items():
+                middle[axis] = here[axis] + value if incremental else value
+            if len(given.middle) < 2:
+                raise ValueError("CIP: the intermediate point must be given by two or three of I1=, J1=, K1=")
+            return arcs.through(here, middle, target)
         if modes.motion == "CT":
             if self.direction is None:
                 raise ValueError("CT needs the direction of a move before it, whose start is known")
@@ -356,14 +360,6 @@ class SiemensPath:
         if not given.centre:
             raise ValueError(f"{modes.motion} without I, J, K, CR= or AR=: one of them must be given")
         return arcs.by_centre(here, target, centre, modes.plane, turn, tolerance)
-
-    def _middle(self, given: Given, here: Vector) -> Vector:
-        middle = here.copy()
-        for axis, (value, incremental, _) in given.middle.items():
-            middle[axis] = here[axis] + value if incremental else value
-        if len(given.middle) < 2:
-            raise ValueError("CIP: the intermediate point must be given by two or three of I1=, J1=, K1=")
-        return middle
 
     def _in_offset(self, element: Element, column: int) -> Element:
         """An arc in the coordinates of the work offset."""
@@ -392,9 +388,12 @@ class SiemensPath:
         ahead = element.direction_at(0.0)
         self._end_corner(element, ahead, motion, moved)
         known = bool(np.all(np.isfinite(element.start[moved])))
-        corner = self._corner_of(element, given, known)
-        if corner is not None:
-            self._corner = corner
+        kind, size = given.corner or ("RND", self.modes.rounding_mm)
+        is_possible = self.modes.motion != "G0" and known and size > 0.0
+        if is_possible:
+            self._corner = _HeldCorner(element, kind, size, given.corner is None, given.column)
+        elif size < 0.0 or (size > 0.0 and given.corner is not None):
+            raise given.error(f"{kind}={size:g}: it must be more than 0, in a block with a feed whose start is known")
         exact = "G09" if given.exact else ""
         if motion == "G0":
             self.put(f"{exact}G00{self._axes(element.end, moved)}")
@@ -492,15 +491,6 @@ class SiemensPath:
         return "".join(f"{'XYZ'[k]}{self._length(float(end[k]))}" for k in range(3) if moved[k])
 
     # ---- corners -----------------------------------------------------------------------------------------------------
-
-    def _corner_of(self, element: Element, given: Given, known: bool) -> _HeldCorner | None:
-        kind, size = given.corner or ("RND", self.modes.rounding_mm)
-        is_possible = self.modes.motion != "G0" and known and size > 0.0
-        if size == 0.0 or (given.corner is None and size > 0.0 and not is_possible):
-            return None
-        if not is_possible:
-            raise given.error(f"{kind}={size:g}: it must be more than 0, in a block with a feed whose start is known")
-        return _HeldCorner(element, kind, size, given.corner is None, given.column)
 
     def _end_corner(self, element: Element, ahead: Vector, motion: str, moved: list[bool]) -> None:
         """Write the corner between the block that was held and this one."""
