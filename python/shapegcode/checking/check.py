@@ -120,7 +120,13 @@ def check_text(
         for stop in look_ahead_breakers(program, machine, table):
             severity = "warning" if stop.unasked else "note"
             found.append(_at(program, severity, "look_ahead_breaker", stop.line, stop.message))
-        found += _feed_findings(program, table)
+        for clamped in table.clamped_feeds:
+            message = (
+                f"{clamped.feed_mm_per_min:.10g} mm/min are more than the axes allow in {clamped.blocks} "
+                f"block{'' if clamped.blocks == 1 else 's'} from here on: the control goes down to "
+                f"{clamped.least_mm_per_min:.0f} mm/min"
+            )
+            found.append(_at(program, "warning", "axis_feed", clamped.first_line, message))
         found += _low_feed_findings(program, machine)
         slowed = [region for region in program.regions if region.shaped]
         for code, line, message in ini_lines([region.path for region in slowed], machine):
@@ -159,13 +165,12 @@ def _at(program: Program, severity: str, code: str, line: int, message: str) -> 
 
 
 def _listed(found: Iterable[Finding], source: str) -> tuple[Finding, ...]:
-    listed: list[Finding] = []
-    seen: dict[str, int] = {}
-    rank = {name: number for number, name in enumerate(_SEVERITIES)}
-    for finding in sorted(
-        found, key=lambda each: (each.file != source, each.file, each.line, each.column, rank[each.severity])
-    ):
-        seen[finding.code] = seen.get(finding.code, 0) + 1
+    def rank(each: Finding) -> tuple[bool, str, int, int, int]:
+        return each.file != source, each.file, each.line, each.column, _SEVERITIES.index(each.severity)
+
+    listed, seen = [], Counter[str]()
+    for finding in sorted(found, key=rank):
+        seen[finding.code] += 1
         if seen[finding.code] <= MOST_FINDINGS:
             listed.append(finding)
     return tuple(listed)
@@ -230,16 +235,6 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
 
 
 # ---- what an accepted program does -------------------------------------------------------------------------
-
-
-def _feed_findings(program: Program, table: BlockTable) -> Iterator[Finding]:
-    for clamped in table.clamped_feeds:
-        message = (
-            f"{clamped.feed_mm_per_min:.10g} mm/min are more than the axes allow in {clamped.blocks} "
-            f"block{'' if clamped.blocks == 1 else 's'} from here on: the control goes down to "
-            f"{clamped.least_mm_per_min:.0f} mm/min"
-        )
-        yield _at(program, "warning", "axis_feed", clamped.first_line, message)
 
 
 def _low_feed_findings(program: Program, machine: Machine) -> Iterator[Finding]:
