@@ -191,7 +191,6 @@ class _Events:
                 self.blocks.append(block)
 
     def _when(self, where: str, event: dict[str, Any]) -> tuple[int, float]:
-        """Counter and time of an event."""
         counter = _integer(where, event, "HFProbeCounter")
         if counter is None:
             raise RecordError(f"{where}.HFProbeCounter is missing: the time is unknown")
@@ -281,7 +280,6 @@ def read_edge_json(path: str | Path) -> EdgeCapture:
 
 
 def _parsed(file: DataFile, where: str, data: bytes) -> dict[str, Any]:
-    """The JSON object of a file."""
     if not data.strip():
         raise RecordError(f"{where}: the file is empty; needed is JSON with Header, Payload and Footer")
     try:

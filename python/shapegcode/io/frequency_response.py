@@ -148,7 +148,10 @@ def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, fl
         if named not in {None, measures}:
             raise RecordError(f"{where}: --response-unit {stated.name} is of {measures}, the response is {named}")
         return measures, stated.factor / over, []
-    found = next((unit for part in _unit_texts(label) if (unit := ratio_unit(part)) is not None), None)
+    # In brackets, behind the name, or the whole text.
+    inside = re.findall(r"\[([^\]]*)\]", label) + re.findall(r"\(((?:[^()]|\([^()]*\))*)\)", label)
+    behind = [label[at.end() :] for at in re.finditer(r"[\s_]+", label)]
+    found = next((unit for part in (*inside, *behind, label) if (unit := ratio_unit(part)) is not None), None)
     if found is not None:
         measures = next(each for each in _RESPONSES if each == found[0].measures)
         if options.quantity not in {None, measures}:
@@ -162,10 +165,3 @@ def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, fl
         "as m/N, µm/N, (m/s)/N, (m/s²)/N or g/N in the header, or --response-unit (of the response, over N), or "
         "--quantity"
     )
-
-
-def _unit_texts(label: str) -> list[str]:
-    """Where a unit may stand: in brackets, behind the name, or the whole text."""
-    inside = re.findall(r"\[([^\]]*)\]", label) + re.findall(r"\(((?:[^()]|\([^()]*\))*)\)", label)
-    behind = [label[at.end() :] for at in re.finditer(r"[\s_]+", label)]
-    return [*inside, *behind, label]

@@ -279,7 +279,6 @@ def _shape(value: Any) -> str:
 
 
 def _response(path: Path, held: dict[str, Any], lines: int, options: ReadOptions, listed: str) -> tuple[str, Any]:
-    """Name and values of the response."""
     wanted = options.response_columns[0] if options.response_columns else None
     if wanted is None:
         complex_ones = [name for name, value in held.items() if np.iscomplexobj(value) and np.size(value) >= lines]

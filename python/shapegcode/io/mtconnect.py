@@ -80,7 +80,6 @@ class _Documents:
                 self._document = None
 
     def close(self) -> Iterator[Event]:
-        """The end of the file."""
         if self._document is not None:
             raise RecordError(
                 f"{self._path}:{self._line}: the document that begins in line {self._document.line} is cut off within "

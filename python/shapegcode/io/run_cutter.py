@@ -136,7 +136,13 @@ class RunCutter:
         if self._status is None:
             self._status = item
         elif item is not self._status:
-            self._second_status(line, item)
+            one, other = self._status.name, item.name
+            if plain_name(one.rpartition(":")[2]) == plain_name(other.rpartition(":")[2]):
+                raise RecordError(
+                    f"{self._source}:{line}: {other} besides {one}: the log has more than one control; choose one, for "
+                    f'example items = {{ status = "{one}" }} with the other items of that control'
+                )
+            self.notes.add("status", line, f"{other} left out: {one} says when the program runs")
             return
         word = text.decode("utf-8", errors="replace").strip().upper()
         state = STATES.get(re.sub(r"[_\s-]", "", word), "unknown")
@@ -182,16 +188,6 @@ class RunCutter:
             self.notes.add("ended", line, f"{name} is {word} without PROGRAM_COMPLETED: ended, or broken off")
             yield from self._finish(time, word)
 
-    def _second_status(self, line: int, item: Item) -> None:
-        assert self._status is not None
-        one, other = self._status.name, item.name
-        if plain_name(one.rpartition(":")[2]) == plain_name(other.rpartition(":")[2]):
-            raise RecordError(
-                f"{self._source}:{line}: {other} besides {one}: the log has more than one control; choose one, for "
-                f'example items = {{ status = "{one}" }} with the other items of that control'
-            )
-        self.notes.add("status", line, f"{other} left out: {one} says when the program runs")
-
     def _moved(self) -> bool:
         """Whether block numbers changed so far."""
         return any(len(set(track.values)) > 1 for track in self._tracks.values() if track.counts)
@@ -220,7 +216,6 @@ class RunCutter:
             track.drop_until(run.end)
 
     def _end(self, last: float) -> Iterator[RunLog]:
-        """The end of the file."""
         if self._first is None:
             raise RecordError(
                 f"{self._source}: no item that is of use: looked for {self._table.sought('block')}; the log has "

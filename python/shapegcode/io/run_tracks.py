@@ -271,7 +271,6 @@ def run_of(part: RunPart, tracks: Sequence[Track], feed_unit: str | None, notes:
 
 
 def _compare_clocks(part: RunPart, runtime: Signal | None, notes: FileNotes) -> None:
-    """Compare the control's own timer with the clock of the log."""
     if runtime is None or part.cut_start or part.cut_end or not part.has_status:
         return
     counted, clock = float(runtime.value[-1]), part.end - part.start

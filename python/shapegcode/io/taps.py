@@ -36,8 +36,6 @@ class _Column:
 
 
 class _Chooser:
-    """Chooses the columns of one file."""
-
     def __init__(self, table: TextTable, options: ReadOptions) -> None:
         self.table, self.options = table, options
         self.labels = table.labels(tap_label)
@@ -159,7 +157,6 @@ class _Chooser:
         )
 
     def responses(self, taken: set[int]) -> list[_Column]:
-        """The columns of the response, one per axis."""
         options = self.options
         if options.response_columns:
             found = [self._named(name, "--response-column") for name in options.response_columns]

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, Strict, model_validator
 
 from shapegcode.io.data_file import toml_tables
+from shapegcode.machine.axes import optional
 from shapegcode.settings.keys import (
     AxisRatios,
     AxisTimes,
@@ -123,13 +124,9 @@ class Controller(TomlTable):
         "word LinuxCNC's with kind = \"linuxcnc\", else FANUC's. A program with words of another control is refused",
         default="auto",
     )
-    linuxcnc: LinuxcncPlanner | None = key(
-        'settings of kind = "linuxcnc"; left out: the control\'s own defaults', default=None
-    )
-    klipper: KlipperPlanner | None = key(
-        'settings of kind = "klipper"; left out: the control\'s own defaults', default=None
-    )
-    grbl: GrblPlanner | None = key('settings of kind = "grbl"; left out: the control\'s own defaults', default=None)
+    linuxcnc: LinuxcncPlanner | None = optional('settings of kind = "linuxcnc"; left out: the control\'s own defaults')
+    klipper: KlipperPlanner | None = optional('settings of kind = "klipper"; left out: the control\'s own defaults')
+    grbl: GrblPlanner | None = optional('settings of kind = "grbl"; left out: the control\'s own defaults')
     interpolation_period_s: Annotated[Positive, Field(ge=1e-5, le=0.1)] = key(
         "time between two set-points", assumed=0.001
     )
@@ -188,26 +185,23 @@ class Controller(TomlTable):
     centripetal_acceleration_mm_s2: Positive = key(
         "largest acceleration across the path in arcs; it limits the feed there", fanuc="1735", assumed=1000.0
     )
-    polyline_acceleration_mm_s2: Positive | None = key(
+    polyline_acceleration_mm_s2: Positive | None = optional(
         "the same along polylines, where two lines meet; left out: as in arcs, under another corner_rule than "
-        '"speed_difference" not limited',
-        default=None,
+        '"speed_difference" not limited'
     )
-    junction_deviation_mm: Annotated[Positive, Field(le=10)] | None = key(
-        'deviation at a corner, run at the acceleration of the axes; corner_rule = "junction_deviation" needs it',
-        default=None,
+    junction_deviation_mm: Annotated[Positive, Field(le=10)] | None = optional(
+        'deviation at a corner, run at the acceleration of the axes; corner_rule = "junction_deviation" needs it'
     )
-    corner_stop_angle_deg: Annotated[Positive, Field(le=180)] | None = key(
-        'least turn of a corner that is a stop; corner_rule = "stops" needs it', default=None
+    corner_stop_angle_deg: Annotated[Positive, Field(le=180)] | None = optional(
+        'least turn of a corner that is a stop; corner_rule = "stops" needs it'
     )
     look_ahead_block_time_s: Annotated[NonNegative, Field(le=1)] = key(
         "look-ahead runs no block off faster than it reads one; 0: not limited", default=0.0
     )
-    contour_acceleration_mm_s2: PositiveAxisValues | None = key(
+    contour_acceleration_mm_s2: PositiveAxisValues | None = optional(
         "largest acceleration of an axis along a contour, corners and curves alike; left out: not limited. One "
         "number, or x, y, z",
         fanuc="1737",
-        default=None,
     )
     rapid_path: Literal["linear", "non_linear"] = key(
         '"linear": a rapid goes straight; "non_linear": each axis travels at its own speed',
@@ -386,14 +380,14 @@ class FeedControl(TomlTable):
         "shorter. A test cut with feeds that change every 0.2, 0.4 and 0.6 mm shows it (paper 001, figure 8)",
         assumed=0.6,
     )
-    max_change_mm_per_min: Positive | None = key(
-        "largest change of the feed from one block to the next; left out: not limited", default=None
+    max_change_mm_per_min: Positive | None = optional(
+        "largest change of the feed from one block to the next; left out: not limited"
     )
-    spindle_power_w: Positive | None = key(
-        "power that the spindle gives for as long as it takes; left out: not limited", default=None
+    spindle_power_w: Positive | None = optional(
+        "power that the spindle gives for as long as it takes; left out: not limited"
     )
-    spindle_torque_nm: Positive | None = key(
-        "torque that the spindle gives for as long as it takes; left out: not limited", default=None
+    spindle_torque_nm: Positive | None = optional(
+        "torque that the spindle gives for as long as it takes; left out: not limited"
     )
 
 
@@ -480,26 +474,23 @@ class Times(TomlTable):
     rapid_override_percent: Annotated[Positive, Field(le=200)] = key("the same of rapids", assumed=100.0)
     tool_change_s: Seconds = key("an M06", assumed=0.0)
     m_function_s: Seconds = key("any other M code that m_codes does not name", assumed=0.0)
-    m_codes: MCodeTimes | None = key(
-        "M codes with a time of their own, { code = [1, 8], s = [0.3, 5.1] }; left out: none", default=None
+    m_codes: MCodeTimes | None = optional(
+        "M codes with a time of their own, { code = [1, 8], s = [0.3, 5.1] }; left out: none"
     )
-    spindle_start: SpindleTimes | None = key(
+    spindle_start: SpindleTimes | None = optional(
         "time in which the spindle comes from rest to a speed, { rpm = [5000, 12000], s = [1.0, 7.3] }; it elapses "
-        "while the axes move; the control waits for the remainder before the next M code or cut; left out: none",
-        default=None,
+        "while the axes move; the control waits for the remainder before the next M code or cut; left out: none"
     )
-    spindle_stop: SpindleTimes | None = key(
-        "likewise to rest after M05; M00, M01, M02, M30, M06 and the next M03 wait for the remainder; left out: none",
-        default=None,
+    spindle_stop: SpindleTimes | None = optional(
+        "likewise to rest after M05; M00, M01, M02, M30, M06 and the next M03 wait for the remainder; left out: none"
     )
     unknown_move_s: AxisTimes = key(
         "a rapid of an axis of which the program does not give start or end: G28, G30, G53, and the first one "
         "behind them or behind M06. One number, or x, y, z",
         assumed=0.0,
     )
-    scatter: TimeScatter | None = key(
+    scatter: TimeScatter | None = optional(
         "what calibrated times scatter by, { cuts_percent = 1.1, between_cuts_s = 0.2, runs_percent = 0.3 }; `time` "
-        "gives a 95 % interval where it is stated; left out: none",
-        default=None,
+        "gives a 95 % interval where it is stated; left out: none"
     )
     open: tuple[OpenTime, ...] = key("what run logs leave open of the calibrated parameters", default=())

@@ -55,7 +55,6 @@ class _Ini:
         return None
 
     def origin(self, section: str, name: str) -> str:
-        """Where a value comes from, for the machine file."""
         return f"parameters: {Path(self.file).name} line {self.entries[section, name][1]}: [{section}] {name}"
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
+from shapegcode.machine.axes import optional
 from shapegcode.machine.dialects import DialectName, code_name, dialect_of
 from shapegcode.settings.keys import Bool, Float, NonNegative, Positive, Text, TomlTable, key, toml
 
@@ -85,11 +86,10 @@ class Input(TomlTable):
     compensation_start_up: Literal["A", "B"] = key(
         "kind of the start-up and cancel moves of cutter compensation", fanuc="5003#0, #1", assumed="A"
     )
-    material_side: Literal["left", "right"] | None = key(
+    material_side: Literal["left", "right"] | None = optional(
         "side of the programmed tool path on which the workpiece lies, seen along the travel: right where the contour "
         "is cut as with G41, left as with G42; with it deviations are reported as gouge and excess; left out: not "
-        "known",
-        default=None,
+        "known"
     )
     scale_unit: Annotated[Positive, Field(le=1)] = key(
         "unit of the factors P, I, J, K of scaling G51 without a decimal point", unit="1", fanuc="5400#7", assumed=0.001
@@ -161,16 +161,14 @@ class Emission(TomlTable):
         "a control",
         default="constant",
     )
-    decimals: Annotated[int, Strict(), Field(ge=2, le=6)] | None = key(
+    decimals: Annotated[int, Strict(), Field(ge=2, le=6)] | None = optional(
         "decimals of positions in mm in shaped blocks, one more in inch; left out: those of the dialect, else those of "
         "controller.least_increment_mm",
         unit="digits",
-        default=None,
     )
-    block_period_s: Annotated[Positive, Field(le=1)] | None = key(
+    block_period_s: Annotated[Positive, Field(le=1)] | None = optional(
         "duration of a short block: a whole multiple of controller.interpolation_period_s and not below "
-        "controller.block_time_s; left out: chosen for the shortest shaper",
-        default=None,
+        "controller.block_time_s; left out: chosen for the shortest shaper"
     )
     prologue: tuple[Text, ...] = key(
         'lines written before each shaped cut, for example ["G05.1 Q0"] to switch a look-ahead mode off', default=()
@@ -384,10 +382,9 @@ class Shaping(TomlTable):
         "this and the direction changes by 45 degrees or more: a shaper must not mix plunges with other cuts",
         default=15.0,
     )
-    part_mass_kg: NonNegative | None = key(
+    part_mass_kg: NonNegative | None = optional(
         "mass of the part on the table, for modes with a table over mass_kg; left out: not known, and their "
-        "nominal frequency holds",
-        default=None,
+        "nominal frequency holds"
     )
 
 

@@ -325,13 +325,11 @@ def compare(
     (first, first_is_cut), (second, second_is_cut) = _read(original, machine), _read(emitted, machine)
     # Within which cuts of other lengths are the same: a conversion allows any, and judges it later.
     joint_um = allowed.path_um if allowed.path_um < math.inf else _JOINT_TOLERANCES * machine.tolerance.contour_um
-    core = _core.compare_programs(
-        first.core,
-        second.core,
-        reader_options(machine),
-        _emission_lines(machine, first.core.expanded_radii_mm),
-        joint_um * 1e-3,
-    )
+    emission = machine.emission
+    lines = [line for group in emission.around_cuts.values() for line in group]
+    lines += [*emission.prefill_lines, *guard_lines(first.core.expanded_radii_mm, machine)]
+    written = ["".join(re.sub(r"\([^)]*\)", "", line).split()) for line in lines]  # as the core compares them
+    core = _core.compare_programs(first.core, second.core, reader_options(machine), written, joint_um * 1e-3)
     is_shaped = second.stamp is not None
     differences = [
         ProgramDifference(
@@ -348,10 +346,10 @@ def compare(
     ]
     differences += _compensation(first, second, allowed)
     if (first_is_cut or second_is_cut) and not any(each.kind == "end" for each in differences):
-        lines = [max(1, program.text.rstrip().count(b"\n") + 1) for program in (first, second)]
-        texts = [f"ends early at line {line}" for line in lines]
+        ends = [max(1, program.text.rstrip().count(b"\n") + 1) for program in (first, second)]
+        texts = [f"ends early at line {line}" for line in ends]
         texts[1 if first_is_cut else 0] = "has an end"
-        differences.append(ProgramDifference("end", lines[0], lines[1], texts[0], texts[1], allowed.covers("end")))
+        differences.append(ProgramDifference("end", ends[0], ends[1], texts[0], texts[1], allowed.covers("end")))
     return Comparison(
         original=first.source,
         emitted=second.source,
@@ -388,14 +386,6 @@ def _read(program: Program | str | Path, machine: Machine) -> tuple[Program, boo
                 found = Program.from_text(kept + b"\n%\n", machine, source=str(program), folder=Path(program).parent)
                 return found, True
         raise
-
-
-def _emission_lines(machine: Machine, radii_mm: dict[int, float]) -> list[str]:
-    """The lines that `convert` writes around shaped cuts for this machine, as the core compares them."""
-    emission = machine.emission
-    locks = (*emission.locking, *emission.unlocking)
-    lines = [*emission.prologue, *emission.epilogue, *locks, *emission.prefill_lines, *guard_lines(radii_mm, machine)]
-    return ["".join(re.sub(r"\([^)]*\)", "", line).split()) for line in lines]
 
 
 def _compensation(first: Program, second: Program, allowed: Allowed) -> Iterator[ProgramDifference]:

@@ -164,7 +164,6 @@ def _code(text: str) -> str:
 
 
 def _refuse(codes: list[str], code: str) -> None:
-    """Words that are not read."""
     for name in codes:
         if name in _REFUSED:
             raise ValueError(f"G{name} is {_REFUSED[name]} on a Haas: it is not read")

@@ -79,7 +79,6 @@ class _Interpreter:
         self._broke = False
 
     def run(self) -> ForeignProgram:
-        """Execute the program."""
         here = self._enter_main()
         power_on = self._machine.power_on
         given = (power_on.plane, power_on.distance, power_on.feed_mode, power_on.path_mode)
@@ -176,7 +175,6 @@ class _Interpreter:
                 position[axis] = here + unit * sum(map(float, _EVERY_WORD[letter].findall(text)))
 
     def _step(self, index: int) -> None:
-        """Execute one line."""
         self._next = index + 1
         self._steps += 1
         self._runner.line, self._runner.file, self._runner.number = index + 1, self._file.index, ""
@@ -239,7 +237,6 @@ class _Interpreter:
     # ---- control flow ----------------------------------------------------------------------------------------
 
     def _control(self, index: int, line: OLine) -> None:
-        """An O word."""
         if line.keyword == "":
             if line.rest.strip() and not line.rest.strip().startswith(("(", ";")):
                 raise ValueError(f"O{line.label}{line.rest[:20]}: no keyword of LinuxCNC")
@@ -326,7 +323,6 @@ class _Interpreter:
         self._parameters.set("_value_returned", 0.0)
 
     def _subroutine(self, label: str, keyword: str) -> tuple[SourceFile, int]:
-        """File and line of a subroutine."""
         if (line := self._file.find(label, keyword)) is not None:
             return self._file, line
         if (line := self._main.find(label, keyword)) is not None:
@@ -468,7 +464,6 @@ def _first_state(machine: Machine, folder: Path | None) -> State:
 
 
 def _last_number(text: str, letter: str) -> float | None:
-    """The number of the last word of a letter."""
     at = max(text.rfind(letter), text.rfind(letter.lower()))
     match = _LAST_WORD[letter].match(text, at) if at >= 0 else None
     return None if match is None else float(match[1])

@@ -29,7 +29,6 @@ class BlockRunner:
     """Executes blocks and writes the lines that they become."""
 
     def __init__(self, state: State, plain: PlainProgram) -> None:
-        """Begin in this state."""
         self.state, self.plain = state, plain
         self.line, self.file = 1, 0
         self.number = ""  # N word that the next block takes
@@ -352,7 +351,12 @@ class BlockRunner:
         turn = 1 if modes.motion == 30 else -1
         given = complex(values.get(names[0], 0.0), values.get(names[1], 0.0)) * unit
         if "r" in values:
-            centre = _centre_of_radius(here, to, values["r"] * unit, turn)
+            radius, chord = values["r"] * unit, abs(to - here)
+            if chord == 0.0 or radius == 0.0:
+                raise ValueError("an arc with R ends where it begins, or its R is 0")
+            if chord / 2.0 - abs(radius) > 0.00127:
+                raise ValueError(f"R{abs(radius):g} mm is too small for a chord of {chord:g} mm")
+            centre = centre_by_radius(here, to, radius, turn)
         elif modes.centres == 901 and any(name not in values for name in names):
             raise ValueError(f"G90.1 needs {names[0].upper()} and {names[1].upper()}")
         else:
@@ -422,13 +426,3 @@ def _plain_comment(text: str) -> str:
     if text.lower().startswith(("msg,", "debug,", "print,", "log", "probe")):
         return ""
     return "".join(c for c in text.upper() if " " <= c <= "~" and c not in "()%;").strip()
-
-
-def _centre_of_radius(here: complex, to: complex, radius: float, turn: int) -> complex:
-    """The centre of an arc with R."""
-    chord = abs(to - here)
-    if chord == 0.0 or radius == 0.0:
-        raise ValueError("an arc with R ends where it begins, or its R is 0")
-    if chord / 2.0 - abs(radius) > 0.00127:
-        raise ValueError(f"R{abs(radius):g} mm is too small for a chord of {chord:g} mm")
-    return centre_by_radius(here, to, radius, turn)

@@ -89,7 +89,6 @@ def _read_words(row: CycleWords, code: int, words: Mapping[str, float], normal: 
 
 
 def _hole(state: State, code: int, row: CycleWords, place: str, levels: tuple[float, float, float]) -> Iterator[str]:
-    """One hole."""
     unit = state.unit_mm
     r, _, clear = levels
     normal = PLANES[state.modes.plane // 10][2]

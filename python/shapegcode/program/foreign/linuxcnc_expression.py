@@ -113,7 +113,6 @@ class Scanner:
     """Reads values and words of one line, whose blanks are gone and letters small."""
 
     def __init__(self, text: str) -> None:
-        """Begin at the first character."""
         self.text = text
         self.at = 0
 

@@ -14,7 +14,6 @@ class Offsets:
     """Changes offsets in the state and writes what FANUC's reader must know of it."""
 
     def __init__(self, state: State, put: Callable[[str], None]) -> None:
-        """Write through `put`."""
         self.state = state
         self._put = put
 

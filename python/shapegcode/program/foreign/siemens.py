@@ -75,7 +75,6 @@ class _Run:
         self._moves_left = machine.controller.max_expansion_moves + lines
 
     def program(self) -> ForeignProgram:
-        """Run it all."""
         main = self._store.main
         self.path.line = main.first
         name = re.sub(r"[^A-Z0-9 _.-]", "", main.name).replace("_", " ")[:32]

@@ -105,7 +105,6 @@ class SiemensPath:
     """Follows the moves of a program and writes them for FANUC."""
 
     def __init__(self, machine: Machine, out: PlainProgram) -> None:
-        """Begin where nothing is known."""
         self.machine, self.out = machine, out
         self.modes = SiemensModes()
         self.at = np.full(3, math.nan)  # in the coordinates of the work offset

@@ -69,7 +69,6 @@ class BlockWords:
     """Executes blocks of words."""
 
     def __init__(self, path: SiemensPath, run: Run, *, uses_m6: bool) -> None:
-        """Begin without a tool."""
         self.path, self._run = path, run
         self._uses_m6 = uses_m6
         self._tool, self._next_tool, self._edge, self._next_edge = 0, 0, -1, -1
@@ -286,7 +285,6 @@ class BlockWords:
             raise word.error(f"{name}= with {self.path.modes.motion or 'no G code'}: G2 or G3 must be in force")
 
     def _go(self, given: Given, rotary: dict[str, float], own_frame: str) -> None:
-        """The motion of a block."""
         if rotary:
             if given.axes or given.polar or self.path.modes.motion != "G0":
                 name = next(iter(rotary))
@@ -472,7 +470,6 @@ class BlockWords:
 
 
 def _frame_of(kind: str, values: dict[str, float], plane: int, column: int) -> SiemensFrame:
-    """One programmable frame."""
     vector = np.array([values.get(axis, 0.0) for axis in "XYZ"])
     if kind == "TRANS":
         return SiemensFrame(offset=vector)
