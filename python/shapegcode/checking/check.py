@@ -21,8 +21,7 @@ from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.reading import given_text, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, no_room
 
-MOST_FINDINGS = 1000
-"""Findings of one code that are listed; the counts hold them all."""
+MOST_FINDINGS = 1000  # findings of one code that are listed; the counts hold them all
 
 _SEVERITIES = ("alarm", "warning", "note")
 _MACRO_CONTROL = re.compile(r"(?<![A-Z])(IF|GOTO|WHILE)(?=\s*[\[#\d.])|(?<![A-Z])(DO|END)(?=\s*\d)")

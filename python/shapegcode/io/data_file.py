@@ -25,12 +25,9 @@ from typing import Any, BinaryIO, Self, cast
 
 from shapegcode.errors import ArgumentError, RecordError, ShapegcodeError
 
-MAX_DEPTH = 64
-"""Lists and tables within each other."""
-MAX_TEXT_BYTES = 1 << 20
-"""Of one text, key, or line."""
-MAX_SETTINGS_BYTES = 4 << 20
-"""Of a TOML file."""
+MAX_DEPTH = 64  # lists and tables within each other
+MAX_TEXT_BYTES = 1 << 20  # of one text, key, or line
+MAX_SETTINGS_BYTES = 4 << 20  # of a TOML file
 _MAX_BYTES = 2 << 30
 _MAX_INTEGER = 2**63 - 1
 #: Unpacked over packed: numbers of a log come to 5 to 15. Up to some size any ratio will do.

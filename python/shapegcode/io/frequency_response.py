@@ -15,8 +15,7 @@ from shapegcode.io.units import FloatArray, Unit, find_unit
 
 ComplexArray = npt.NDArray[np.complex128]
 
-#: Fewer lines hold no mode with its damping.
-FEWEST_LINES = 16
+FEWEST_LINES = 16  # fewer lines hold no mode with its damping
 _RESPONSES: tuple[Quantity, ...] = ("acceleration", "velocity", "displacement")
 _NAMES: dict[str, Quantity] = {
     "receptance": "displacement", "compliance": "displacement", "flexibility": "displacement",

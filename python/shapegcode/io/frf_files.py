@@ -38,8 +38,7 @@ _PARTS = {
 }
 _WORDS = {word: part for part, words in _PARTS.items() for word in words.split()}
 _DB = 20.0
-#: Without a header: frequency, real and imaginary part, in this order, of so many columns.
-_BARE_COLUMNS = (3, 4)
+_BARE_COLUMNS = (3, 4)  # without a header: frequency, real and imaginary part, in this order, of so many columns
 
 
 def part_of(text: str) -> str | None:

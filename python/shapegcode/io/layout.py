@@ -119,11 +119,9 @@ def without_thousands(data: bytes) -> bytes:
     return re.sub(rb"(?<![\d.,])" + _THOUSANDS.encode(), lambda found: found[0].replace(b".", b""), data)
 
 
-#: The header of loggers with long preambles stays within this.
-_HEAD_BYTES = 262_144
+_HEAD_BYTES = 262_144  # the header of loggers with long preambles stays within this
 _HEAD_LINES = 400
-#: So many rows of numbers on end are data; a preamble may hold one or two.
-_ROWS_TO_KNOW = 3
+_ROWS_TO_KNOW = 3  # so many rows of numbers on end are data; a preamble may hold one or two
 _MARK = re.compile(r"^\s*(#+|%+|//+|\*+)\s*")  # of a comment
 _NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
 _RATE = re.compile(

@@ -17,15 +17,13 @@ from shapegcode.io.data_file import MAX_DEPTH, MAX_TEXT_BYTES
 from shapegcode.io.layout import chunks, line_chunks
 from shapegcode.io.run_items import Event, FileNotes, Item, ItemTable, Stamps
 
-#: An agent sends no more at once: its largest buffers hold a million.
-_MAX_OBSERVATIONS = 1_000_000
+_MAX_OBSERVATIONS = 1_000_000  # an agent sends no more at once: its largest buffers hold a million
 _MAX_ITEMS = 100_000
 #: Sub-types of which the value is not what the machine does, by kind of item.
 _LEFT_OUT = {"COMMANDED", "PROGRAMMED", "JOG", "TARGET", "PROBE", "INCREMENTAL", "SCHEDULE", "OVERRIDE"}
 _AXES = ("X", "Y", "Z")
 _BEGIN = re.compile(rb"<\?xml\s|<(?:\w+:)?MTConnect(?:Streams|Devices|Error|Assets)\b")
-#: Bytes that the declaration of a document, or the beginning of its root, may need.
-_OVERLAP = 80
+_OVERLAP = 80  # bytes that the declaration of a document, or the beginning of its root, may need
 _FEED_UNIT = "mm/s"
 _SEQUENCE = re.compile(r"\d{1,20}", re.ASCII)
 

@@ -10,14 +10,10 @@ from shapegcode.errors import RecordError
 from shapegcode.io.run_items import STATES, Event, FileNotes, Item, ItemTable, State, plain_name
 from shapegcode.io.run_tracks import Hold, RunLog, RunPart, Track, run_of
 
-#: A step back up to this is an adapter whose items overtake each other; more is a clock that was set.
-_DISORDER_S = 1.0
-#: No value for this long within a run is said.
-_QUIET_S = 30.0
-#: What a value of text counts as, in values.
-_TEXT_VALUES = 8
-#: Values kept while no run goes on.
-_IDLE_VALUES = 100_000
+_DISORDER_S = 1.0  # a step back up to this is an adapter whose items overtake each other; more is a clock that was set
+_QUIET_S = 30.0  # no value for this long within a run is said
+_TEXT_VALUES = 8  # what a value of text counts as, in values
+_IDLE_VALUES = 100_000  # values kept while no run goes on
 
 
 class RunCutter:

@@ -25,10 +25,8 @@ from shapegcode.io.run_tracks import RunLog
 
 LogFormat = Literal["shdr", "mtconnect", "edge", "csv"]
 
-#: Values that one run may have: 10 hours at 100 a second; some 60 MB.
-MAX_VALUES = 4_000_000
-#: NIST_PLATE-12 is PLATE-12; whether OP2 is BOX_OP2 is not known.
-_SHORTEST_NAME = 4
+MAX_VALUES = 4_000_000  # values that one run may have: 10 hours at 100 a second; some 60 MB
+_SHORTEST_NAME = 4  # NIST_PLATE-12 is PLATE-12; whether OP2 is BOX_OP2 is not known
 _TABLE_LINES = 100
 _SHDR_LINE = re.compile(rb"[^|\r\n]*\d[^|\r\n]*\|[^|\r\n]+\|")
 

@@ -99,16 +99,11 @@ _SIGNALS: tuple[Role, ...] = (
 _COUNTS: frozenset[Role] = frozenset({"block", "sequence"})
 #: What was set before the start still holds; of feed and block nothing is known after so long.
 _KEPT: frozenset[Role] = frozenset({"tool", "spindle", "feed_override", "rapid_override"})
-#: A status is polled: what came so shortly before it belongs to the run.
-_LEAD_IN_S = 1.0
-#: A program's name may come so long after its start.
-_NAME_S = 5.0
-#: A first block number beyond it is no start of a program.
-_LATE_START = 50
-#: A program that begins anew after a hold goes back by more.
-_RESTART_BLOCKS = 20
-#: Whole seconds of a control, shown late.
-_CLOCKS_APART_S = 3.0
+_LEAD_IN_S = 1.0  # a status is polled: what came so shortly before it belongs to the run
+_NAME_S = 5.0  # a program's name may come so long after its start
+_LATE_START = 50  # a first block number beyond it is no start of a program
+_RESTART_BLOCKS = 20  # a program that begins anew after a hold goes back by more
+_CLOCKS_APART_S = 3.0  # whole seconds of a control, shown late
 _CLOCKS_APART = 0.01
 
 

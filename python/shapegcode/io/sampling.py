@@ -14,15 +14,13 @@ from shapegcode.io.units import FloatArray
 _OFF_GRID = 0.49
 #: A step from one instant to the next may differ from the period by this share; a missing sample doubles it.
 _OFF_STEP = 0.9
-#: Off the grid by more than this share of a period, the user gets a warning.
-_TELL = 0.1
+_TELL = 0.1  # off the grid by more than this share of a period, the user gets a warning
 #: A stated rate and the instants may differ by this share: clocks are better by far, wrong units are worse by far.
 STATED_RATE_TOLERANCE = 0.01
 #: Rounding moves an instant by half a digit at most; where digits are finer than this share of what it is off, the
 #: clock of the logger itself is uneven.
 _ROUNDED = 0.5
-#: Half of the steps differ from the usual one by more than this share: the clock is uneven.
-_UNEVEN = 0.05
+_UNEVEN = 0.05  # half of the steps differ from the usual one by more than this share: the clock is uneven
 _GRID_ONLY = "samples must be evenly spaced"
 
 
@@ -112,12 +110,9 @@ def _digit_of(times_s: FloatArray) -> float:
     return 0.0
 
 
-#: The grid has this share of the samples: the others show noise and gaps.
-_DENSITY = 0.8
-#: The longest step may be so many mean ones: a longer one leaves less than a third of the band.
-_LONGEST_STEP = 3.0
-#: Sinc of so many samples either way in a Kaiser window with 80 dB, flat up to .4 of the grid's rate.
-_REACH = 16
+_DENSITY = 0.8  # the grid has this share of the samples: the others show noise and gaps
+_LONGEST_STEP = 3.0  # the longest step may be so many mean ones: a longer one leaves less than a third of the band
+_REACH = 16  # Sinc of so many samples either way in a Kaiser window with 80 dB, flat up to .4 of the grid's rate
 _BETA = 7.86
 _RIDGE = 1e-6
 #: Intervals are widened by this much at least: what the pulse holds above the grid's band is an error beside the noise,

@@ -23,8 +23,7 @@ _REMEDY = (
     "state the unit, or of a signal in volts the sensor's sensitivity (--force-sensitivity 2.25mV/N, "
     "--response-sensitivity 100mV/g) or the scale (--force-scale, --response-scale)"
 )
-#: Fewer samples are no record of a vibration.
-_MIN_ROWS = 16
+_MIN_ROWS = 16  # fewer samples are no record of a vibration
 
 
 @dataclass(frozen=True)

@@ -9,20 +9,15 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-"""Of doubles, of any shape."""
+FloatArray = npt.NDArray[np.float64]  # of doubles, of any shape
 
 
 Measured = Literal["time", "force", "torque", "acceleration", "velocity", "displacement"]
 
-#: Inch in mm (exact by definition).
-MM_PER_INCH = 25.4
-#: Standard acceleration of gravity, m/s² (exact by definition).
-_G_M_S2 = 9.80665
-#: Pound-force in N (exact by definition).
-_LBF_N = 4.4482216152605
-#: Inch in m (exact by definition).
-_INCH_M = 0.0254
+MM_PER_INCH = 25.4  # Inch in mm (exact by definition)
+_G_M_S2 = 9.80665  # Standard acceleration of gravity, m/s² (exact by definition)
+_LBF_N = 4.4482216152605  # Pound-force in N (exact by definition)
+_INCH_M = 0.0254  # Inch in m (exact by definition)
 
 _FACTORS: dict[Measured, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6, "min": 60.0},

@@ -15,8 +15,7 @@ from shapegcode.machine.result import ReadTable
 
 _LAW = (1401, 1420, 1422, 1430, 1432, 1602, 1603, 1604, 1610, 1620, 1621, 1622, 1623, 1660, 1730, 1731, 1732)
 _AHEAD = (1735, 1737, 1769, 1770, 1771, 1772, 1773, 1774, 1783)
-NUMBERS = frozenset((*_LAW, *_AHEAD, 1820, 1825, 1826, 2005, 2068, 2092))
-"""Parameters that are read here."""
+NUMBERS = frozenset((*_LAW, *_AHEAD, 1820, 1825, 1826, 2005, 2068, 2092))  # parameters that are read here
 
 
 def take_motion(draft: Draft) -> None:

@@ -21,8 +21,7 @@ RADIUS_NOT_KNOWN = "the radius of offset D"
 
 _ZERO_RADIUS = re.compile(r"offset D(\d+) has a radius of 0\b")
 _KEPT = "cutter compensation is on and not expanded"
-_MEMORY_PER_BLOCK = 100
-"""Bytes of memory for each block that a conversion writes (docs/evidence/benchmarks.md)."""
+_MEMORY_PER_BLOCK = 100  # bytes of memory for each block that a conversion writes (docs/evidence/benchmarks.md)
 _SLACK_MM = 0.0005  # a radius that differs by more is another one
 
 

@@ -155,12 +155,10 @@ _CONTROLLER_KEYS = (
 )  # fmt: skip
 """Of `controller`: what changes how a text is read; limits of memory and time do not."""
 
-_NOT_READ = ("compensation", "material_side")
-"""Of `input`: what is decided of a program that was read."""
+_NOT_READ = ("compensation", "material_side")  # of `input`: what is decided of a program that was read
 
 
-Finder = Callable[[int], tuple[str, bytes] | None]
-"""Name and text of a program that another one calls, by its O number."""
+Finder = Callable[[int], tuple[str, bytes] | None]  # name and text of a program that another one calls, by its O number
 
 
 @dataclass(frozen=True)

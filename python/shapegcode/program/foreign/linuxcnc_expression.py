@@ -20,8 +20,7 @@ _EQUAL = 1e-4  # EQ, NE: values nearer to each other are equal; in later version
 Value = Callable[["ParameterTable"], float]
 
 
-Setting: TypeAlias = tuple["str | Value", "Value"]
-"""`#5 = ...`, or `#<name> = ...`: what is set, and to what."""
+Setting: TypeAlias = tuple["str | Value", "Value"]  # `#5 = ...`, or `#<name> = ...`: what is set, and to what
 
 
 @dataclass(frozen=True)

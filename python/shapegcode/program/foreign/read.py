@@ -15,8 +15,7 @@ from shapegcode.io.data_file import read_file
 from shapegcode.machine import Machine
 
 _MAX_CALLED_BYTES = 10_000_000
-MAX_DIGITS = 8
-"""Digits of a word in FANUC's words (alarm 0003)."""
+MAX_DIGITS = 8  # digits of a word in FANUC's words (alarm 0003)
 
 
 @dataclass(frozen=True)

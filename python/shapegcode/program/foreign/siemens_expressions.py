@@ -12,8 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-Value = float | int | bool | str
-"""Value of an expression: REAL, INT, BOOL or STRING."""
+Value = float | int | bool | str  # value of an expression: REAL, INT, BOOL or STRING
 
 
 class WordError(ValueError):
@@ -41,8 +40,7 @@ class Scope(Protocol):
         """Value of a variable, an R parameter or an element of an array."""
 
 
-Expression = Callable[[Scope], Value]
-"""Function that returns its value in a scope."""
+Expression = Callable[[Scope], Value]  # function that returns its value in a scope
 
 _SPACE = re.compile(r"[ \t]*")
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?")
