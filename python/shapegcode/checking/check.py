@@ -119,14 +119,7 @@ def check_text(
         for stop in look_ahead_breakers(program, machine, table):
             severity = "warning" if stop.unasked else "note"
             found.append(_at(program, severity, "look_ahead_breaker", stop.line, stop.message))
-        for clamped in table.clamped_feeds:
-            message = (
-                f"{clamped.feed_mm_per_min:.10g} mm/min are more than the axes allow in {clamped.blocks} "
-                f"block{'' if clamped.blocks == 1 else 's'} from here on: the control goes down to "
-                f"{clamped.least_mm_per_min:.0f} mm/min"
-            )
-            found.append(_at(program, "warning", "axis_feed", clamped.first_line, message))
-        found += _low_feed_findings(program, machine)
+        found += _feed_findings(program, machine, table)
         slowed = [region for region in program.regions if region.shaped]
         for code, line, message in ini_lines([region.path for region in slowed], machine):
             found.append(_at(program, "warning", code, line or slowed[0].first_line, message))
@@ -236,7 +229,14 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
 # ---- what an accepted program does -------------------------------------------------------------------------
 
 
-def _low_feed_findings(program: Program, machine: Machine) -> Iterator[Finding]:
+def _feed_findings(program: Program, machine: Machine, table: BlockTable) -> Iterator[Finding]:
+    for clamped in table.clamped_feeds:
+        message = (
+            f"{clamped.feed_mm_per_min:.10g} mm/min are more than the axes allow in {clamped.blocks} "
+            f"block{'' if clamped.blocks == 1 else 's'} from here on: the control goes down to "
+            f"{clamped.least_mm_per_min:.0f} mm/min"
+        )
+        yield _at(program, "warning", "axis_feed", clamped.first_line, message)
     least = machine.controller.minimum_feed_mm_per_min
     for region in program.regions:
         slowest = region.path.slowest_feed_mm_per_s * 60.0

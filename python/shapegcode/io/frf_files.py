@@ -227,10 +227,8 @@ def read_frf_mat(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
     if name.lower() in _ANGULAR:
         frequency = frequency / (2.0 * np.pi)
     found, response = _response(path, held, len(frequency), options, listed)
-    coherence = next(
-        (np.ravel(np.asarray(held[each], float)) for each in held if each.lower() in _COHERENCES and each != found),
-        None,
-    )
+    coherences = (held[each] for each in held if each.lower() in _COHERENCES and each != found)
+    coherence = next((np.ravel(np.asarray(each, float)) for each in coherences), None)
     if coherence is not None and len(coherence) != len(frequency):
         coherence = None
     label = " ".join(str(value) for key, value in held.items() if isinstance(value, str) and "unit" in key.lower())

@@ -56,11 +56,8 @@ def even_period(
     repeated = np.flatnonzero(steps == 0.0)
     if repeated.size and not coarse:
         row = int(repeated[0]) + 1
-        raise UnevenTimeError(
-            row,
-            f"time {times_s[row]:.9g} s is repeated: must ascend; if the file gives too few digits, leave the time out "
-            "and state the period (--sample-period)",
-        )
+        remedy = "if the file gives too few digits, leave the time out and state the period (--sample-period)"
+        raise UnevenTimeError(row, f"time {times_s[row]:.9g} s is repeated: must ascend; {remedy}")
     usual = float(np.median(steps))
     if not coarse:
         row = int(np.argmax(np.abs(steps - usual)))
@@ -79,20 +76,13 @@ def even_period(
     row = int(np.argmax(np.abs(off)))
     share = float(abs(off[row])) / period
     limit = max(_OFF_GRID, digit / period if coarse else 0.0)
+    place = f"time {times_s[row]:.9g} s is {share:.2g} periods of {period:.6g} s off even spacing"
     if share > limit:
-        raise UnevenTimeError(
-            row,
-            f"time {times_s[row]:.9g} s is {share:.2g} periods of {period:.6g} s off even spacing (limit {limit:.2g}): "
-            f"{_GRID_ONLY} and none may be missing",
-            ascending=True,
-        )
+        text = f"{place} (limit {limit:.2g}): {_GRID_ONLY} and none may be missing"
+        raise UnevenTimeError(row, text, ascending=True)
     if not even_clock and share > _TELL and not coarse and _digit_of(times_s) < _ROUNDED * share * period:
-        raise UnevenTimeError(
-            row,
-            f"time {times_s[row]:.9g} s is {share:.2g} periods of {period:.6g} s off even spacing, more than "
-            f"the digits of the file explain: {_GRID_ONLY}",
-            ascending=True,
-        )
+        text = f"{place}, more than the digits of the file explain: {_GRID_ONLY}"
+        raise UnevenTimeError(row, text, ascending=True)
     if share > _TELL and not coarse:
         return period, [
             f"times are up to {100 * share:.0f} % of a period off even spacing: taken as rounding, with the mean "

@@ -151,9 +151,8 @@ class _Chooser:
         scale = options.force_scale
         if options.force_sensitivity is not None:
             scale = self._volts(index) * per_volt("force_sensitivity", options.force_sensitivity, ("force",))[1]
-        return _Column(
-            index, self.labels[index], self._factor(index, "force", options.force_unit) if scale is None else scale
-        )
+        factor = self._factor(index, "force", options.force_unit) if scale is None else scale
+        return _Column(index, self.labels[index], factor)
 
     def responses(self, taken: set[int]) -> list[_Column]:
         options = self.options
@@ -291,11 +290,8 @@ def read_sweep(path: Path, options: ReadOptions) -> Record:
     told = options.axis or _axis_of_name(path.name)
     records = read_csv(path, replace(klipper_options(options), axis=told))
     record = max(records, key=lambda each: float(each.response.std()))
-    note = (
-        ()
-        if told
-        else (f"{path}: the axis is not stated: {(record.axis or '').upper()} moved most (state it with --axis)",)
-    )
+    axis = (record.axis or "").upper()
+    note = () if told else (f"{path}: the axis is not stated: {axis} moved most (state it with --axis)",)
     return replace(record, source=str(path), notes=(*record.notes, *note))
 
 

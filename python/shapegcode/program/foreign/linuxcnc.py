@@ -97,11 +97,8 @@ class _Interpreter:
             message = "the values of this line are nested too deep to be worked out"
             raise refusal(self._file.name, here + 1, message + self._call_stack()) from None
         if not self._runner.ended and not self._main.text.lstrip().startswith("%"):
-            raise refusal(
-                self._main.name,
-                self._main.count,
-                "the program has neither M2 or M30 nor '%' lines: LinuxCNC refuses it, it may be truncated",
-            )
+            message = "the program has neither M2 or M30 nor '%' lines: LinuxCNC refuses it, it may be truncated"
+            raise refusal(self._main.name, self._main.count, message)
         if not self._runner.ended:
             self._plain.put("M30", self._main.count)
         blends = self._runner.path_tolerances
@@ -227,11 +224,8 @@ class _Interpreter:
         if switch == "on":
             return None
         if switch == "unknown":
-            self._plain.note(
-                self._runner.line,
-                "`/` lines are executed, as with the block-skip switch off; input.block_skip states its position",
-                "block skip",
-            )
+            text = "`/` lines are executed, as with the block-skip switch off; input.block_skip states its position"
+            self._plain.note(self._runner.line, text, "block skip")
         return block
 
     # ---- control flow ----------------------------------------------------------------------------------------
@@ -332,10 +326,8 @@ class _Interpreter:
             files = (folder / (name + suffix) for folder in self._folders for suffix in (".ngc", ".NGC", ".nc"))
             path = next((file for file in files if file.is_file()), None) if _FILE_NAME.fullmatch(name) else None
             if path is None:
-                raise ValueError(
-                    f"subroutine O{label} is neither in the file nor is there {name}.ngc beside it or in "
-                    "input.program_folders"
-                )
+                where = f"in the file nor is there {name}.ngc beside it or in input.program_folders"
+                raise ValueError(f"subroutine O{label} is neither {where}")
             text = called_source(path, self._machine)
             self._plain.names.append(str(path))
             self._files[label] = SourceFile(str(path), text, len(self._plain.names))
@@ -376,11 +368,8 @@ class _Interpreter:
             opening = self._file.before(index, line.label, ("do",))
             if holds and opening is not None:
                 if self._broke:
-                    self._plain.note(
-                        index + 1,
-                        "a DO loop behind a BREAK: read as documented; LinuxCNC 2.9.0~pre1 runs it once only",
-                        "DO behind BREAK",
-                    )
+                    text = "a DO loop behind a BREAK: read as documented; LinuxCNC 2.9.0~pre1 runs it once only"
+                    self._plain.note(index + 1, text, "DO behind BREAK")
                 self._next = opening + 1
         elif not holds:
             self._next = self._behind(index, line, "endwhile") + 1

@@ -193,11 +193,8 @@ class BlockRunner:
             self.note("G61.1 stops at the end of every block: FANUC's G61", "G61.1")
             return "G61"
         if code == 610:
-            self.note(
-                "G61 follows the path exactly and does not stop where it is smooth; FANUC's G61 would stop in every "
-                "block: read as G64",
-                "G61",
-            )
+            what = "G61 follows the path exactly and does not stop where it is smooth"
+            self.note(f"{what}; FANUC's G61 would stop in every block: read as G64", "G61")
             self.path_tolerances |= {(None, None), (0.0, 0.0)}  # more than one
         else:
             p, q = (values[name] * self.state.unit_mm if name in values else None for name in "pq")

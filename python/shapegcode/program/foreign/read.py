@@ -292,23 +292,19 @@ def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
     """A semicolon ends a block for FANUC, and begins a comment for other controls."""
     found = next((each for each in _BEHIND_SEMICOLON.finditer(data) if each[1]), None) if b";" in data else None
     if found is not None:
-        raise refusal(
-            source,
-            data.count(b"\n", 0, found.start()) + 1,
+        message = (
             "words behind `;`: FANUC begins a block there, LinuxCNC, a Haas and a Sinumerik have a comment; write a "
-            "line end or ( ), or state the control: --set controller.dialect=linuxcnc, haas or siemens",
+            "line end or ( ), or state the control: --set controller.dialect=linuxcnc, haas or siemens"
         )
+        raise refusal(source, data.count(b"\n", 0, found.start()) + 1, message)
 
 
 def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]:
     """The dialect of a program."""
     if written := _WRITTEN_FOR.search(data[:LOOKED_AT_BYTES]):
         control = {b"KLIPPER": "Klipper", b"ISG": "the ISG kernel"}[written[1]]
-        raise refusal(
-            source,
-            data.count(b"\n", 0, written.start()) + 1,
-            f"emitted for {control}, whose programs are written and not read: keep the original",
-        )
+        message = f"emitted for {control}, whose programs are written and not read: keep the original"
+        raise refusal(source, data.count(b"\n", 0, written.start()) + 1, message)
     stated = machine.controller.dialect
     # A machine of FANUC's kind and a program without foreign words: the usual case takes one look.
     expected = stated if stated != "auto" else machine.controller.kind
@@ -316,23 +312,21 @@ def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]
     if stated != "auto":
         for sign in signs:
             if sign.dialect != stated:
-                raise refusal(
-                    source,
-                    sign.line,
+                message = (
                     f"this is a program for {CONTROLS[sign.dialect]}: {sign.words} ({sign.meaning}), which "
                     f"{CONTROLS[stated]} does not know; controller.dialect is {stated}: "
-                    f"--set controller.dialect={sign.dialect} reads it",
+                    f"--set controller.dialect={sign.dialect} reads it"
                 )
+                raise refusal(source, sign.line, message)
         return stated, f"controller.dialect = {stated}"
     if len(signs) > 1:
         first, second = signs[0], signs[1]
-        raise refusal(
-            source,
-            second.line,
+        message = (
             f"{second.words} is a word of {CONTROLS[second.dialect]} ({second.meaning}), and {first.words} in line "
             f"{first.line} one of {CONTROLS[first.dialect]} ({first.meaning}): the program mixes them; state the "
-            "control with controller.dialect",
+            "control with controller.dialect"
         )
+        raise refusal(source, second.line, message)
     if signs:
         return signs[0].dialect, signs[0].reason
     if machine.controller.kind == "linuxcnc":
