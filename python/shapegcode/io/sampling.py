@@ -44,11 +44,9 @@ def even_period(
         raise UnevenTimeError(row, f"time {times_s[row]:.9g} s comes after {times_s[row - 1]:.9g} s: must ascend")
     mean = float(times_s[-1] - times_s[0]) / (count - 1)
     if stated_s is not None and not abs(mean / stated_s - 1.0) <= STATED_RATE_TOLERANCE:
-        raise UnevenTimeError(
-            0,
-            f"the time column says a sample every {mean:.6g} s, {stated_s:.6g} s is stated: must agree within "
-            f"{100 * STATED_RATE_TOLERANCE:g} %; is the unit of the time right?",
-        )
+        what = f"the time column says a sample every {mean:.6g} s, {stated_s:.6g} s is stated"
+        must = f"must agree within {100 * STATED_RATE_TOLERANCE:g} %; is the unit of the time right?"
+        raise UnevenTimeError(0, f"{what}: {must}")
     period = mean if stated_s is None else stated_s
     rising = steps[steps > 0.0]
     digit = float(np.min(rising)) if rising.size else 0.0

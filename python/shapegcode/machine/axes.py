@@ -209,13 +209,9 @@ class AxisMode(TomlTable):
         return _along(axis) if self.moves is None else self.moves.as_tuple()
 
     @model_validator(mode="after")
-    def _uncertainty_of_a_mass(self) -> AxisMode:
+    def _has_a_mass_and_lies_in_its_table(self) -> AxisMode:
         if self.mass_uncertainty_percent is not None and self.mass_kg is None:
             raise ValueError("mass_uncertainty_percent is given, mass_kg is not")
-        return self
-
-    @model_validator(mode="after")
-    def _nominal_in_table(self) -> AxisMode:
         if self.frequency_over is not None:
             low, high = min(self.frequency_over.frequency_hz), max(self.frequency_over.frequency_hz)
             if not low <= self.frequency_hz <= high:

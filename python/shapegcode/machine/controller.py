@@ -335,13 +335,9 @@ class Controller(TomlTable):
         return data
 
     @model_validator(mode="after")
-    def _reads_whole_units(self) -> Self:
+    def _reads_whole_units_and_has_its_rule(self) -> Self:
         if self.kind != "fanuc" and not self.calculator_decimal_point:
             raise ValueError(f'calculator_decimal_point = false: with kind = "{self.kind}" X10 is 10 mm or inch')
-        return self
-
-    @model_validator(mode="after")
-    def _has_its_rule(self) -> Self:
         needed = {"junction_deviation": "junction_deviation_mm", "stops": "corner_stop_angle_deg"}.get(self.corner_rule)
         if needed is not None and getattr(self, needed) is None:
             raise ValueError(f'corner_rule = "{self.corner_rule}" needs {needed}')

@@ -263,15 +263,11 @@ class Emission(TomlTable):
         return lines
 
     @model_validator(mode="after")
-    def _lines_fit(self) -> Emission:
+    def _fits_its_lines_and_dialect(self) -> Emission:
         for line in (*self.prologue, *self.epilogue, *self.lock_lines, *self.unlock_lines):
             if len(line) > self.max_line_length:
                 limit = f"emission.max_line_length is {self.max_line_length}"
                 raise ValueError(f"the line {json.dumps(line)} has {len(line)} characters, {limit}")
-        return self
-
-    @model_validator(mode="after")
-    def _has_another_dialect(self) -> Emission:
         for name, stated in (("words", self.words), ("decimals", self.decimals)):
             if stated and self.dialect == "fanuc":
                 raise ValueError(f"{name} counts only where emission.dialect is another one than fanuc")

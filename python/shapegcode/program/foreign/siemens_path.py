@@ -137,10 +137,8 @@ class SiemensPath:
 
     def set_frame(self, frame: SiemensFrame) -> None:
         """Another programmable frame."""
-        changed = np.abs(frame.linear - self.modes.frame.linear).max(axis=1) + np.abs(
-            frame.offset - self.modes.frame.offset
-        )
-        self.modes.frame = frame
+        before, self.modes.frame = self.modes.frame, frame
+        changed = np.abs(frame.linear - before.linear).max(axis=1) + np.abs(frame.offset - before.offset)
         self.shifted = [was or change > 1e-12 for was, change in zip(self.shifted, changed, strict=True)]
 
     def set_plane(self, plane: int) -> None:
@@ -369,15 +367,14 @@ class SiemensPath:
             return Element(start, end)
         first, second, across = PLANES[element.plane]
         linear = frame.linear
-        scale = math.sqrt(
-            abs(linear[first, first] * linear[second, second] - linear[first, second] * linear[second, first])
-        )
         inner = linear[np.ix_([first, second], [first, second])]
+        turned = inner[0, 0] * inner[1, 1] - inner[0, 1] * inner[1, 0]  # its determinant
+        scale = math.sqrt(abs(turned))
         tilt = np.abs(np.r_[linear[across, [first, second]], linear[[first, second], across]]).max()
         if tilt > 1e-9 or np.abs(inner @ inner.T - scale * scale * np.eye(2)).max() > 1e-9:
             what = "a frame that tilts its plane or makes it an ellipse (ROT, SCALE)"
             raise WordError(f"an arc in G{element.plane} under {what}: it is not read", column)
-        side = math.copysign(1.0, inner[0, 0] * inner[1, 1] - inner[0, 1] * inner[1, 0])
+        side = math.copysign(1.0, turned)
         return Element(start, end, frame.apply(element.centre), element.plane, element.sweep_rad * side)
 
     # ---- writing -----------------------------------------------------------------------------------------------------
@@ -451,10 +448,8 @@ class SiemensPath:
         total = math.log(feed / start) / slope
         acceleration = max(feed, start) * abs(slope)  # mm/min²
         count = max(1, math.ceil(total / math.sqrt(8.0 * _FLIN_ERROR_MM / acceleration)))
-        self.note(
-            "FLIN: the feed is linear along the path of a block; it is read as blocks of constant feed, within 0.5 um",
-            "FLIN",
-        )
+        how = "it is read as blocks of constant feed, within 0.5 um"
+        self.note(f"FLIN: the feed is linear along the path of a block; {how}", "FLIN")
         ends = [start * math.expm1(slope * total * k / count) / slope / length for k in range(1, count)]
         bounds = [0.0, *ends, 1.0]
         return [(bounds[k], bounds[k + 1], total / count, 0.0) for k in range(count)]
@@ -498,11 +493,8 @@ class SiemensPath:
             return
         first, second, across = PLANES[self.modes.plane]
         behind = corner.element.direction_at(1.0)
-        in_plane = (
-            not moved[across]
-            and abs(behind[across]) < 1e-9
-            and (element.centre is None or element.plane == self.modes.plane)
-        )
+        in_plane = element.centre is None or element.plane == self.modes.plane
+        in_plane = in_plane and not moved[across] and abs(behind[across]) < 1e-9
         cosine = float(np.clip(behind[[first, second]] @ ahead[[first, second]], -1.0, 1.0))
         if motion == "G0" or not in_plane or len(self._held) != 1:
             if not corner.is_modal:
