@@ -7,12 +7,13 @@ import re
 from collections.abc import Iterator
 
 from shapegcode.errors import RecordError
-from shapegcode.io.run_items import STATES, Event, FileNotes, Item, ItemTable, State, plain_name
+from shapegcode.io.run_items import STATES, Event, FileNotes, Item, ItemTable, Role, State, plain_name
 from shapegcode.io.run_tracks import Hold, RunLog, RunPart, Track, run_of
 
 _DISORDER_S = 1.0  # a step back up to this is an adapter whose items overtake each other; more is a clock that was set
 _QUIET_S = 30.0  # no value for this long within a run is said
 _TEXT_VALUES = 8  # what a value of text counts as, in values
+_EXAMPLE = 'for example items = { block = "Block_Number" }'
 _IDLE_VALUES = 100_000  # values kept while no run goes on
 
 
@@ -110,10 +111,8 @@ class RunCutter:
                 "values: is its end logged? Log fewer items, cut the log, or allow more (max_values)"
             )
         elif self._status is None:
-            raise RecordError(
-                f"{self._source}:{line}: {self._limit} values, and nothing that says when a program runs: looked for "
-                f"{self._table.sought('status')}; the log has {self._names()}; name it (items), or cut the log"
-            )
+            what = f"{self._limit} values, and nothing that says when a program runs"
+            raise RecordError(f"{self._source}:{line}: {what}: {self._sought('status')} (items), or cut the log")
         for track in self._tracks.values():
             track.drop_until(track.last_time)
 
@@ -122,9 +121,11 @@ class RunCutter:
         wrong = "is empty" if not shown else f"is {shown[:40]!r}, no {'line number' if track.counts else 'number'}"
         self.notes.add(f"value of {track.item.name}", line, f"{track.item.name} {wrong}, left out")
 
-    def _names(self) -> str:
+    def _sought(self, role: Role) -> str:
         names = list(self._table.seen)
-        return (", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "")) or "no items"
+        more = f" and {len(names) - 20} more" if len(names) > 20 else ""
+        held = f"{', '.join(names[:20])}{more}" or "no items"
+        return f"looked for {self._table.sought(role)}; the log has {held}; name it"
 
     # --- what the program does ---
 
@@ -202,21 +203,15 @@ class RunCutter:
         for part in run.restarted(tracks):
             found = run_of(part, tracks, self._feed_unit or self.notes.feed_unit, self.notes)
             if not len(found.block) and not any(track.counts and track.ever for track in tracks):
-                raise RecordError(
-                    f"{self._source}:{part.lines[1]}: no line numbers of the program: looked for "
-                    f"{self._table.sought('block')}; the log has {self._names()}; name it, for example "
-                    'items = { block = "Block_Number" }'
-                )
+                what = f"no line numbers of the program: {self._sought('block')}, {_EXAMPLE}"
+                raise RecordError(f"{self._source}:{part.lines[1]}: {what}")
             yield found
         for track in tracks:
             track.drop_until(run.end)
 
     def _end(self, last: float) -> Iterator[RunLog]:
         if self._first is None:
-            raise RecordError(
-                f"{self._source}: no item that is of use: looked for {self._table.sought('block')}; the log has "
-                f'{self._names()}; name it, for example items = {{ block = "Block_Number" }}'
-            )
+            raise RecordError(f"{self._source}: no item that is of use: {self._sought('block')}, {_EXAMPLE}")
         if self._open is not None:
             held = self._open.held
             if held is not None:
