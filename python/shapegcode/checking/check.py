@@ -21,8 +21,7 @@ from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.reading import given_text, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, no_room
 
-MOST_FINDINGS = 1000
-"""Findings of one code that are listed; the counts hold them all."""
+MOST_FINDINGS = 1000  # findings of one code that are listed; the counts hold them all
 
 _SEVERITIES = ("alarm", "warning", "note")
 _MACRO_CONTROL = re.compile(r"(?<![A-Z])(IF|GOTO|WHILE)(?=\s*[\[#\d.])|(?<![A-Z])(DO|END)(?=\s*\d)")
@@ -120,8 +119,7 @@ def check_text(
         for stop in look_ahead_breakers(program, machine, table):
             severity = "warning" if stop.unasked else "note"
             found.append(_at(program, severity, "look_ahead_breaker", stop.line, stop.message))
-        found += _feed_findings(program, table)
-        found += _low_feed_findings(program, machine)
+        found += _feed_findings(program, machine, table)
         slowed = [region for region in program.regions if region.shaped]
         for code, line, message in ini_lines([region.path for region in slowed], machine):
             found.append(_at(program, "warning", code, line or slowed[0].first_line, message))
@@ -159,13 +157,12 @@ def _at(program: Program, severity: str, code: str, line: int, message: str) -> 
 
 
 def _listed(found: Iterable[Finding], source: str) -> tuple[Finding, ...]:
-    listed: list[Finding] = []
-    seen: dict[str, int] = {}
-    rank = {name: number for number, name in enumerate(_SEVERITIES)}
-    for finding in sorted(
-        found, key=lambda each: (each.file != source, each.file, each.line, each.column, rank[each.severity])
-    ):
-        seen[finding.code] = seen.get(finding.code, 0) + 1
+    def rank(each: Finding) -> tuple[bool, str, int, int, int]:
+        return each.file != source, each.file, each.line, each.column, _SEVERITIES.index(each.severity)
+
+    listed, seen = [], Counter[str]()
+    for finding in sorted(found, key=rank):
+        seen[finding.code] += 1
         if seen[finding.code] <= MOST_FINDINGS:
             listed.append(finding)
     return tuple(listed)
@@ -232,7 +229,7 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
 # ---- what an accepted program does -------------------------------------------------------------------------
 
 
-def _feed_findings(program: Program, table: BlockTable) -> Iterator[Finding]:
+def _feed_findings(program: Program, machine: Machine, table: BlockTable) -> Iterator[Finding]:
     for clamped in table.clamped_feeds:
         message = (
             f"{clamped.feed_mm_per_min:.10g} mm/min are more than the axes allow in {clamped.blocks} "
@@ -240,9 +237,6 @@ def _feed_findings(program: Program, table: BlockTable) -> Iterator[Finding]:
             f"{clamped.least_mm_per_min:.0f} mm/min"
         )
         yield _at(program, "warning", "axis_feed", clamped.first_line, message)
-
-
-def _low_feed_findings(program: Program, machine: Machine) -> Iterator[Finding]:
     least = machine.controller.minimum_feed_mm_per_min
     for region in program.regions:
         slowest = region.path.slowest_feed_mm_per_s * 60.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -47,12 +46,8 @@ class Finding:
     @property
     def place(self) -> str:
         """``file:line:column`` as far as it is known; the file without its folder."""
-        known = [
-            Path(self.file).name,
-            *([self.line] if self.line > 0 else []),
-            *([self.column] if self.line * self.column else []),
-        ]
-        return ":".join(map(str, known))
+        line = f":{self.line}" if self.line > 0 else ""
+        return f"{Path(self.file).name}{line}{f':{self.column}' if self.line * self.column else ''}"
 
 
 @dataclass(frozen=True)
@@ -191,15 +186,14 @@ class Check(Result):
             if "arc_centre" in self.counts_by_code:
                 return "set input.arc_centre as the note says, and check again."
             return f"correct {first.place} first: alarms behind it may come from it."
-        worst = {finding.code for finding in self.findings if finding.severity == "warning"}
+        worst = {finding.code: finding for finding in reversed(self.findings) if finding.severity == "warning"}
         if "work_limit" in worst:
-            stop = next(finding for finding in self.findings if finding.code == "work_limit")
-            return f"correct {stop.place} if it is a slip; else raise the key that it names with --set."
+            place = worst["work_limit"].place
+            return f"correct {place} if it is a slip; else raise the key that it names with --set."
         if "dnc_rate" in worst:
             return "raise the baud rate or lower the feed where the serial line is too slow (controller.dnc_baud)."
         if "program_memory" in worst:
-            large = next(finding for finding in self.findings if finding.code == "program_memory")
-            if "--max-bytes" in large.message:
+            if "--max-bytes" in worst["program_memory"].message:
                 return f"{no_room(self.memory_bytes)}."
             return "drip feed the program (controller.dnc_baud), or split it."
         if "short_block" in worst:
@@ -222,7 +216,13 @@ class Check(Result):
             Column("alarm", value=lambda finding: f"{finding.alarm:04d}" if finding.alarm else ""),
             Column("what", value="message", text=True),
         )
-        shown = list(self._first_of_each())
+        shown, seen = [], Counter[tuple[str, str, int]]()
+        for finding in self.findings:
+            kind = (finding.severity, finding.code, finding.alarm)
+            seen[kind] += 1
+            # What the control refuses is what the user came for.
+            if seen[kind] <= (_SHOWN_ALARMS if finding.severity == "alarm" else _SHOWN_ALIKE):
+                shown.append(finding)
         listed = Counter(finding.code for finding in shown)
         more = [
             f"... and {count - listed[code]} more of {code}: --json lists them"
@@ -230,12 +230,3 @@ class Check(Result):
             if count > listed[code]
         ]
         return [Table("", columns, shown, caption="\n".join(more))]
-
-    def _first_of_each(self) -> Iterator[Finding]:
-        seen: Counter[tuple[str, str, int]] = Counter()
-        for finding in self.findings:
-            kind = (finding.severity, finding.code, finding.alarm)
-            seen[kind] += 1
-            # What the control refuses is what the user came for.
-            if seen[kind] <= (_SHOWN_ALARMS if finding.severity == "alarm" else _SHOWN_ALIKE):
-                yield finding

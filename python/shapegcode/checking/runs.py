@@ -21,9 +21,8 @@ from shapegcode.model.machine_model import fanuc_model
 from shapegcode.model.stream import cuts_of_lines
 from shapegcode.program import Program
 
-_CUTTING, _RAPID, _DWELL = (
-    kind.value for kind in (_core.BlockKind.cutting, _core.BlockKind.rapid, _core.BlockKind.dwell)
-)
+_KIND = _core.BlockKind
+_CUTTING, _RAPID, _DWELL = (kind.value for kind in (_KIND.cutting, _KIND.rapid, _KIND.dwell))
 # The clock rounds the end of a run up to a period, and has no shorter one than this: so the program runs in slow
 # motion, which makes that a nanosecond.
 _PERIOD_S = 1e-5
@@ -136,30 +135,19 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
         first, last = int(line[begin]), int(line[end - 1])
         first_short = int(np.searchsorted(short_at, begin))
         shorts = int(np.searchsorted(short_at, end)) - first_short
+        own_s = duration[begin:end]
+        # Characters between two blocks count with the block that follows.
+        amounts = np.diff(line_bytes[line[begin:end]], prepend=line_bytes[first - 1])
         runs.append(
             CuttingRun(
-                first,
-                last,
-                int(line_bytes[last] - line_bytes[first - 1]),
-                _needed_per_s(duration[begin:end], line_bytes, first, line[begin:end], stretch_s[begin]),
-                end - begin,
-                float(duration[begin:end].sum()),
-                float(taken[begin:end].sum()),
-                shorts,
-                float(duration[begin:end].min()),
+                first, last, int(line_bytes[last] - line_bytes[first - 1]),
+                _core.busiest_per_s(own_s, amounts, stretch_s[begin]), end - begin, float(own_s.sum()),
+                float(taken[begin:end].sum()), shorts, float(own_s.min()),
                 int(line[short_at[first_short]]) if shorts else 0,
             )
-        )
+        )  # fmt: skip
     firsts = tuple(line[short_at[:_FIRST_PLACES]].tolist())
     return BlockTable(tuple(runs), lines, lines_of[_RAPID], lines_of[_DWELL], firsts, clamped)
-
-
-def _needed_per_s(
-    duration_s: FloatArray, offsets: npt.NDArray[np.int64], first: int, lines: npt.NDArray[np.int64], stretch_s: float
-) -> float:
-    """Characters per second; those between two blocks count with the block that follows."""
-    amounts = np.diff(offsets[lines], prepend=offsets[first - 1])
-    return _core.busiest_per_s(duration_s, amounts, stretch_s)
 
 
 def _shaper_s(program: Program, machine: Machine) -> float:
@@ -245,11 +233,8 @@ def look_ahead_breakers(program: Program, machine: Machine, table: BlockTable) -
     for entries in gaps.values():
         words = ", ".join(dict.fromkeys(word for _, word, _ in entries))
         effect = min((effect for _, _, effect in entries), key=_EFFECTS.index)
-        yield Breaker(
-            min(line for line, _, _ in entries),
-            f"{words} between two cutting moves: {effect}",
-            effect in (_STOPS, _CANCELS),
-        )
+        sentence = f"{words} between two cutting moves: {effect}"
+        yield Breaker(min(line for line, _, _ in entries), sentence, effect in (_STOPS, _CANCELS))
 
 
 def _coded_lines(program: Program) -> Iterator[tuple[int, str]]:

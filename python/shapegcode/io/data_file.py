@@ -25,12 +25,9 @@ from typing import Any, BinaryIO, Self, cast
 
 from shapegcode.errors import ArgumentError, RecordError, ShapegcodeError
 
-MAX_DEPTH = 64
-"""Lists and tables within each other."""
-MAX_TEXT_BYTES = 1 << 20
-"""Of one text, key, or line."""
-MAX_SETTINGS_BYTES = 4 << 20
-"""Of a TOML file."""
+MAX_DEPTH = 64  # lists and tables within each other
+MAX_TEXT_BYTES = 1 << 20  # of one text, key, or line
+MAX_SETTINGS_BYTES = 4 << 20  # of a TOML file
 _MAX_BYTES = 2 << 30
 _MAX_INTEGER = 2**63 - 1
 #: Unpacked over packed: numbers of a log come to 5 to 15. Up to some size any ratio will do.
@@ -40,9 +37,7 @@ _MAX_GROWTH, _ANY_GROWTH_BYTES = 60, 600 << 20
 _PIECE_BYTES = 1 << 20
 _GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
 _PACKED_FAULTS = (EOFError, NotImplementedError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error)
-_KINDS = {
-    stat.S_IFIFO: "a pipe", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device", stat.S_IFSOCK: "a socket",
-}  # fmt: skip
+_KINDS = {stat.S_IFIFO: "a pipe", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device", stat.S_IFSOCK: "a socket"}
 #: What a value takes in memory at most, by the character that makes it: objects with one key are the dearest.
 _MEMORY = {b"{": 240, b"[": 100, b":": 100, b'"': 30, b",": 40}
 _NOT_STRUCTURE = bytes(set(range(256)) - set(b'[]{}"'))
@@ -181,20 +176,16 @@ class DataFile:
             structure = structure.replace(b"[]", b"")
         if structure.count(b"[") > MAX_DEPTH or b"[]" in structure:
             raise self._fault(f"{where}: nested too deeply: at most {MAX_DEPTH} lists and objects within each other")
-        integer = None
-        if re.search(rb"\d{19}", data):
 
-            def integer(digits: str) -> int:
-                return _integer(digits, lambda text: self._fault(f"{where}: {text}"))
+        def integer(digits: str) -> int:
+            if len(digits) > 20 or abs(int(digits)) > _MAX_INTEGER:
+                shown = digits if len(digits) <= 24 else f"{digits[:12]}... ({len(digits)} digits)"
+                must = f"must be from -{_MAX_INTEGER} to {_MAX_INTEGER}"
+                raise self._fault(f"{where}: the whole number {shown}: {must}")
+            return int(digits)
 
-        return json.loads(data.decode("utf-8-sig"), parse_int=integer, parse_constant=constant)
-
-
-def _integer(digits: str, fault: Fault) -> int:
-    if len(digits) > 20 or abs(int(digits)) > _MAX_INTEGER:
-        shown = digits if len(digits) <= 24 else f"{digits[:12]}... ({len(digits)} digits)"
-        raise fault(f"the whole number {shown}: must be from -{_MAX_INTEGER} to {_MAX_INTEGER}")
-    return int(digits)
+        parse_int = integer if re.search(rb"\d{19}", data) else None
+        return json.loads(data.decode("utf-8-sig"), parse_int=parse_int, parse_constant=constant)
 
 
 def toml_tables(text: str) -> dict[str, Any]:
@@ -315,15 +306,12 @@ def write_bytes(path: str | Path, data: bytes | memoryview, *, overwrite: bool =
         if overwrite:
             with replaced_file(path) as stream:
                 stream.write(data)
-        else:
-            _write_new(_target_of(path), data)
-
-
-def _write_new(target: Path, data: bytes | memoryview) -> None:
-    with open(target, "xb") as stream:
-        try:
-            stream.write(data)
-            stream.flush()
-        except BaseException:
-            target.unlink(missing_ok=True)
-            raise
+            return
+        target = _target_of(path)
+        with open(target, "xb") as stream:
+            try:
+                stream.write(data)
+                stream.flush()
+            except BaseException:
+                target.unlink(missing_ok=True)
+                raise

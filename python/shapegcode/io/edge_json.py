@@ -10,7 +10,7 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -21,42 +21,39 @@ import numpy.typing as npt
 
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import DataFile
-from shapegcode.io.edge_capture import EdgeAxis, EdgeBlock, EdgeCall, EdgeCapture, EdgeGap, EdgeValue
+from shapegcode.io.edge_capture import EdgeAxis, EdgeBlock, EdgeCall, EdgeCapture, EdgeGap, EdgeValue, IntArray
 from shapegcode.io.run_tracks import RunLog, Signal
 from shapegcode.io.units import FloatArray
 
 _MIN_ROWS = 2
 _MAX_VALUE = 1e12
 _NUMBERS = {int, float, type(None)}
+_EVENTS = ("HFBlockEvent", "HFCallEvent", "HFTimestamp")  # entries of a payload that are one event each
+_COUNTER_RANGE = 1 << 31  # after its last number the counter starts again at 0
+_APART_S = 0.5
+_VERSIONS = ((0, 6), (1, 1))
+_MAX_GAPS = 10
+_CYCLE_MS = (0.05, 50.0)
+_AXIS_DIGITS = 4  # an axis number has two at most
+_END = re.compile(r"\s*(?:/?\s*N\d+\s*)?(?:M0?2|M30)\b", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
-class Rows:
-    """Samples."""
-
-    counter: npt.NDArray[np.int64]  # (n,) rising
-    columns: Mapping[str, FloatArray]  # (n,) by address, without the counter
-    notes: tuple[str, ...]  # what was left out
-
-
-def read_rows(source: str, addresses: tuple[str, ...], files: Iterable[tuple[str, list[Any]]]) -> Rows:
-    """Join the rows of all entries "HFData"."""
+def _joined_rows(path: Path, parts: list[_Part]) -> tuple[IntArray, dict[str, FloatArray], list[str]]:
+    """Counters, values by address, and notes of the rows of all entries "HFData"."""
+    addresses = parts[0].addresses
     pieces: list[FloatArray] = []
     sources: list[str] = []  # of each piece, for messages
-    for name, payload in files:
-        for index, entry in enumerate(payload):
-            if "HFData" not in entry:
-                continue
-            where = f"{name}: Payload[{index}].HFData"
-            piece = _numbers(where, entry["HFData"], addresses)
-            if len(piece):
+    for part in parts:
+        for index, entry in enumerate(part.payload):
+            where = f"{part.where}: Payload[{index}].HFData"
+            if "HFData" in entry and len(piece := _numbers(where, entry["HFData"], addresses)):
                 pieces.append(piece)
                 sources.append(where)
-    if sum(map(len, pieces)) < _MIN_ROWS:
-        raise RecordError(f"{source}: the Payload holds {sum(map(len, pieces))} rows of HFData: at least 2 are needed")
+    starts = np.cumsum([0, *map(len, pieces)])
+    if starts[-1] < _MIN_ROWS:
+        raise RecordError(f"{path}: the Payload holds {starts[-1]} rows of HFData: at least 2 are needed")
     values = np.concatenate(pieces)
-    starts = np.cumsum([0, *(len(piece) for piece in pieces)])
-    counter, kept, notes = _counters(values, addresses.index("CYCLE"), sources, starts)
+    counter, kept, notes = _counters(values[:, addresses.index("CYCLE")], values, sources, starts)
     columns: dict[str, FloatArray] = {}
     for rank, address in enumerate(addresses):
         if address == "CYCLE":
@@ -66,7 +63,7 @@ def read_rows(source: str, addresses: tuple[str, ...], files: Iterable[tuple[str
         if missing.size:
             where = "at all" if missing.size == len(column) else f"in {missing.size} of {len(column)} samples"
             notes.append(f"{address}: no value {where}, the first at counter {counter[missing[0]]}")
-    return Rows(counter, columns, tuple(notes))
+    return counter, columns, notes
 
 
 def _numbers(where: str, rows: Any, addresses: tuple[str, ...]) -> FloatArray:
@@ -97,25 +94,24 @@ def _numbers(where: str, rows: Any, addresses: tuple[str, ...]) -> FloatArray:
 
 
 def _counters(
-    values: FloatArray, rank: int, sources: list[str], starts: npt.NDArray[np.int64]
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_], list[str]]:
+    raw: FloatArray, values: FloatArray, sources: list[str], starts: IntArray
+) -> tuple[IntArray, npt.NDArray[np.bool_], list[str]]:
     """Counter of each row that is kept, which rows these are, and notes."""
-    raw = values[:, rank]
 
     def at(row: int) -> str:
         piece = int(np.searchsorted(starts, row, side="right")) - 1
         return f"{sources[piece]}[{row - starts[piece]}]"
 
-    bad = np.flatnonzero(~((raw >= 0) & (raw < COUNTER_RANGE) & (raw == np.floor(raw))))
+    bad = np.flatnonzero(~((raw >= 0) & (raw < _COUNTER_RANGE) & (raw == np.floor(raw))))
     if bad.size:
-        raise RecordError(f"{at(bad[0])}: CYCLE = {raw[bad[0]]:g}: must be a whole number, 0 to {COUNTER_RANGE - 1}")
+        raise RecordError(f"{at(bad[0])}: CYCLE = {raw[bad[0]]:g}: must be a whole number, 0 to {_COUNTER_RANGE - 1}")
     notes: list[str] = []
     steps = np.diff(raw)
-    over = steps < -COUNTER_RANGE / 2
+    over = steps < -_COUNTER_RANGE / 2
     if over.any():
         notes.append(f"the counter starts again at 0 after {int(raw[np.flatnonzero(over)[0]])}: counted on")
     counter = raw.astype(np.int64)
-    counter[1:] += COUNTER_RANGE * np.cumsum(over)
+    counter[1:] += _COUNTER_RANGE * np.cumsum(over)
     repeated = np.flatnonzero(np.diff(counter) == 0) + 1
     same = np.array([np.array_equal(values[row], values[row - 1], equal_nan=True) for row in repeated], dtype=bool)
     kept = np.ones(len(counter), dtype=bool)
@@ -132,14 +128,7 @@ def _counters(
     return counter[kept], kept, notes
 
 
-EVENTS = ("HFBlockEvent", "HFCallEvent", "HFTimestamp")
-"""Entries of a payload that are one event each."""
-COUNTER_RANGE = 1 << 31
-"""After its last number the counter starts again at 0."""
-_APART_S = 0.5
-
-
-def key_of(table: Mapping[str, Any], name: str) -> Any:
+def _key_of(table: Mapping[str, Any], name: str) -> Any:
     """A value by its key in whatever case: versions differ ("HfProbeCounter"); None where there is none."""
     if name in table:
         return table[name]
@@ -147,7 +136,7 @@ def key_of(table: Mapping[str, Any], name: str) -> Any:
 
 
 @dataclass
-class Events:
+class _Events:
     """Blocks, calls, slow values and time stamps of the files, in their order there."""
 
     start: int
@@ -164,12 +153,17 @@ class Events:
         for index, entry in enumerate(payload):
             for kind, content in entry.items():
                 where = f"{name}: Payload[{index}].{kind}"
-                if kind not in ("HFData", "LFData", *EVENTS):
+                if kind not in ("HFData", "LFData", *_EVENTS):
                     self.others[kind] += 1
-                elif kind == "LFData":
-                    self._values(where, content)
-                elif kind in EVENTS:
+                elif kind in _EVENTS:
                     self._event(where, kind, _object(where, content))
+                elif kind == "LFData":
+                    if not isinstance(content, list):
+                        raise RecordError(f"{where} = {str(content)[:40]!r}: must be a list")
+                    for number, value in enumerate(content):
+                        each = _object(f"{where}[{number}]", value)
+                        when = self._when(f"{where}[{number}]", each)
+                        self.values.append(EdgeValue(*when, str(each.get("address", "")), str(each.get("value", ""))))
 
     def notes(self) -> list[str]:
         """What was left out, and where the clock does not go with the counter."""
@@ -197,21 +191,12 @@ class Events:
                 self.blocks.append(block)
 
     def _when(self, where: str, event: dict[str, Any]) -> tuple[int, float]:
-        """Counter and time of an event."""
         counter = _integer(where, event, "HFProbeCounter")
         if counter is None:
             raise RecordError(f"{where}.HFProbeCounter is missing: the time is unknown")
-        if self.start - counter > COUNTER_RANGE // 2:
-            counter += COUNTER_RANGE  # it began anew at 0 after the first sample
+        if self.start - counter > _COUNTER_RANGE // 2:
+            counter += _COUNTER_RANGE  # it began anew at 0 after the first sample
         return counter, (counter - self.start) * self.cycle_s
-
-    def _values(self, where: str, content: Any) -> None:
-        if not isinstance(content, list):
-            raise RecordError(f"{where} = {str(content)[:40]!r}: must be a list")
-        for index, entry in enumerate(content):
-            each = _object(f"{where}[{index}]", entry)
-            counter, time_s = self._when(f"{where}[{index}]", each)
-            self.values.append(EdgeValue(counter, time_s, str(each.get("address", "")), str(each.get("value", ""))))
 
 
 def _object(where: str, value: Any) -> dict[str, Any]:
@@ -222,7 +207,7 @@ def _object(where: str, value: Any) -> dict[str, Any]:
 
 def _integer(where: str, table: Mapping[str, Any], name: str) -> int | None:
     """A whole number, which versions write as number or as text; None where there is none."""
-    value = key_of(table, name)
+    value = _key_of(table, name)
     if value is None or value == "":
         return None
     try:
@@ -260,11 +245,6 @@ def _clock_notes(stamps: Sequence[tuple[int, str]], cycle_s: float) -> list[str]
     return notes
 
 
-_VERSIONS = ((0, 6), (1, 1))
-_MAX_GAPS = 10
-_CYCLE_MS = (0.05, 50.0)
-
-
 def is_edge_json(head: bytes) -> bool:
     """Whether a file may be such a capture, by its first bytes."""
     text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
@@ -288,27 +268,18 @@ def read_edge_json(path: str | Path) -> EdgeCapture:
     """
     path = Path(path)
     with DataFile(path) as file:
-        parts = [_Part(where, _parsed(file, where, data)) for where, data in _contents(file)]
+        zipped = ((f"{path}({name})", data) for name, data in file.members(".json"))
+        contents = zipped if file.kind == "zip" else [(str(path), file.read())]
+        parts = [_Part(where, _parsed(file, where, data)) for where, data in contents]
     if not parts:
         raise RecordError(f"{path}: the archive holds no .json file")
     parts.sort(key=lambda each: each.first_counter)
     if len({(part.cycle_s, part.addresses) for part in parts}) > 1:
         raise RecordError(f"{path}: the files in it differ in signals or cycle: one recording has one header")
-    rows = read_rows(str(path), parts[0].addresses, ((part.where, part.payload) for part in parts))
-    return _capture(path, parts, rows)
-
-
-def _contents(file: DataFile) -> Iterator[tuple[str, bytes]]:
-    """(name for messages, text) of the file, or of each file in an archive."""
-    if file.kind == "zip":
-        for name, data in file.members(".json"):
-            yield f"{file.path}({name})", data
-    else:
-        yield str(file.path), file.read()
+    return _capture(path, parts)
 
 
 def _parsed(file: DataFile, where: str, data: bytes) -> dict[str, Any]:
-    """The JSON object of a file."""
     if not data.strip():
         raise RecordError(f"{where}: the file is empty; needed is JSON with Header, Payload and Footer")
     try:
@@ -357,8 +328,8 @@ class _Part:
     def first_counter(self) -> float:
         """Of the first event or sample, to put files in order."""
         for entry in self.payload:
-            for kind in EVENTS:
-                found = key_of(entry[kind], "HFProbeCounter") if isinstance(entry.get(kind), dict) else None
+            for kind in _EVENTS:
+                found = _key_of(entry[kind], "HFProbeCounter") if isinstance(entry.get(kind), dict) else None
                 if isinstance(found, int):
                     return found
             rows = entry.get("HFData")
@@ -370,7 +341,7 @@ class _Part:
 
     def _version(self, header: dict[str, Any]) -> str:
         table = header.get("Version")
-        text = str(key_of(table, "OutputFileFormatVersion")) if isinstance(table, dict) else "None"
+        text = str(_key_of(table, "OutputFileFormatVersion")) if isinstance(table, dict) else "None"
         key = f"{self.where}: Header.Version.outputFileFormatVersion"
         first, last = (".".join(map(str, each)) for each in _VERSIONS)
         try:
@@ -416,10 +387,15 @@ class _Part:
                 self.notes.append(f"the recording {words} {str(chain[name])[:200]}")
 
 
-def _capture(path: Path, parts: list[_Part], rows: Rows) -> EdgeCapture:
+def _capture(path: Path, parts: list[_Part]) -> EdgeCapture:
     first = parts[0]
-    gaps = _gaps(rows, first.cycle_s)
-    notes = [note for part in parts for note in part.notes] + list(rows.notes)
+    counter, columns, notes = _joined_rows(path, parts)
+    time_s, steps = (counter - counter[0]) * first.cycle_s, np.diff(counter)
+    gaps = [
+        EdgeGap(at + 1, int(counter[at]), int(steps[at]) - 1, float(time_s[at]), float(steps[at]) * first.cycle_s)
+        for at in np.flatnonzero(steps > 1).tolist()
+    ]
+    notes = [note for part in parts for note in part.notes] + notes
     notes += [
         f"{gap.missing} cycles ({gap.missing * first.cycle_s:.3f} s) are missing at {gap.start_s:.3f} s, behind "
         f"counter {gap.counter}"
@@ -427,7 +403,7 @@ def _capture(path: Path, parts: list[_Part], rows: Rows) -> EdgeCapture:
     ]
     if len(gaps) > _MAX_GAPS:
         notes.append(f"{sum(gap.missing for gap in gaps)} cycles are missing in {len(gaps)} places altogether")
-    events = Events(int(rows.counter[0]), first.cycle_s)
+    events = _Events(int(counter[0]), first.cycle_s)
     for part in parts:
         events.read(part.where, part.payload)
     notes += events.notes()
@@ -435,33 +411,16 @@ def _capture(path: Path, parts: list[_Part], rows: Rows) -> EdgeCapture:
         source=str(path),
         version=first.version,
         cycle_s=first.cycle_s,
-        counter=rows.counter,
-        time_s=(rows.counter - rows.counter[0]) * first.cycle_s,
-        columns=rows.columns,
+        counter=counter,
+        time_s=time_s,
+        columns=columns,
         axes=_axes(first.signals),
         blocks=tuple(sorted(events.blocks, key=lambda each: each.counter)),
         calls=tuple(sorted(events.calls, key=lambda each: each.counter)),
         values=tuple(sorted(events.values, key=lambda each: each.counter)),
-        gaps=gaps,
+        gaps=tuple(gaps),
         notes=tuple(notes),
     )
-
-
-def _gaps(rows: Rows, cycle_s: float) -> tuple[EdgeGap, ...]:
-    steps = np.diff(rows.counter)
-    return tuple(
-        EdgeGap(
-            index=int(index) + 1,
-            counter=int(rows.counter[index]),
-            missing=int(steps[index]) - 1,
-            start_s=float(rows.counter[index] - rows.counter[0]) * cycle_s,
-            duration_s=float(steps[index]) * cycle_s,
-        )
-        for index in np.flatnonzero(steps > 1)
-    )
-
-
-_AXIS_DIGITS = 4  # an axis number has two at most
 
 
 def _axes(signals: tuple[tuple[str, str], ...]) -> tuple[EdgeAxis, ...]:
@@ -471,10 +430,6 @@ def _axes(signals: tuple[tuple[str, str], ...]) -> tuple[EdgeAxis, ...]:
         if bar and number.isdecimal() and len(number) <= _AXIS_DIGITS:
             found.setdefault(int(number), (label or number, []))[1].append(name)
     return tuple(EdgeAxis(number, label, tuple(names)) for number, (label, names) in sorted(found.items()))
-
-
-_END = re.compile(r"\s*(?:/?\s*N\d+\s*)?(?:M0?2|M30)\b", re.IGNORECASE)
-_AXES = ("x", "y", "z")
 
 
 def edge_runs(path: Path) -> Iterator[RunLog]:
@@ -503,7 +458,12 @@ def edge_runs(path: Path) -> Iterator[RunLog]:
         duration_s=None,
         block=_signal(blocks, [float(block.line or 0) for block in blocks], "SeekOffset"),
         tool=_signal(tools, [float(block.active_tool or 0) for block in tools], "ActiveTool") if tools else None,
-        position_mm=_positions(capture),
+        position_mm=tuple(
+            (letter, Signal(capture.time_s, capture.position(axis.number), f"DES_POS|{axis.number}"))
+            for letter in "xyz"
+            for axis in capture.axes
+            if axis.name.lower().startswith(letter) and "DES_POS" in axis.signals
+        ),
         program=program or None,
         notes=tuple(notes),
         block_texts=tuple((block.time_s, block.text) for block in capture.blocks),
@@ -516,13 +476,3 @@ def edge_runs(path: Path) -> Iterator[RunLog]:
 
 def _signal(blocks: list[EdgeBlock], values: list[float], name: str) -> Signal:
     return Signal(np.array([block.time_s for block in blocks]), np.array(values), name)
-
-
-def _positions(capture: EdgeCapture) -> tuple[tuple[str, Signal], ...]:
-    """Commands of X, Y, Z by the labels of the axes."""
-    return tuple(
-        (letter, Signal(capture.time_s, capture.position(axis.number), f"DES_POS|{axis.number}"))
-        for letter in _AXES
-        for axis in capture.axes
-        if axis.name.lower().startswith(letter) and "DES_POS" in axis.signals
-    )

@@ -9,23 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
+from shapegcode.io.columns import words_of
 from shapegcode.io.record import Quantity, ReadOptions, stated_unit
 from shapegcode.io.units import FloatArray, Unit, find_unit
 
 ComplexArray = npt.NDArray[np.complex128]
 
-#: Fewer lines hold no mode with its damping.
-FEWEST_LINES = 16
+FEWEST_LINES = 16  # fewer lines hold no mode with its damping
 _RESPONSES: tuple[Quantity, ...] = ("acceleration", "velocity", "displacement")
 _NAMES: dict[str, Quantity] = {
-    "receptance": "displacement",
-    "compliance": "displacement",
-    "flexibility": "displacement",
-    "admittance": "displacement",
-    "mobility": "velocity",
-    "accelerance": "acceleration",
-    "inertance": "acceleration",
-}
+    "receptance": "displacement", "compliance": "displacement", "flexibility": "displacement",
+    "admittance": "displacement", "mobility": "velocity", "accelerance": "acceleration", "inertance": "acceleration",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +51,8 @@ class FrequencyResponse:
 
     def __post_init__(self) -> None:
         count = len(self.frequency_hz)
-        for what, values in (
-            ("frequencies", self.frequency_hz),
-            ("lines", self.response),
-            ("coherence", self.coherence),
-        ):
+        named = {"frequencies": self.frequency_hz, "lines": self.response, "coherence": self.coherence}
+        for what, values in named.items():
             if values is None:
                 continue
             bad = np.flatnonzero(~np.isfinite(values))
@@ -140,17 +132,11 @@ def ratio_unit(text: str) -> tuple[Unit, float] | None:
     return unit, unit.factor / force.factor
 
 
-def quantity_of_name(text: str) -> Quantity | None:
-    """What a name such as "Receptance" or "accelerance" says."""
-    words = re.findall(r"[^\W\d_]+", text.lower())
-    return next((_NAMES[word] for word in words if word in _NAMES), None)
-
-
 def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, float, list[str]]:
     """Quantity and factor to SI of a response over force, by options, unit or name."""
     force = stated_unit(options.force_unit, ("force",))
     over = options.force_scale or (1.0 if force is None else force.factor)
-    named = options.quantity or quantity_of_name(label)
+    named = options.quantity or next((_NAMES[word] for word in words_of(label) if word in _NAMES), None)
     stated = stated_unit(options.response_unit, _RESPONSES)
     if options.response_scale is not None:
         if named is None:
@@ -161,7 +147,10 @@ def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, fl
         if named not in {None, measures}:
             raise RecordError(f"{where}: --response-unit {stated.name} is of {measures}, the response is {named}")
         return measures, stated.factor / over, []
-    found = next((unit for part in _unit_texts(label) if (unit := ratio_unit(part)) is not None), None)
+    # In brackets, behind the name, or the whole text.
+    inside = re.findall(r"\[([^\]]*)\]", label) + re.findall(r"\(((?:[^()]|\([^()]*\))*)\)", label)
+    behind = [label[at.end() :] for at in re.finditer(r"[\s_]+", label)]
+    found = next((unit for part in (*inside, *behind, label) if (unit := ratio_unit(part)) is not None), None)
     if found is not None:
         measures = next(each for each in _RESPONSES if each == found[0].measures)
         if options.quantity not in {None, measures}:
@@ -175,10 +164,3 @@ def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, fl
         "as m/N, µm/N, (m/s)/N, (m/s²)/N or g/N in the header, or --response-unit (of the response, over N), or "
         "--quantity"
     )
-
-
-def _unit_texts(label: str) -> list[str]:
-    """Where a unit may stand: in brackets, behind the name, or the whole text."""
-    inside = re.findall(r"\[([^\]]*)\]", label) + re.findall(r"\(((?:[^()]|\([^()]*\))*)\)", label)
-    behind = [label[at.end() :] for at in re.finditer(r"[\s_]+", label)]
-    return [*inside, *behind, label]

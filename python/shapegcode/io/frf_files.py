@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.columns import Label, tap_label
+from shapegcode.io.columns import Label, tap_label, words_of
 from shapegcode.io.data_file import open_file
 from shapegcode.io.frequency_response import (
     FEWEST_LINES,
@@ -38,16 +38,14 @@ _PARTS = {
 }
 _WORDS = {word: part for part, words in _PARTS.items() for word in words.split()}
 _DB = 20.0
-#: Without a header: frequency, real and imaginary part, in this order, of so many columns.
-_BARE_COLUMNS = (3, 4)
+_BARE_COLUMNS = (3, 4)  # without a header: frequency, real and imaginary part, in this order, of so many columns
 
 
 def part_of(text: str) -> str | None:
     """Which part of a frequency response a column holds, by its header."""
     if re.search(r"\|[^|]+\|", text):
         return "magnitude"
-    words = re.findall(r"[^\W\d_]+", text.lower())
-    return next((_WORDS[word] for word in words if word in _WORDS), None)
+    return next((_WORDS[word] for word in words_of(text) if word in _WORDS), None)
 
 
 def is_frf_text(path: Path, options: ReadOptions) -> bool:
@@ -82,7 +80,9 @@ def read_frf_text(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
     polar = "magnitude" in column
     label, other = said["magnitude" if polar else "real"].strip(), said.get("imaginary", "").strip()
     warnings: list[str] = []
-    text = next((each for each in (label, other, *_preamble(path, table)) if _says(each)), label)
+    above = utf8_text(path)[:20_000].decode("utf-8", "replace").splitlines()[: table.layout.first_row - 1]
+    preamble = (line.strip(" #%/*\t;,") for line in above)
+    text = next((each for each in (label, other, *preamble) if _says(each)), label)
     if path.suffix.lower() == ".frf" and not _says(text) and options.quantity is None and options.response_unit is None:
         warnings.append(f"{path}: no unit: displacement over force in m/N is taken, as CutPro has it")
         text = "receptance m/N"
@@ -123,11 +123,6 @@ def _says(text: str) -> bool:
     return True
 
 
-def _preamble(path: Path, table: TextTable) -> list[str]:
-    lines = utf8_text(path)[:20_000].decode("utf-8", "replace").splitlines()
-    return [line.strip(" #%/*\t;,") for line in lines[: table.layout.first_row - 1]]
-
-
 def _places(table: TextTable, header: list[str], options: ReadOptions) -> dict[str, int]:
     """Index of the column of each part."""
     if not any(header):
@@ -143,7 +138,8 @@ def _places(table: TextTable, header: list[str], options: ReadOptions) -> dict[s
         if part is not None:
             found.setdefault(part, []).append(index)
     if options.axis is not None:
-        along = {part: [k for k in ks if _axis(header[k]) in {options.axis, None}] for part, ks in found.items()}
+        axes = [next((word for word in words_of(text) if word in {"x", "y", "z"}), None) for text in header]
+        along = {part: [k for k in ks if axes[k] in {options.axis, None}] for part, ks in found.items()}
         found = {part: along[part] or ks for part, ks in found.items()}
     pairs = [pair for pair in (("real", "imaginary"), ("magnitude", "phase")) if set(pair) <= set(found)]
     listed = ", ".join(repr(text) for text in header)
@@ -160,11 +156,6 @@ def _places(table: TextTable, header: list[str], options: ReadOptions) -> dict[s
                 f"chosen with --axis; the header names {listed}"
             )
     return {part: found[part][0] for part in wanted}
-
-
-def _axis(text: str) -> str | None:
-    words = re.findall(r"[^\W\d_]+", text.lower())
-    return next((word for word in words if word in {"x", "y", "z"}), None)
 
 
 def _polar(column: dict[str, FloatArray], said: dict[str, str], warnings: list[str]) -> ComplexArray:
@@ -236,10 +227,8 @@ def read_frf_mat(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
     if name.lower() in _ANGULAR:
         frequency = frequency / (2.0 * np.pi)
     found, response = _response(path, held, len(frequency), options, listed)
-    coherence = next(
-        (np.ravel(np.asarray(held[each], float)) for each in held if each.lower() in _COHERENCES and each != found),
-        None,
-    )
+    coherences = (held[each] for each in held if each.lower() in _COHERENCES and each != found)
+    coherence = next((np.ravel(np.asarray(each, float)) for each in coherences), None)
     if coherence is not None and len(coherence) != len(frequency):
         coherence = None
     label = " ".join(str(value) for key, value in held.items() if isinstance(value, str) and "unit" in key.lower())
@@ -287,7 +276,6 @@ def _shape(value: Any) -> str:
 
 
 def _response(path: Path, held: dict[str, Any], lines: int, options: ReadOptions, listed: str) -> tuple[str, Any]:
-    """Name and values of the response."""
     wanted = options.response_columns[0] if options.response_columns else None
     if wanted is None:
         complex_ones = [name for name, value in held.items() if np.iscomplexobj(value) and np.size(value) >= lines]

@@ -119,13 +119,10 @@ def without_thousands(data: bytes) -> bytes:
     return re.sub(rb"(?<![\d.,])" + _THOUSANDS.encode(), lambda found: found[0].replace(b".", b""), data)
 
 
-#: The header of loggers with long preambles stays within this.
-_HEAD_BYTES = 262_144
+_HEAD_BYTES = 262_144  # the header of loggers with long preambles stays within this
 _HEAD_LINES = 400
-#: So many rows of numbers on end are data; a preamble may hold one or two.
-_ROWS_TO_KNOW = 3
+_ROWS_TO_KNOW = 3  # so many rows of numbers on end are data; a preamble may hold one or two
 _MARK = re.compile(r"^\s*(#+|%+|//+|\*+)\s*")  # of a comment
-_DELIMITERS = ("\t", ";", ",", " ")
 _NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
 _RATE = re.compile(
     r"(?:sampl\w*[ _-]*(?:rate|freq\w*)|abtast(?:rate|frequenz)|sample_rate|\bfs\b)"
@@ -199,7 +196,7 @@ def _rows(lines: list[str], delimiter: str, strict: bool, least: int) -> _Rows |
 
 def _find_rows(lines: list[str]) -> _Rows | None:
     for strict in (True, False):
-        for delimiter in _DELIMITERS:
+        for delimiter in _NAMES:
             found = _rows(lines, delimiter, strict, 2)
             if found is None:
                 continue
@@ -258,7 +255,9 @@ def find_layout(path: Path, head: bytes, by_number: bool) -> Layout:
             f"{path}:1: no header: the first line is {lines[rows.start][:80]!r}; needed is a line that names the "
             "columns, such as 'time_s,force_N,acc_m/s^2', or columns named by number (--time-column 1 ...)"
         )
-    if _labels_known(header[1][rows.columns :]) or _short(header[1], rows):
+    # Cells of the rows without a name, other than empty ones behind the last delimiter.
+    is_short = bool(header[1]) and any(any(row[len(header[1]) :]) for row in rows.numbers)
+    if _labels_known(header[1][rows.columns :]) or is_short:
         hint = (
             "; decimal commas cannot be told from commas between columns: export with semicolons or decimal points"
             if rows.delimiter == "," and rows.columns == 2 * len(header[1])
@@ -280,11 +279,6 @@ def find_layout(path: Path, head: bytes, by_number: bool) -> Layout:
         skipped=max(0, header[0] - 1),
         period_s=_stated_period(lines[: max(0, header[0] - 1)]),
     )
-
-
-def _short(header: list[str], rows: _Rows) -> bool:
-    """Whether cells of the rows have no name, other than empty ones behind the last delimiter."""
-    return bool(header) and any(any(row[len(header) :]) for row in rows.numbers)
 
 
 def _choose_header(

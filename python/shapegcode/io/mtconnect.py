@@ -17,15 +17,13 @@ from shapegcode.io.data_file import MAX_DEPTH, MAX_TEXT_BYTES
 from shapegcode.io.layout import chunks, line_chunks
 from shapegcode.io.run_items import Event, FileNotes, Item, ItemTable, Stamps
 
-#: An agent sends no more at once: its largest buffers hold a million.
-_MAX_OBSERVATIONS = 1_000_000
+_MAX_OBSERVATIONS = 1_000_000  # an agent sends no more at once: its largest buffers hold a million
 _MAX_ITEMS = 100_000
 #: Sub-types of which the value is not what the machine does, by kind of item.
 _LEFT_OUT = {"COMMANDED", "PROGRAMMED", "JOG", "TARGET", "PROBE", "INCREMENTAL", "SCHEDULE", "OVERRIDE"}
 _AXES = ("X", "Y", "Z")
 _BEGIN = re.compile(rb"<\?xml\s|<(?:\w+:)?MTConnect(?:Streams|Devices|Error|Assets)\b")
-#: Bytes that the declaration of a document, or the beginning of its root, may need.
-_OVERLAP = 80
+_OVERLAP = 80  # bytes that the declaration of a document, or the beginning of its root, may need
 _FEED_UNIT = "mm/s"
 _SEQUENCE = re.compile(r"\d{1,20}", re.ASCII)
 
@@ -45,13 +43,9 @@ class _Documents:
     """Divides a file into documents, and gives the observations of each as soon as it ends."""
 
     def __init__(self, path: Path, table: ItemTable, notes: FileNotes) -> None:
-        self._path = path
-        self._table = table
-        self._notes = notes
+        self._path, self._table, self._notes = path, table, notes
         self._document: _Document | None = None
-        self._rest = b""
-        self._line = 1
-        self._count = 0
+        self._rest, self._line, self._count = b"", 1, 0
         self._sent: dict[str, int] = {}  # last sequence number by instance of the agent
 
     def feed(self, piece: bytes) -> Iterator[Event]:
@@ -75,11 +69,15 @@ class _Documents:
             self._line += data.count(b"\n", 0, used)
             data = data[used:]
             if self._document.ended:
-                yield from self._events(self._document)
+                observations = self._document.observations
+                sent = self._sent.get(self._document.instance, -1)
+                self._sent[self._document.instance] = max([sent, *(each[0] for each in observations)])
+                fresh = [each for each in observations if each[0] < 0 or each[0] > sent]
+                numbered = all(each[0] >= 0 for each in fresh)
+                yield from (each[1:] for each in sorted(fresh, key=lambda each: each[0] if numbered else each[2]))
                 self._document = None
 
     def close(self) -> Iterator[Event]:
-        """The end of the file."""
         if self._document is not None:
             raise RecordError(
                 f"{self._path}:{self._line}: the document that begins in line {self._document.line} is cut off within "
@@ -90,40 +88,25 @@ class _Documents:
             raise RecordError(f"{self._path}:1: no MTConnectStreams document in the file")
         yield from ()
 
-    def _events(self, document: _Document) -> Iterator[Event]:
-        sent = self._sent.get(document.instance, -1)
-        self._sent[document.instance] = max([sent, *(each[0] for each in document.observations)])
-        fresh = [each for each in document.observations if each[0] < 0 or each[0] > sent]
-        numbered = all(each[0] >= 0 for each in fresh)
-        fresh.sort(key=lambda each: each[0] if numbered else each[2])
-        for _, line, time, stamp, item, text in fresh:
-            yield line, time, stamp, item, text
-
 
 class _Document:
     """One document."""
 
     def __init__(self, path: Path, line: int, table: ItemTable, notes: FileNotes, transcoded: bool) -> None:
-        self.line = line
-        self.ended = False
-        self.instance = ""
+        self.line, self.ended, self.instance = line, False, ""
         self.observations: list[_Observation] = []
-        self._path = path
-        self._table = table
-        self._notes = notes
+        self._path, self._table, self._notes = path, table, notes
         self._stamps = Stamps()
         self._open: list[str] = []
         self._known: dict[tuple[str, ...], Item | None] = {}
         self._axis = ""
         self._now: tuple[Item, dict[str, str], int] | None = None
         self._text: list[str] = []
-        self._text_length = 0
-        self._fed = 0
+        self._text_length = self._fed = 0
         # A file in UTF-16 was turned into UTF-8 before it comes here, its declaration was not.
         self._parser = expat.ParserCreate("UTF-8" if transcoded else None, namespace_separator="}")
         self._parser.buffer_text = True
-        self._parser.StartElementHandler = self._start
-        self._parser.EndElementHandler = self._end
+        self._parser.StartElementHandler, self._parser.EndElementHandler = self._start, self._end
         self._parser.CharacterDataHandler = self._characters
         self._parser.EntityDeclHandler = self._refuse_entity
 
@@ -190,17 +173,14 @@ class _Document:
         elif name == "ComponentStream":
             self._axis = attributes.get("name", "") if attributes.get("component") == "Linear" else ""
         elif "timestamp" in attributes and depth >= 2:
-            self._observation(name, attributes)
-
-    def _observation(self, name: str, attributes: dict[str, str]) -> None:
-        kind = attributes.get("subType", ""), attributes.get("name", ""), attributes.get("dataItemId", "")
-        key = (name + self._axis, *kind)
-        if key not in self._known:
-            if len(self._known) == _MAX_ITEMS:
-                raise RecordError(f"{self._path}:{self._here}: more than {_MAX_ITEMS} different data items")
-            self._known[key] = self._item(name, *kind)
-        item = self._known[key]
-        self._now = None if item is None else (item, attributes, self._here)
+            kind = attributes.get("subType", ""), attributes.get("name", ""), attributes.get("dataItemId", "")
+            key = (name + self._axis, *kind)
+            if key not in self._known:
+                if len(self._known) == _MAX_ITEMS:
+                    raise RecordError(f"{self._path}:{self._here}: more than {_MAX_ITEMS} different data items")
+                self._known[key] = self._item(name, *kind)
+            item = self._known[key]
+            self._now = None if item is None else (item, attributes, self._here)
 
     def _item(self, name: str, kind: str, given: str, identity: str) -> Item | None:
         """What a data item is: chosen by its id or name, else by its element, and by its sub-type."""
@@ -285,13 +265,9 @@ class _Odd:
     """Lines that are not one item and its value."""
 
     def __init__(self, path: Path, table: ItemTable, notes: FileNotes, known: dict[bytes, Item | None]) -> None:
-        self._path = path
-        self._table = table
-        self._notes = notes
-        self._known = known
+        self._path, self._table, self._notes, self._known = path, table, notes, known
         self.until = b""  # ends what goes over several lines
-        self._began = 0
-        self._unreadable = ""
+        self._began, self._unreadable = 0, ""
 
     def one(self, fields: list[bytes]) -> tuple[tuple[Item, bytes], ...]:
         """(item, value) of a line with an item that was not met so far; none of one of no use."""

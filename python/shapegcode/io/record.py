@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -124,22 +124,21 @@ class ReadOptions:
             value = getattr(self, name)
             if value is not None and not 0.0 < value < float("inf"):
                 raise RecordError(f"{name} = {value:g}: must be above 0")
-        stated: tuple[tuple[str, str | None, tuple[Measured, ...]], ...] = (
-            ("time_unit", self.time_unit, ("time",)),
-            ("force_unit", self.force_unit, ("force",)),
-            ("response_unit", self.response_unit, ("acceleration", "velocity", "displacement")),
-        )
-        for option, text, allowed in stated:
+        kinds: dict[str, tuple[Measured, ...]] = {
+            "time": ("time",),
+            "force": ("force",),
+            "response": get_args(Quantity),
+        }
+        for kind, allowed in kinds.items():
+            text = getattr(self, f"{kind}_unit")
             if text is not None and stated_unit(text, allowed) is None:
-                raise RecordError(f"{option} {text!r} is not known: must be one of {units_of(*allowed)}")
-        for option, text, allowed in (
-            ("force_sensitivity", self.force_sensitivity, ("force",)),
-            ("response_sensitivity", self.response_sensitivity, ("acceleration", "velocity", "displacement")),
-        ):
+                raise RecordError(f"{kind}_unit {text!r} is not known: must be one of {units_of(*allowed)}")
+        for kind in ("force", "response"):
+            text = getattr(self, f"{kind}_sensitivity")
             if text is not None:
-                per_volt(option, text, allowed)
-            if text is not None and getattr(self, option.replace("sensitivity", "scale")) is not None:
-                raise RecordError(f"{option} {text!r} and {option.replace('sensitivity', 'scale')}: state one of both")
+                per_volt(f"{kind}_sensitivity", text, kinds[kind])
+                if getattr(self, f"{kind}_scale") is not None:
+                    raise RecordError(f"{kind}_sensitivity {text!r} and {kind}_scale: state one of both")
 
 
 _VOLTS = {"v": 1.0, "mv": 1e-3, "µv": 1e-6, "uv": 1e-6}

@@ -5,37 +5,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 
 from shapegcode.errors import RecordError
-from shapegcode.io.run_items import STATES, Event, FileNotes, Item, ItemTable, State, plain_name
+from shapegcode.io.run_items import STATES, Event, FileNotes, Item, ItemTable, Role, State, plain_name
 from shapegcode.io.run_tracks import Hold, RunLog, RunPart, Track, run_of
 
-#: A step back up to this is an adapter whose items overtake each other; more is a clock that was set.
-_DISORDER_S = 1.0
-#: No value for this long within a run is said.
-_QUIET_S = 30.0
-#: What a value of text counts as, in values.
-_TEXT_VALUES = 8
-#: Values kept while no run goes on.
-_IDLE_VALUES = 100_000
-
-
-@dataclass
-class _Open:
-    """The run that goes on."""
-
-    start: float
-    stamp: str
-    line: int
-    cut_start: bool = False
-    holds: list[Hold] = field(default_factory=list)
-    gaps: list[tuple[float, float]] = field(default_factory=list)
-
-    @property
-    def held(self) -> Hold | None:
-        """The hold that has not ended."""
-        return self.holds[-1] if self.holds and self.holds[-1].end is None else None
+_DISORDER_S = 1.0  # a step back up to this is an adapter whose items overtake each other; more is a clock that was set
+_QUIET_S = 30.0  # no value for this long within a run is said
+_TEXT_VALUES = 8  # what a value of text counts as, in values
+_EXAMPLE = 'for example items = { block = "Block_Number" }'
+_IDLE_VALUES = 100_000  # values kept while no run goes on
 
 
 class RunCutter:
@@ -43,17 +22,13 @@ class RunCutter:
 
     def __init__(self, source: str, table: ItemTable, feed_unit: str | None, max_values: int) -> None:
         self.notes = FileNotes()
-        self.feed_unit = feed_unit
-        self._source = source
-        self._table = table
-        self._limit = max_values
+        self._source, self._table, self._feed_unit, self._limit = source, table, feed_unit, max_values
         self._tracks: dict[Item, Track] = {}
         self._status: Item | None = None
         self._state: State = "unknown"
-        self._open: _Open | None = None
+        self._open: RunPart | None = None  # the run that goes on
         self._first: tuple[int, float, str] | None = None
-        self._last_line = 0
-        self._given = False
+        self._last_line, self._given = 0, False
 
     def runs(self, events: Iterator[Event]) -> Iterator[RunLog]:
         """The runs of a log."""
@@ -85,7 +60,8 @@ class RunCutter:
                 yield from self._status_event(line, time, stamp, item, text)
                 room = self._limit if self._open is not None or self._state == "unknown" else _IDLE_VALUES
             else:
-                track.add_text(time, text)
+                track.times.append(time)
+                track.texts.append(text.decode("utf-8", errors="replace").strip())
                 room -= _TEXT_VALUES
             if room <= 0:
                 self._last_line = line
@@ -115,7 +91,7 @@ class RunCutter:
         then = "" if run is None else "; the run ends there, its rest is left out"
         if run is None and self._state == "unknown" and self._moved():
             first, at, began = self._first
-            run = self._open = _Open(at, began, first, cut_start=True)
+            run = self._open = RunPart(self._source, at, began, (first, first), cut_start=True)
             then = "; the run ends there, and another one begins"
         self.notes.add("back", line, f"the clock goes back by {-step:.3f} s{then}")
         if run is not None:
@@ -131,14 +107,12 @@ class RunCutter:
             yield from self._finish(self._open.held.start, self._open.held.word)
         elif self._open is not None:
             raise RecordError(
-                f"{self._source}:{line}: the run that began in line {self._open.line} has more than {self._limit} "
+                f"{self._source}:{line}: the run that began in line {self._open.lines[0]} has more than {self._limit} "
                 "values: is its end logged? Log fewer items, cut the log, or allow more (max_values)"
             )
         elif self._status is None:
-            raise RecordError(
-                f"{self._source}:{line}: {self._limit} values, and nothing that says when a program runs: looked for "
-                f"{self._table.sought('status')}; the log has {self._names()}; name it (items), or cut the log"
-            )
+            what = f"{self._limit} values, and nothing that says when a program runs"
+            raise RecordError(f"{self._source}:{line}: {what}: {self._sought('status')} (items), or cut the log")
         for track in self._tracks.values():
             track.drop_until(track.last_time)
 
@@ -147,9 +121,11 @@ class RunCutter:
         wrong = "is empty" if not shown else f"is {shown[:40]!r}, no {'line number' if track.counts else 'number'}"
         self.notes.add(f"value of {track.item.name}", line, f"{track.item.name} {wrong}, left out")
 
-    def _names(self) -> str:
+    def _sought(self, role: Role) -> str:
         names = list(self._table.seen)
-        return (", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "")) or "no items"
+        more = f" and {len(names) - 20} more" if len(names) > 20 else ""
+        held = f"{', '.join(names[:20])}{more}" or "no items"
+        return f"looked for {self._table.sought(role)}; the log has {held}; name it"
 
     # --- what the program does ---
 
@@ -157,7 +133,13 @@ class RunCutter:
         if self._status is None:
             self._status = item
         elif item is not self._status:
-            self._second_status(line, item)
+            one, other = self._status.name, item.name
+            if plain_name(one.rpartition(":")[2]) == plain_name(other.rpartition(":")[2]):
+                raise RecordError(
+                    f"{self._source}:{line}: {other} besides {one}: the log has more than one control; choose one, for "
+                    f'example items = {{ status = "{one}" }} with the other items of that control'
+                )
+            self.notes.add("status", line, f"{other} left out: {one} says when the program runs")
             return
         word = text.decode("utf-8", errors="replace").strip().upper()
         state = STATES.get(re.sub(r"[_\s-]", "", word), "unknown")
@@ -168,12 +150,12 @@ class RunCutter:
         self._state = state
         if first and state in ("hold", "stop", "completed") and self._moved() and self._first is not None:
             began, at, text_at = self._first
-            self._open = _Open(at, text_at, began, cut_start=True)
+            self._open = RunPart(self._source, at, text_at, (began, began), cut_start=True)
             self.notes.add("middle", began, f"the log begins within a run: no {item.name} ACTIVE before it")
         run = self._open
         if run is None:
             if state == "active":
-                self._open = _Open(time, stamp.decode("latin-1").strip(), line)
+                self._open = RunPart(self._source, time, stamp.decode("latin-1").strip(), (line, line))
         elif state == "active":
             if (held := run.held) is not None:
                 held.end, held.resumed = time, (stamp.decode("latin-1").strip(), line)
@@ -203,16 +185,6 @@ class RunCutter:
             self.notes.add("ended", line, f"{name} is {word} without PROGRAM_COMPLETED: ended, or broken off")
             yield from self._finish(time, word)
 
-    def _second_status(self, line: int, item: Item) -> None:
-        assert self._status is not None
-        one, other = self._status.name, item.name
-        if plain_name(one.rpartition(":")[2]) == plain_name(other.rpartition(":")[2]):
-            raise RecordError(
-                f"{self._source}:{line}: {other} besides {one}: the log has more than one control; choose one, for "
-                f'example items = {{ status = "{one}" }} with the other items of that control'
-            )
-        self.notes.add("status", line, f"{other} left out: {one} says when the program runs")
-
     def _moved(self) -> bool:
         """Whether block numbers changed so far."""
         return any(len(set(track.values)) > 1 for track in self._tracks.values() if track.counts)
@@ -223,36 +195,23 @@ class RunCutter:
         """Give the run that goes on; *word*: what ended it, None: it is cut off."""
         run = self._open
         assert run is not None
-        self._open = None
-        self._given = True
-        has_status = self._status is not None
-        end = max(end, run.start)  # items may overtake each other
-        part = RunPart(
-            self._source, run.start, run.stamp, end, word, (run.line, self._last_line), run.cut_start,
-            word is None and has_status, run.holds, run.gaps, has_status,
-        )  # fmt: skip
-        for each in part.restarted(list(self._tracks.values())):
-            yield self._made(each)
-        for track in self._tracks.values():
-            track.drop_until(end)
-
-    def _made(self, part: RunPart) -> RunLog:
-        found = run_of(part, list(self._tracks.values()), self.feed_unit or self.notes.feed_unit, self.notes)
-        if not len(found.block) and not any(track.counts and track.ever for track in self._tracks.values()):
-            raise RecordError(
-                f"{self._source}:{part.lines[1]}: no line numbers of the program: looked for "
-                f"{self._table.sought('block')}; the log has {self._names()}; name it, for example "
-                'items = { block = "Block_Number" }'
-            )
-        return found
+        self._open, self._given = None, True
+        run.end, run.word = max(end, run.start), word  # items may overtake each other
+        run.lines, run.has_status = (run.lines[0], self._last_line), self._status is not None
+        run.cut_end = word is None and run.has_status
+        tracks = list(self._tracks.values())
+        for part in run.restarted(tracks):
+            found = run_of(part, tracks, self._feed_unit or self.notes.feed_unit, self.notes)
+            if not len(found.block) and not any(track.counts and track.ever for track in tracks):
+                what = f"no line numbers of the program: {self._sought('block')}, {_EXAMPLE}"
+                raise RecordError(f"{self._source}:{part.lines[1]}: {what}")
+            yield found
+        for track in tracks:
+            track.drop_until(run.end)
 
     def _end(self, last: float) -> Iterator[RunLog]:
-        """The end of the file."""
         if self._first is None:
-            raise RecordError(
-                f"{self._source}: no item that is of use: looked for {self._table.sought('block')}; the log has "
-                f'{self._names()}; name it, for example items = {{ block = "Block_Number" }}'
-            )
+            raise RecordError(f"{self._source}: no item that is of use: {self._sought('block')}, {_EXAMPLE}")
         if self._open is not None:
             held = self._open.held
             if held is not None:
@@ -265,7 +224,7 @@ class RunCutter:
         elif self._status is None:
             line, time, stamp = self._first
             self.notes.add("status", 0, "nothing says when the program runs: the whole log is one run")
-            self._open = _Open(time, stamp, line)
+            self._open = RunPart(self._source, time, stamp, (line, line))
             yield from self._finish(last, None)
         elif not self._given:
             raise RecordError(

@@ -44,11 +44,9 @@ _NAMES: dict[Role, str] = {
     "z": "z z_act zact z_actual z_pos zpos z_position actual_z z_abs zabs pos_z z_mm position_z",
 }
 
-#: Names that are kept for messages.
-_MAX_NAMES = 1000
+_MAX_NAMES = 1000  # names that are kept for messages
 
-ROLES: tuple[Role, ...] = get_args(Role)
-"""What an item can be; the keys of `items`."""
+ROLES: tuple[Role, ...] = get_args(Role)  # what an item can be; the keys of `items`
 
 _STATES: dict[State, str] = {
     "active": "ACTIVE RUNNING RUN EXECUTING IN_CYCLE CYCLE AUTO_RUN START STARTED STRT MSTR",
@@ -133,8 +131,7 @@ class ItemTable:
         return self.chosen.get(role) or ", ".join(_NAMES[role].split()[:6])
 
 
-Event: TypeAlias = tuple[int, float, bytes, Item, bytes]
-"""(line, time in s, time stamp, item, value as text)."""
+Event: TypeAlias = tuple[int, float, bytes, Item, bytes]  # (line, time in s, time stamp, item, value as text)
 
 _SHOWN = 3
 
@@ -164,8 +161,7 @@ class FileNotes:
         return tuple(found)
 
 
-#: 2017-02-10T18:33: stands before the seconds.
-_MINUTE = 17
+_MINUTE = 17  # 2017-02-10T18:33: stands before the seconds
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _ISO = re.compile(
     r"(\d{4})[-/](\d\d)[-/](\d\d)[T ](\d\d):(\d\d)(?::(\d\d)([.,]\d+)?)? ?(Z|[+-]\d\d(?::?\d\d)?)?", re.IGNORECASE

@@ -25,10 +25,8 @@ from shapegcode.io.run_tracks import RunLog
 
 LogFormat = Literal["shdr", "mtconnect", "edge", "csv"]
 
-#: Values that one run may have: 10 hours at 100 a second; some 60 MB.
-MAX_VALUES = 4_000_000
-#: NIST_PLATE-12 is PLATE-12; whether OP2 is BOX_OP2 is not known.
-_SHORTEST_NAME = 4
+MAX_VALUES = 4_000_000  # values that one run may have: 10 hours at 100 a second; some 60 MB
+_SHORTEST_NAME = 4  # NIST_PLATE-12 is PLATE-12; whether OP2 is BOX_OP2 is not known
 _TABLE_LINES = 100
 _SHDR_LINE = re.compile(rb"[^|\r\n]*\d[^|\r\n]*\|[^|\r\n]+\|")
 
@@ -99,7 +97,12 @@ def iter_run_logs(
     unit = None if feed_unit is None else stated_feed_unit(feed_unit)
     kind = _format(path, format)
     names = (program_name,) if isinstance(program_name, str) else tuple(program_name or ())
-    runs = _runs(path, kind, table, unit, max_values)
+    if kind == "edge":
+        runs = edge_runs(path)
+    else:
+        cutter = RunCutter(str(path), table, unit, max_values)
+        events = {"shdr": shdr_events, "mtconnect": mtconnect_events, "csv": table_events}[kind]
+        runs = cutter.runs(events(path, table, cutter.notes))
     others: list[str] = []
     found = False
     for run in runs:
@@ -110,14 +113,6 @@ def iter_run_logs(
             others.append(run.program)
     if not found:
         raise RecordError(f"{path}: no run of {' or '.join(names)}; the log names {', '.join(others)}")
-
-
-def _runs(path: Path, kind: LogFormat, table: ItemTable, unit: str | None, max_values: int) -> Iterator[RunLog]:
-    if kind == "edge":
-        return edge_runs(path)
-    cutter = RunCutter(str(path), table, unit, max_values)
-    events = {"shdr": shdr_events, "mtconnect": mtconnect_events, "csv": table_events}[kind]
-    return cutter.runs(events(path, table, cutter.notes))
 
 
 def _format(path: Path, stated: LogFormat | None) -> LogFormat:

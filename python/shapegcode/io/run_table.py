@@ -79,7 +79,12 @@ def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Eve
                 notes.add("short", number, f"{len(cells)} cells of {header.cells}")
             for column in header.columns:
                 if column.index < len(cells):
-                    yield number, time, stamp, column.item, _value(cells[column.index], column)
+                    cell = cells[column.index]
+                    if column.item.role not in _TEXTS:
+                        cell = _point(cell)
+                        if column.factor != 1.0 and is_number(cell, False):
+                            cell = repr(float(cell) * column.factor)
+                    yield number, time, stamp, column.item, cell.encode()
 
 
 def _time(cells: list[str], header: _Header, stamps: Stamps) -> tuple[bytes, float]:
@@ -97,15 +102,6 @@ def _time(cells: list[str], header: _Header, stamps: Stamps) -> tuple[bytes, flo
 def _point(cell: str) -> str:
     """A number with a point for a comma."""
     return without_thousands(cell.encode()).decode().replace(",", ".") if "," in cell else cell
-
-
-def _value(cell: str, column: _UsedColumn) -> bytes:
-    if column.item.role in _TEXTS:
-        return cell.encode()
-    cell = _point(cell)
-    if column.factor != 1.0 and is_number(cell, False):
-        return repr(float(cell) * column.factor).encode()
-    return cell.encode()
 
 
 def _header(path: Path, table: ItemTable) -> _Header:

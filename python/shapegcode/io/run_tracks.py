@@ -99,16 +99,11 @@ _SIGNALS: tuple[Role, ...] = (
 _COUNTS: frozenset[Role] = frozenset({"block", "sequence"})
 #: What was set before the start still holds; of feed and block nothing is known after so long.
 _KEPT: frozenset[Role] = frozenset({"tool", "spindle", "feed_override", "rapid_override"})
-#: A status is polled: what came so shortly before it belongs to the run.
-_LEAD_IN_S = 1.0
-#: A program's name may come so long after its start.
-_NAME_S = 5.0
-#: A first block number beyond it is no start of a program.
-_LATE_START = 50
-#: A program that begins anew after a hold goes back by more.
-_RESTART_BLOCKS = 20
-#: Whole seconds of a control, shown late.
-_CLOCKS_APART_S = 3.0
+_LEAD_IN_S = 1.0  # a status is polled: what came so shortly before it belongs to the run
+_NAME_S = 5.0  # a program's name may come so long after its start
+_LATE_START = 50  # a first block number beyond it is no start of a program
+_RESTART_BLOCKS = 20  # a program that begins anew after a hold goes back by more
+_CLOCKS_APART_S = 3.0  # whole seconds of a control, shown late
 _CLOCKS_APART = 0.01
 
 
@@ -127,10 +122,8 @@ class Track:
     """The values of one item, as they come."""
 
     def __init__(self, item: Item) -> None:
-        self.item = item
-        self.counts = item.role in _COUNTS
-        self.times = array("d")
-        self.values = array("d")
+        self.item, self.counts = item, item.role in _COUNTS
+        self.times, self.values = array("d"), array("d")
         self.texts: list[str] | None = [] if item.role in _TEXT_ROLES else None
         self.ever = False
 
@@ -138,12 +131,6 @@ class Track:
     def last_time(self) -> float:
         """Of its last value."""
         return self.times[-1] if self.times else -math.inf
-
-    def add_text(self, time: float, text: bytes) -> None:
-        """Add a text value."""
-        assert self.texts is not None
-        self.times.append(time)
-        self.texts.append(text.decode("utf-8", errors="replace").strip())
 
     def drop_until(self, end: float) -> None:
         """Drop values up to a time but for the last one, which may still hold."""
@@ -154,8 +141,7 @@ class Track:
         if self.last_time > end:
             before = np.flatnonzero(np.array(self.times) <= end)
             keep = int(before[-1]) if before.size else 0
-        self.times = self.times[keep:]
-        self.values = self.values[keep:]
+        self.times, self.values = self.times[keep:], self.values[keep:]
         if self.texts is not None:
             self.texts = self.texts[keep:]
 
@@ -182,21 +168,26 @@ class Track:
         return Signal(times, kept, self.item.name)
 
 
-@dataclass(frozen=True)
+@dataclass
 class RunPart:
     """From when to when a run goes; times in s of the log's clock."""
 
     source: str
     start: float
     stamp: str
-    end: float
-    word: str | None
     lines: tuple[int, int]
-    cut_start: bool
-    cut_end: bool
-    holds: list[Hold]
-    gaps: list[tuple[float, float]]
+    cut_start: bool = False
+    end: float = math.inf
+    word: str | None = None  # what ended it; None: it is cut off
+    cut_end: bool = False
     has_status: bool = True
+    holds: list[Hold] = field(default_factory=list)
+    gaps: list[tuple[float, float]] = field(default_factory=list)
+
+    @property
+    def held(self) -> Hold | None:
+        """The hold that has not ended."""
+        return self.holds[-1] if self.holds and self.holds[-1].end is None else None
 
     def restarted(self, tracks: Sequence[Track]) -> Iterator[RunPart]:
         """Divide it where the program started again after a stop, without an end in the log."""
@@ -234,7 +225,8 @@ def run_of(part: RunPart, tracks: Sequence[Track], feed_unit: str | None, notes:
     """Make the run."""
     signals = {role: _best(part, tracks, role, notes) for role in _SIGNALS}
     block, counts = signals["block"], "line"
-    texts = _texts(part, tracks, "block_text")
+    inside = ([p for p in pairs if p[0] >= -_LEAD_IN_S] for _, pairs in _text_values(part, tracks, "block_text"))
+    texts = tuple(next(filter(None, inside), ()))
     if block is None:
         counts = "sequence"
         block = signals["sequence"] or _n_words(texts, notes)
@@ -274,7 +266,6 @@ def run_of(part: RunPart, tracks: Sequence[Track], feed_unit: str | None, notes:
 
 
 def _compare_clocks(part: RunPart, runtime: Signal | None, notes: FileNotes) -> None:
-    """Compare the control's own timer with the clock of the log."""
     if runtime is None or part.cut_start or part.cut_end or not part.has_status:
         return
     counted, clock = float(runtime.value[-1]), part.end - part.start
@@ -306,14 +297,6 @@ def _text_values(part: RunPart, tracks: Sequence[Track], role: Role) -> Iterator
             track.item,
             [(time - part.start, text) for time, text in pairs if time <= part.end and text and text != "UNAVAILABLE"],
         )
-
-
-def _texts(part: RunPart, tracks: Sequence[Track], role: Role) -> tuple[tuple[float, str], ...]:
-    """The values of text of a run."""
-    for _, pairs in _text_values(part, tracks, role):
-        if found := tuple(pair for pair in pairs if pair[0] >= -_LEAD_IN_S):
-            return found
-    return ()
 
 
 def _n_words(texts: tuple[tuple[float, str], ...], notes: FileNotes) -> Signal | None:

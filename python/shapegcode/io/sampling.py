@@ -14,15 +14,13 @@ from shapegcode.io.units import FloatArray
 _OFF_GRID = 0.49
 #: A step from one instant to the next may differ from the period by this share; a missing sample doubles it.
 _OFF_STEP = 0.9
-#: Off the grid by more than this share of a period, the user gets a warning.
-_TELL = 0.1
+_TELL = 0.1  # off the grid by more than this share of a period, the user gets a warning
 #: A stated rate and the instants may differ by this share: clocks are better by far, wrong units are worse by far.
 STATED_RATE_TOLERANCE = 0.01
 #: Rounding moves an instant by half a digit at most; where digits are finer than this share of what it is off, the
 #: clock of the logger itself is uneven.
 _ROUNDED = 0.5
-#: Half of the steps differ from the usual one by more than this share: the clock is uneven.
-_UNEVEN = 0.05
+_UNEVEN = 0.05  # half of the steps differ from the usual one by more than this share: the clock is uneven
 _GRID_ONLY = "samples must be evenly spaced"
 
 
@@ -46,11 +44,9 @@ def even_period(
         raise UnevenTimeError(row, f"time {times_s[row]:.9g} s comes after {times_s[row - 1]:.9g} s: must ascend")
     mean = float(times_s[-1] - times_s[0]) / (count - 1)
     if stated_s is not None and not abs(mean / stated_s - 1.0) <= STATED_RATE_TOLERANCE:
-        raise UnevenTimeError(
-            0,
-            f"the time column says a sample every {mean:.6g} s, {stated_s:.6g} s is stated: must agree within "
-            f"{100 * STATED_RATE_TOLERANCE:g} %; is the unit of the time right?",
-        )
+        what = f"the time column says a sample every {mean:.6g} s, {stated_s:.6g} s is stated"
+        must = f"must agree within {100 * STATED_RATE_TOLERANCE:g} %; is the unit of the time right?"
+        raise UnevenTimeError(0, f"{what}: {must}")
     period = mean if stated_s is None else stated_s
     rising = steps[steps > 0.0]
     digit = float(np.min(rising)) if rising.size else 0.0
@@ -58,11 +54,8 @@ def even_period(
     repeated = np.flatnonzero(steps == 0.0)
     if repeated.size and not coarse:
         row = int(repeated[0]) + 1
-        raise UnevenTimeError(
-            row,
-            f"time {times_s[row]:.9g} s is repeated: must ascend; if the file gives too few digits, leave the time out "
-            "and state the period (--sample-period)",
-        )
+        remedy = "if the file gives too few digits, leave the time out and state the period (--sample-period)"
+        raise UnevenTimeError(row, f"time {times_s[row]:.9g} s is repeated: must ascend; {remedy}")
     usual = float(np.median(steps))
     if not coarse:
         row = int(np.argmax(np.abs(steps - usual)))
@@ -81,20 +74,13 @@ def even_period(
     row = int(np.argmax(np.abs(off)))
     share = float(abs(off[row])) / period
     limit = max(_OFF_GRID, digit / period if coarse else 0.0)
+    place = f"time {times_s[row]:.9g} s is {share:.2g} periods of {period:.6g} s off even spacing"
     if share > limit:
-        raise UnevenTimeError(
-            row,
-            f"time {times_s[row]:.9g} s is {share:.2g} periods of {period:.6g} s off even spacing (limit {limit:.2g}): "
-            f"{_GRID_ONLY} and none may be missing",
-            ascending=True,
-        )
+        text = f"{place} (limit {limit:.2g}): {_GRID_ONLY} and none may be missing"
+        raise UnevenTimeError(row, text, ascending=True)
     if not even_clock and share > _TELL and not coarse and _digit_of(times_s) < _ROUNDED * share * period:
-        raise UnevenTimeError(
-            row,
-            f"time {times_s[row]:.9g} s is {share:.2g} periods of {period:.6g} s off even spacing, more than "
-            f"the digits of the file explain: {_GRID_ONLY}",
-            ascending=True,
-        )
+        text = f"{place}, more than the digits of the file explain: {_GRID_ONLY}"
+        raise UnevenTimeError(row, text, ascending=True)
     if share > _TELL and not coarse:
         return period, [
             f"times are up to {100 * share:.0f} % of a period off even spacing: taken as rounding, with the mean "
@@ -112,12 +98,9 @@ def _digit_of(times_s: FloatArray) -> float:
     return 0.0
 
 
-#: The grid has this share of the samples: the others show noise and gaps.
-_DENSITY = 0.8
-#: The longest step may be so many mean ones: a longer one leaves less than a third of the band.
-_LONGEST_STEP = 3.0
-#: Sinc of so many samples either way in a Kaiser window with 80 dB, flat up to .4 of the grid's rate.
-_REACH = 16
+_DENSITY = 0.8  # the grid has this share of the samples: the others show noise and gaps
+_LONGEST_STEP = 3.0  # the longest step may be so many mean ones: a longer one leaves less than a third of the band
+_REACH = 16  # Sinc of so many samples either way in a Kaiser window with 80 dB, flat up to .4 of the grid's rate
 _BETA = 7.86
 _RIDGE = 1e-6
 #: Intervals are widened by this much at least: what the pulse holds above the grid's band is an error beside the noise,

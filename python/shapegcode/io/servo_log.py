@@ -118,12 +118,10 @@ def _time_unit(table: TextTable, label: Label, step: float) -> float:
     return 1.0 if as_seconds else 1e-3
 
 
-def _length_units(table: TextTable, columns: _Columns) -> list[float]:
-    """Factors to mm of the columns behind the time; one without a unit has that of the others, else mm."""
-    units = [
-        unit_of(table.where, columns.labels[index], ("displacement",), "say it with --units")
-        for index in columns.used[1:]
-    ]
+def _length_factors(table: TextTable, columns: _Columns) -> list[float]:
+    """To mm, of the columns behind the time; one without a unit has that of the others, else mm."""
+    labels = [columns.labels[index] for index in columns.used[1:]]
+    units = [unit_of(table.where, label, ("displacement",), "say it with --units") for label in labels]
     factors = [None if unit is None else factor_between(unit, "mm") for unit in units]
     usual = next((each for each in factors if each is not None), 1.0)
     return [usual if each is None else each for each in factors]
@@ -136,10 +134,14 @@ def read_log(path: Path, units: tuple[float, float] | None = None) -> ServoLog:
     values = table.numbers(columns.used, _MIN_ROWS)
     if len(values) > _MAX_ROWS:
         raise ArgumentError(f"{path}: more than {_MAX_ROWS} rows")
-    _refuse_descending(table, values[:, 0])
+    bad = np.flatnonzero(np.diff(values[:, 0]) <= 0.0)
+    if bad.size:
+        row = int(bad[0]) + 1
+        when = f"time {values[row, 0]:g} does not come after {values[row - 1, 0]:g}"
+        raise ArgumentError(f"{path}:{table.line_of(row)}: {when}")
     step = float(np.median(np.diff(values[:, 0])))
     values[:, 0] *= units[0] if units else _time_unit(table, columns.labels[columns.time], step)
-    values[:, 1:] *= units[1] if units else _length_units(table, columns)
+    values[:, 1:] *= units[1] if units else _length_factors(table, columns)
     times = values[:, 0] - values[0, 0]
     _refuse_gaps(table, times)
     command = np.full((len(times), 3), np.nan)
@@ -149,15 +151,6 @@ def read_log(path: Path, units: tuple[float, float] | None = None) -> ServoLog:
     for k, axis in enumerate(columns.actual, start=1 + len(columns.command)):
         actual[:, "xyz".index(axis)] = values[:, k]
     return ServoLog(str(path), times, command, actual if columns.actual else None)
-
-
-def _refuse_descending(table: TextTable, times: Array) -> None:
-    bad = np.flatnonzero(np.diff(times) <= 0.0)
-    if bad.size:
-        row = int(bad[0]) + 1
-        raise ArgumentError(
-            f"{table.path}:{table.line_of(row)}: time {times[row]:g} does not come after {times[row - 1]:g}"
-        )
 
 
 def _refuse_gaps(table: TextTable, times: Array) -> None:

@@ -27,8 +27,7 @@ from shapegcode.io.layout import (
 )
 from shapegcode.io.units import FloatArray
 
-#: Faults are looked for in pieces of this size.
-_PIECE_BYTES = 4_000_000
+_PIECE_BYTES = 4_000_000  # faults are looked for in pieces of this size
 
 
 class TextTable:

@@ -23,8 +23,7 @@ _REMEDY = (
     "state the unit, or of a signal in volts the sensor's sensitivity (--force-sensitivity 2.25mV/N, "
     "--response-sensitivity 100mV/g) or the scale (--force-scale, --response-scale)"
 )
-#: Fewer samples are no record of a vibration.
-_MIN_ROWS = 16
+_MIN_ROWS = 16  # fewer samples are no record of a vibration
 
 
 @dataclass(frozen=True)
@@ -36,8 +35,6 @@ class _Column:
 
 
 class _Chooser:
-    """Chooses the columns of one file."""
-
     def __init__(self, table: TextTable, options: ReadOptions) -> None:
         self.table, self.options = table, options
         self.labels = table.labels(tap_label)
@@ -154,12 +151,10 @@ class _Chooser:
         scale = options.force_scale
         if options.force_sensitivity is not None:
             scale = self._volts(index) * per_volt("force_sensitivity", options.force_sensitivity, ("force",))[1]
-        return _Column(
-            index, self.labels[index], self._factor(index, "force", options.force_unit) if scale is None else scale
-        )
+        factor = self._factor(index, "force", options.force_unit) if scale is None else scale
+        return _Column(index, self.labels[index], factor)
 
     def responses(self, taken: set[int]) -> list[_Column]:
-        """The columns of the response, one per axis."""
         options = self.options
         if options.response_columns:
             found = [self._named(name, "--response-column") for name in options.response_columns]
@@ -295,11 +290,8 @@ def read_sweep(path: Path, options: ReadOptions) -> Record:
     told = options.axis or _axis_of_name(path.name)
     records = read_csv(path, replace(klipper_options(options), axis=told))
     record = max(records, key=lambda each: float(each.response.std()))
-    note = (
-        ()
-        if told
-        else (f"{path}: the axis is not stated: {(record.axis or '').upper()} moved most (state it with --axis)",)
-    )
+    axis = (record.axis or "").upper()
+    note = () if told else (f"{path}: the axis is not stated: {axis} moved most (state it with --axis)",)
     return replace(record, source=str(path), notes=(*record.notes, *note))
 
 

@@ -18,13 +18,9 @@ from shapegcode.io.units import FloatArray, find_unit, units_of
 
 _TIME_RESPONSE = 1
 _FUNCTIONS = {
-    2: "auto spectra",
-    3: "cross spectra",
-    4: "frequency response functions",
-    6: "coherence",
-    9: "power spectral densities",
-    12: "spectra",
-}
+    2: "auto spectra", 3: "cross spectra", 4: "frequency response functions", 6: "coherence",
+    9: "power spectral densities", 12: "spectra",
+}  # fmt: skip
 _TIME_TYPE = 17
 _Measured = Literal["force"] | Quantity
 _MEASURED: dict[int, _Measured] = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "force"}
@@ -47,7 +43,7 @@ class _Channel:
     @property
     def place(self) -> tuple[int, int]:
         """Node and axis."""
-        return int(self.header["rsp_node"]), abs(int(self.header["rsp_dir"]))
+        return _place(self.header, "rsp")
 
 
 class UffFile:
@@ -234,7 +230,6 @@ def _force_of(path: Path, response: _Channel, forces: list[_Channel], responses:
     The force at the response's reference; of those, the one with its version, load case or function number where these
     tell measurements apart; of those, by their order in the file.
     """
-    head = response.header
 
     def alike(channel: _Channel, channels: list[_Channel]) -> list[_Channel]:
         for key in ("ver_num", "load_case_id", "func_id"):
@@ -243,7 +238,7 @@ def _force_of(path: Path, response: _Channel, forces: list[_Channel], responses:
                 channels = same or channels
         return channels
 
-    reference = (int(head["ref_node"]), abs(int(head["ref_dir"])))
+    reference = _place(response.header, "ref")
     candidates = [force for force in forces if force.place == reference] if reference != (0, 0) else []
     candidates = alike(response, candidates or forces)
     rivals = alike(response, [each for each in responses if each.place == response.place])
@@ -331,7 +326,31 @@ def read_frf_uff(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
     else:
         found = _of_one_point(path, found, options, notes)
     coherences = [data for _, data in functions if int(data["func_type"]) == _COHERENCE]
-    return [_response(file, index, data, units, coherences, options, notes, len(found) > 1) for index, data in found]
+    responses = []
+    for index, data in found:
+        where = f"{path}: dataset {index + 1}"
+        if not np.iscomplexobj(data["data"]):
+            raise RecordError(
+                f"{where}: real values only: a magnitude without phase tells no mode from its neighbour; export real "
+                "and imaginary part"
+            )
+        values = whole_values(where, data)
+        label = str(data.get("abscissa_axis_units_lab", ""))
+        unit = find_unit(label)
+        if unit is not None and unit.measures == "time":
+            raise RecordError(f"{where}: its abscissa is in {unit.name}: a frequency response has its frequency there")
+        frequency = np.asarray(data["x"], dtype=np.float64) * frequency_factor(label)
+        quantity, factor, warnings = _scale(where, data, units, options)
+        sign = -1.0 if int(data["rsp_dir"]) * int(data["ref_dir"]) < 0 else 1.0
+        scaled = np.asarray(values * (sign * factor), dtype=np.complex128)
+        lines = checked_lines(where, frequency, scaled, _coherence(data, coherences, len(values)))
+        responses.append(
+            FrequencyResponse(
+                where if len(found) > 1 else str(path), *lines[:2], quantity, lines[2], _axis(data) or options.axis,
+                (*file.warnings, *warnings), (*notes, *lines[3]),
+            )
+        )  # fmt: skip
+    return responses
 
 
 def _numbered(
@@ -385,50 +404,6 @@ def _axis(data: dict[str, Any]) -> str | None:
 
 def _point(data: dict[str, Any]) -> str:
     return f"node {data['rsp_node']} along {_axis(data) or data['rsp_dir']}, force at node {data['ref_node']}"
-
-
-def _response(
-    file: UffFile,
-    index: int,
-    data: dict[str, Any],
-    units: dict[str, Any] | None,
-    coherences: list[dict[str, Any]],
-    options: ReadOptions,
-    notes: list[str],
-    several: bool,
-) -> FrequencyResponse:
-    where = f"{file.path}: dataset {index + 1}"
-    if not np.iscomplexobj(data["data"]):
-        raise RecordError(
-            f"{where}: real values only: a magnitude without phase tells no mode from its neighbour; export real and "
-            "imaginary part"
-        )
-    values = whole_values(where, data)
-    frequency = _frequency(where, data)
-    quantity, factor, warnings = _scale(where, data, units, options)
-    coherence = _coherence(data, coherences, len(values))
-    sign = -1.0 if int(data["rsp_dir"]) * int(data["ref_dir"]) < 0 else 1.0
-    lines, response, coherence, left_out = checked_lines(
-        where, frequency, np.asarray(values * (sign * factor), dtype=np.complex128), coherence
-    )
-    return FrequencyResponse(
-        where if several else str(file.path),
-        lines,
-        response,
-        quantity,
-        coherence,
-        _axis(data) or options.axis,
-        tuple([*file.warnings, *warnings]),
-        tuple([*notes, *left_out]),
-    )
-
-
-def _frequency(where: str, data: dict[str, Any]) -> FloatArray:
-    label = str(data.get("abscissa_axis_units_lab", ""))
-    unit = find_unit(label)
-    if unit is not None and unit.measures == "time":
-        raise RecordError(f"{where}: its abscissa is in {unit.name}: a frequency response has its frequency there")
-    return np.asarray(data["x"], dtype=np.float64) * frequency_factor(label)
 
 
 def _scale(

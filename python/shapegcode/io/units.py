@@ -9,20 +9,15 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-"""Of doubles, of any shape."""
+FloatArray = npt.NDArray[np.float64]  # of doubles, of any shape
 
 
 Measured = Literal["time", "force", "torque", "acceleration", "velocity", "displacement"]
 
-#: Inch in mm (exact by definition).
-MM_PER_INCH = 25.4
-#: Standard acceleration of gravity, m/s² (exact by definition).
-_G_M_S2 = 9.80665
-#: Pound-force in N (exact by definition).
-_LBF_N = 4.4482216152605
-#: Inch in m (exact by definition).
-_INCH_M = 0.0254
+MM_PER_INCH = 25.4  # exact by definition
+_G_M_S2 = 9.80665  # standard acceleration of gravity, m/s² (exact by definition)
+_LBF_N = 4.4482216152605  # pound-force in N (exact by definition)
+_INCH_M = 0.0254  # inch in m (exact by definition)
 
 _FACTORS: dict[Measured, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6, "min": 60.0},
@@ -38,26 +33,14 @@ _FACTORS: dict[Measured, dict[str, float]] = {
 _SPELLINGS = {
     spelling: unit
     for unit, spellings in {
-        "s": "sec second seconds sek sekunde sekunden",
-        "ms": "msec millisecond milliseconds",
-        "us": "usec µsec",
-        "min": "minute minutes",
-        "n": "newton newtons",
-        "kgf": "kp",
-        "nm": "n_m",
-        "m": "meter metre",
-        "um": "micron",
-        "inch": "in",
-        "g": "gn g0 g's gs",
-        "m/s²": "ms-2",
-        "mm/s²": "mms-2",
-        "m/s": "ms-1",
-        "mm/s": "mms-1 millimeter/second",
-        "mm/min": "mm_min mmpm millimeter/minute",
+        "s": "sec second seconds sek sekunde sekunden", "ms": "msec millisecond milliseconds", "us": "usec µsec",
+        "min": "minute minutes", "n": "newton newtons", "kgf": "kp", "nm": "n_m", "m": "meter metre", "um": "micron",
+        "inch": "in", "g": "gn g0 g's gs", "m/s²": "ms-2", "mm/s²": "mms-2", "m/s": "ms-1",
+        "mm/s": "mms-1 millimeter/second", "mm/min": "mm_min mmpm millimeter/minute",
         "inch/min": "in/min ipm inch_min inch/minute",
     }.items()
     for spelling in spellings.split()
-}
+}  # fmt: skip
 #: Units of raw signals and of quantities that are not converted: behind a name they must not pass for a part of it.
 _FOREIGN = frozenset(
     {"v", "mv", "µv", "uv", "kv", "volt", "volts", "pc", "nc", "coulomb", "ma"}

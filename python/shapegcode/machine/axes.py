@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -9,6 +10,13 @@ from pydantic import Field, model_validator
 
 from shapegcode.errors import ArgumentError
 from shapegcode.settings.keys import Bool, Float, InlineTable, NonNegative, Positive, Text, TomlTable, key, toml
+
+optional = partial(key, default=None)
+_Ratio = Annotated[NonNegative, Field(lt=1)]
+_Percent = Annotated[NonNegative, Field(lt=100)]
+_Hertz = Annotated[Positive, Field(le=10_000)]
+_Speed = Annotated[Positive, Field(ge=1, le=10_000_000)]
+_MAX_MODES = 200  # identification finds 40 at most
 
 
 class Drive(TomlTable):
@@ -24,9 +32,7 @@ class Drive(TomlTable):
     stiffness_n_per_um: Positive = key(
         "axial stiffness from motor to table: screw, nut, bearings and coupling in series"
     )
-    damping_ratio: Annotated[NonNegative, Field(lt=1)] = key(
-        "damping ratio of motor against table on that stiffness", assumed=0.05
-    )
+    damping_ratio: _Ratio = key("damping ratio of motor against table on that stiffness", assumed=0.05)
     backlash_um: NonNegative = key(
         "free travel between motor and table (a ball bar shows it together with the elastic windup of the screw); 0: "
         "none",
@@ -47,8 +53,8 @@ class Drive(TomlTable):
     acceleration_feed_forward_ratio: Annotated[NonNegative, Field(le=1)] = key(
         "share of the torque for the set-points' acceleration that is fed forward; 0: none", fanuc="2069", assumed=0.0
     )
-    torque_limit_n_m: Positive | None = key(
-        "largest torque of the motor; left out: not limited", unit="N m", fanuc="2060", default=None
+    torque_limit_n_m: Positive | None = optional(
+        "largest torque of the motor; left out: not limited", unit="N m", fanuc="2060"
     )
     friction_model: Literal["viscous", "stribeck", "lugre"] = key(
         'friction of the table. "viscous": in proportion to the speed alone; "stribeck": Coulomb, static and Stribeck '
@@ -56,12 +62,9 @@ class Drive(TomlTable):
         assumed="viscous",
     )
     friction_viscous_n_s_per_m: NonNegative = key("viscous friction of the guideways", unit="N s/m", assumed=0.0)
-    friction_coulomb_n: Positive | None = key(
-        "sliding friction of the guideways; stribeck and lugre need it", default=None
-    )
-    friction_static_n: Positive | None = key(
-        "friction of the guideways to be overcome from rest, not below the sliding one; stribeck and lugre need it",
-        default=None,
+    friction_coulomb_n: Positive | None = optional("sliding friction of the guideways; stribeck and lugre need it")
+    friction_static_n: Positive | None = optional(
+        "friction of the guideways to be overcome from rest, not below the sliding one; stribeck and lugre need it"
     )
     friction_stribeck_velocity_mm_per_s: Positive = key(
         "speed at which the friction has fallen from static to sliding", assumed=5.0
@@ -84,34 +87,25 @@ class Drive(TomlTable):
     def _friction_is_complete(self) -> Drive:
         if self.friction_model == "viscous":
             return self
-        for name in ("friction_coulomb_n", "friction_static_n"):
-            if getattr(self, name) is None:
-                raise ValueError(f'friction_model is "{self.friction_model}": needs {name}')
-        assert self.friction_coulomb_n is not None
-        assert self.friction_static_n is not None
-        if self.friction_static_n < self.friction_coulomb_n:
+        sliding, static = self.friction_coulomb_n, self.friction_static_n
+        if sliding is None or static is None:
+            name = "friction_coulomb_n" if sliding is None else "friction_static_n"
+            raise ValueError(f'friction_model is "{self.friction_model}": needs {name}')
+        if static < sliding:
             raise ValueError(
-                f"friction_static_n is {toml(self.friction_static_n)}: must not be below "
-                f"friction_coulomb_n, {toml(self.friction_coulomb_n)} (unit: N)"
+                f"friction_static_n is {toml(static)}: must not be below friction_coulomb_n, {toml(sliding)} (unit: N)"
             )
         return self
-
-
-_MAX_MODES = 200  # identification finds 40 at most
 
 
 class FrequencyOver(InlineTable):
     """How the frequency of a mode depends on where an axis stands or on what the part weighs."""
 
-    axis: Literal["x", "y", "z"] | None = key("axis whose position counts", default=None)
-    position_mm: tuple[Float, ...] | None = key(
-        "positions of the axis, ascending, in the machine's coordinates", default=None
-    )
-    mass_kg: tuple[NonNegative, ...] | None = key("masses of the part, ascending", default=None)
-    frequency_hz: tuple[Annotated[Positive, Field(le=10_000)], ...] = key("natural frequencies, one per row")
-    damping_ratio: tuple[Annotated[NonNegative, Field(lt=1)], ...] | None = key(
-        "damping ratios, one per row", default=None
-    )
+    axis: Literal["x", "y", "z"] | None = optional("axis whose position counts")
+    position_mm: tuple[Float, ...] | None = optional("positions of the axis, ascending, in the machine's coordinates")
+    mass_kg: tuple[NonNegative, ...] | None = optional("masses of the part, ascending")
+    frequency_hz: tuple[_Hertz, ...] = key("natural frequencies, one per row")
+    damping_ratio: tuple[_Ratio, ...] | None = optional("damping ratios, one per row")
 
     @model_validator(mode="after")
     def _is_a_table(self) -> FrequencyOver:
@@ -170,48 +164,40 @@ class Direction(InlineTable):
 class AxisMode(TomlTable):
     """One vibration mode of an axis, excited by the motion of that axis."""
 
-    frequency_hz: Annotated[Positive, Field(le=10_000)] = key(
-        "natural frequency; from a tap test, or from the decay after a rapid stop"
-    )
-    damping_ratio: Annotated[NonNegative, Field(lt=1)] = key("damping ratio (1 = critically damped)")
+    frequency_hz: _Hertz = key("natural frequency; from a tap test, or from the decay after a rapid stop")
+    damping_ratio: _Ratio = key("damping ratio (1 = critically damped)")
     participation: Annotated[Positive, Field(le=1000)] = key(
         "share of this mode in the axis's deflection; several modes of one axis need not add up to 1",
         unit="1",
         default=1.0,
     )
-    excited_by: Direction | None = key(
+    excited_by: Direction | None = optional(
         "shares of the accelerations of X, Y and Z that excite this mode, { y = 1, z = 0.2 }; left out: that of its "
-        "axis alone, { y = 1 } under axes.y. A mode that several axes excite is listed under one of them only",
-        default=None,
+        "axis alone, { y = 1 } under axes.y. A mode that several axes excite is listed under one of them only"
     )
-    moves: Direction | None = key(
+    moves: Direction | None = optional(
         "what this mode moves at the tool against the part, as shares of its deflection: { y = 1, z = 0.3 } rocks the "
-        "tool by 0.3 mm in Z for every mm in Y; left out: its axis alone. participation counts for all of it",
-        default=None,
+        "tool by 0.3 mm in Z for every mm in Y; left out: its axis alone. participation counts for all of it"
     )
-    frequency_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
+    frequency_uncertainty_percent: _Percent | None = optional(
         "uncertainty of the frequency, up and down (position of the table, mass of the workpiece); left out: not "
-        "known. With no value, or up to 0.2 %, the shaper is designed for the nominal frequency only",
-        default=None,
+        "known. With no value, or up to 0.2 %, the shaper is designed for the nominal frequency only"
     )
-    damping_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
-        "uncertainty of the damping ratio, up and down, relative; left out: not known, and the ratio is taken as exact",
-        default=None,
+    damping_uncertainty_percent: _Percent | None = optional(
+        "uncertainty of the damping ratio, up and down, relative; left out: not known, and the ratio is taken as exact"
     )
-    mass_kg: Positive | None = key(
+    mass_kg: Positive | None = optional(
         "equivalent mass of this mode at the point that was tapped; its stiffness there is mass_kg * (2 pi "
-        "frequency_hz)^2. Shapers do not need it; left out: not measured",
-        default=None,
+        "frequency_hz)^2. Shapers do not need it; left out: not measured"
     )
-    mass_uncertainty_percent: NonNegative | None = key("uncertainty of the mass, up and down", default=None)
-    source: Text | None = key("where the values of this mode come from", default=None)
-    frequency_over: FrequencyOver | None = key(
+    mass_uncertainty_percent: NonNegative | None = optional("uncertainty of the mass, up and down")
+    source: Text | None = optional("where the values of this mode come from")
+    frequency_over: FrequencyOver | None = optional(
         'table of the frequency over the position of an axis, { axis = "z", position_mm = [0, 200, 400], '
         "frequency_hz = [52, 46, 41] }, or over the mass of the part, { mass_kg = [0, 300], frequency_hz = [46, 38] }; "
         "damping_ratio = [...] may follow. Linear between the rows, constant beyond them; positions are the machine's: "
         "program plus work offset and tool length. frequency_hz above stays the nominal value and lies within the "
-        "table",
-        default=None,
+        "table"
     )
 
     def excitation(self, axis: int) -> tuple[float, float, float]:
@@ -223,13 +209,9 @@ class AxisMode(TomlTable):
         return _along(axis) if self.moves is None else self.moves.as_tuple()
 
     @model_validator(mode="after")
-    def _uncertainty_of_a_mass(self) -> AxisMode:
+    def _has_a_mass_and_lies_in_its_table(self) -> AxisMode:
         if self.mass_uncertainty_percent is not None and self.mass_kg is None:
             raise ValueError("mass_uncertainty_percent is given, mass_kg is not")
-        return self
-
-    @model_validator(mode="after")
-    def _nominal_in_table(self) -> AxisMode:
         if self.frequency_over is not None:
             low, high = min(self.frequency_over.frequency_hz), max(self.frequency_over.frequency_hz)
             if not low <= self.frequency_hz <= high:
@@ -248,15 +230,13 @@ def _along(axis: int) -> tuple[float, float, float]:
 class Axis(TomlTable):
     """Limits of one axis; all three tables are required."""
 
-    max_feed_mm_per_min: Annotated[Positive, Field(ge=1, le=10_000_000)] = key(
-        "largest cutting feed of this axis", fanuc="1430"
-    )
-    rapid_mm_per_min: Annotated[Positive, Field(ge=1, le=10_000_000)] = key("rapid traverse (G00)", fanuc="1420")
+    max_feed_mm_per_min: _Speed = key("largest cutting feed of this axis", fanuc="1430")
+    rapid_mm_per_min: _Speed = key("rapid traverse (G00)", fanuc="1420")
     max_acceleration_mm_s2: Annotated[Positive, Field(ge=1, le=1_000_000)] = key(
         "largest acceleration while cutting", fanuc="1660"
     )
-    max_jerk_mm_s3: Annotated[Positive, Field(ge=10, le=10**10)] | None = key(
-        "largest jerk while cutting; left out: not limited", default=None
+    max_jerk_mm_s3: Annotated[Positive, Field(ge=10, le=10**10)] | None = optional(
+        "largest jerk while cutting; left out: not limited"
     )
     modes: Annotated[tuple[AxisMode, ...], Field(max_length=_MAX_MODES)] = key(
         "vibration modes, one table each; none: the axis is taken as rigid", default=()
@@ -266,8 +246,8 @@ class Axis(TomlTable):
         "not known; the axis is simulated as rigid, and every verdict says so",
         default=False,
     )
-    drive: Drive | None = key(
-        "feed drive, for the simulation with friction; left out: the axis follows its set-points exactly", default=None
+    drive: Drive | None = optional(
+        "feed drive, for the simulation with friction; left out: the axis follows its set-points exactly"
     )
 
     @model_validator(mode="after")

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, Strict, model_validator
 
 from shapegcode.io.data_file import toml_tables
+from shapegcode.machine.axes import optional
 from shapegcode.settings.keys import (
     AxisRatios,
     AxisTimes,
@@ -31,6 +32,11 @@ PLANNER_NAMES = {"fanuc": "FANUC", "linuxcnc": "LinuxCNC", "klipper": "Klipper",
 
 
 _NO_MEMORY_LIMIT = 4 * 10**9  # bytes
+
+Code = Annotated[int, Strict(), Field(ge=0, le=99_999_999)]
+Seconds = Annotated[NonNegative, Field(le=3600)]
+_Time = Annotated[NonNegative, Field(le=10)]
+_Decimals = Annotated[int, Strict(), Field(ge=0, le=6)]
 
 
 class LinuxcncPlanner(TomlTable):
@@ -118,13 +124,9 @@ class Controller(TomlTable):
         "word LinuxCNC's with kind = \"linuxcnc\", else FANUC's. A program with words of another control is refused",
         default="auto",
     )
-    linuxcnc: LinuxcncPlanner | None = key(
-        'settings of kind = "linuxcnc"; left out: the control\'s own defaults', default=None
-    )
-    klipper: KlipperPlanner | None = key(
-        'settings of kind = "klipper"; left out: the control\'s own defaults', default=None
-    )
-    grbl: GrblPlanner | None = key('settings of kind = "grbl"; left out: the control\'s own defaults', default=None)
+    linuxcnc: LinuxcncPlanner | None = optional('settings of kind = "linuxcnc"; left out: the control\'s own defaults')
+    klipper: KlipperPlanner | None = optional('settings of kind = "klipper"; left out: the control\'s own defaults')
+    grbl: GrblPlanner | None = optional('settings of kind = "grbl"; left out: the control\'s own defaults')
     interpolation_period_s: Annotated[Positive, Field(ge=1e-5, le=0.1)] = key(
         "time between two set-points", assumed=0.001
     )
@@ -147,13 +149,13 @@ class Controller(TomlTable):
         '"jerk_limited": by the acceleration and jerk of the axes',
         assumed="constant_time",
     )
-    time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
+    time_constant_s: _Time = key(
         "duration of a speed change (look-ahead, constant time), or length of the moving average or time constant "
         "of the exponential (after interpolation)",
         fanuc="1622, 1771",
         assumed=0.05,
     )
-    bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
+    bell_time_s: _Time = key(
         "time over which the acceleration itself is built up; length of the second moving average; 0: none",
         fanuc="1772",
         assumed=0.0,
@@ -164,7 +166,7 @@ class Controller(TomlTable):
         fanuc="1610#0, #1",
         assumed="linear",
     )
-    look_ahead_filter_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
+    look_ahead_filter_time_constant_s: _Time = key(
         "length of the moving average after interpolation in look-ahead mode; 0: none", fanuc="1769", assumed=0.0
     )
     corner_rule: Literal["speed_difference", "junction_deviation", "stops"] = key(
@@ -183,26 +185,23 @@ class Controller(TomlTable):
     centripetal_acceleration_mm_s2: Positive = key(
         "largest acceleration across the path in arcs; it limits the feed there", fanuc="1735", assumed=1000.0
     )
-    polyline_acceleration_mm_s2: Positive | None = key(
+    polyline_acceleration_mm_s2: Positive | None = optional(
         "the same along polylines, where two lines meet; left out: as in arcs, under another corner_rule than "
-        '"speed_difference" not limited',
-        default=None,
+        '"speed_difference" not limited'
     )
-    junction_deviation_mm: Annotated[Positive, Field(le=10)] | None = key(
-        'deviation at a corner, run at the acceleration of the axes; corner_rule = "junction_deviation" needs it',
-        default=None,
+    junction_deviation_mm: Annotated[Positive, Field(le=10)] | None = optional(
+        'deviation at a corner, run at the acceleration of the axes; corner_rule = "junction_deviation" needs it'
     )
-    corner_stop_angle_deg: Annotated[Positive, Field(le=180)] | None = key(
-        'least turn of a corner that is a stop; corner_rule = "stops" needs it', default=None
+    corner_stop_angle_deg: Annotated[Positive, Field(le=180)] | None = optional(
+        'least turn of a corner that is a stop; corner_rule = "stops" needs it'
     )
     look_ahead_block_time_s: Annotated[NonNegative, Field(le=1)] = key(
         "look-ahead runs no block off faster than it reads one; 0: not limited", default=0.0
     )
-    contour_acceleration_mm_s2: PositiveAxisValues | None = key(
+    contour_acceleration_mm_s2: PositiveAxisValues | None = optional(
         "largest acceleration of an axis along a contour, corners and curves alike; left out: not limited. One "
         "number, or x, y, z",
         fanuc="1737",
-        default=None,
     )
     rapid_path: Literal["linear", "non_linear"] = key(
         '"linear": a rapid goes straight; "non_linear": each axis travels at its own speed',
@@ -212,7 +211,7 @@ class Controller(TomlTable):
     rapid_time_constant_s: AxisTimes = key(
         "time in which a rapid reaches its speed. One number, or x, y, z", fanuc="1620, 1773", assumed=0.15
     )
-    rapid_bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
+    rapid_bell_time_s: _Time = key(
         "time over which the acceleration of a rapid is built up; 0: none", fanuc="1621, 1774", assumed=0.0
     )
     in_position_s: AxisValues = key(
@@ -238,13 +237,13 @@ class Controller(TomlTable):
         fanuc="2005#1, 2068, 2092",
         assumed=0.0,
     )
-    shaped_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
+    shaped_time_constant_s: _Time = key(
         "length of the controller's own moving average after interpolation while a shaped program runs (it "
         "smooths the shaped blocks once more); 0: off",
         fanuc="1622, 1769",
         assumed=0.0,
     )
-    shaped_bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
+    shaped_bell_time_s: _Time = key(
         "length of its second moving average, where it builds up the acceleration as a bell; 0: none",
         fanuc="1622 with 1610#1",
         assumed=0.0,
@@ -282,14 +281,10 @@ class Controller(TomlTable):
         fanuc="3401#0",
         default=False,
     )
-    feed_decimals_mm: Annotated[int, Strict(), Field(ge=0, le=6)] = key(
-        "decimals of an F word in mm/min", unit="digits", assumed=1
-    )
-    feed_decimals_inch: Annotated[int, Strict(), Field(ge=0, le=6)] = key(
-        "decimals of an F word in inch/min", unit="digits", assumed=2
-    )
+    feed_decimals_mm: _Decimals = key("decimals of an F word in mm/min", unit="digits", assumed=1)
+    feed_decimals_inch: _Decimals = key("decimals of an F word in inch/min", unit="digits", assumed=2)
     minimum_feed_mm_per_min: Positive = key("smallest feed written in a block", assumed=1.0)
-    no_buffer_m_codes: tuple[Annotated[int, Strict(), Field(ge=0, le=99_999_999)], ...] = key(
+    no_buffer_m_codes: tuple[Code, ...] = key(
         "M codes at which the controller stops reading ahead, besides M00, M01, M02 and M30",
         fanuc="3411-3432",
         default=(),
@@ -340,13 +335,9 @@ class Controller(TomlTable):
         return data
 
     @model_validator(mode="after")
-    def _reads_whole_units(self) -> Self:
+    def _reads_whole_units_and_has_its_rule(self) -> Self:
         if self.kind != "fanuc" and not self.calculator_decimal_point:
             raise ValueError(f'calculator_decimal_point = false: with kind = "{self.kind}" X10 is 10 mm or inch')
-        return self
-
-    @model_validator(mode="after")
-    def _has_its_rule(self) -> Self:
         needed = {"junction_deviation": "junction_deviation_mm", "stops": "corner_stop_angle_deg"}.get(self.corner_rule)
         if needed is not None and getattr(self, needed) is None:
             raise ValueError(f'corner_rule = "{self.corner_rule}" needs {needed}')
@@ -385,24 +376,21 @@ class FeedControl(TomlTable):
         "shorter. A test cut with feeds that change every 0.2, 0.4 and 0.6 mm shows it (paper 001, figure 8)",
         assumed=0.6,
     )
-    max_change_mm_per_min: Positive | None = key(
-        "largest change of the feed from one block to the next; left out: not limited", default=None
+    max_change_mm_per_min: Positive | None = optional(
+        "largest change of the feed from one block to the next; left out: not limited"
     )
-    spindle_power_w: Positive | None = key(
-        "power that the spindle gives for as long as it takes; left out: not limited", default=None
+    spindle_power_w: Positive | None = optional(
+        "power that the spindle gives for as long as it takes; left out: not limited"
     )
-    spindle_torque_nm: Positive | None = key(
-        "torque that the spindle gives for as long as it takes; left out: not limited", default=None
+    spindle_torque_nm: Positive | None = optional(
+        "torque that the spindle gives for as long as it takes; left out: not limited"
     )
-
-
-Seconds = Annotated[NonNegative, Field(le=3600)]
 
 
 class MCodeTimes(InlineTable):
     """Times of single M codes."""
 
-    code: tuple[Annotated[int, Strict(), Field(ge=0, le=99_999_999)], ...] = key("M codes")
+    code: tuple[Code, ...] = key("M codes")
     s: tuple[Seconds, ...] = key("their times", unit="s")
 
     @model_validator(mode="after")
@@ -482,26 +470,23 @@ class Times(TomlTable):
     rapid_override_percent: Annotated[Positive, Field(le=200)] = key("the same of rapids", assumed=100.0)
     tool_change_s: Seconds = key("an M06", assumed=0.0)
     m_function_s: Seconds = key("any other M code that m_codes does not name", assumed=0.0)
-    m_codes: MCodeTimes | None = key(
-        "M codes with a time of their own, { code = [1, 8], s = [0.3, 5.1] }; left out: none", default=None
+    m_codes: MCodeTimes | None = optional(
+        "M codes with a time of their own, { code = [1, 8], s = [0.3, 5.1] }; left out: none"
     )
-    spindle_start: SpindleTimes | None = key(
+    spindle_start: SpindleTimes | None = optional(
         "time in which the spindle comes from rest to a speed, { rpm = [5000, 12000], s = [1.0, 7.3] }; it elapses "
-        "while the axes move; the control waits for the remainder before the next M code or cut; left out: none",
-        default=None,
+        "while the axes move; the control waits for the remainder before the next M code or cut; left out: none"
     )
-    spindle_stop: SpindleTimes | None = key(
-        "likewise to rest after M05; M00, M01, M02, M30, M06 and the next M03 wait for the remainder; left out: none",
-        default=None,
+    spindle_stop: SpindleTimes | None = optional(
+        "likewise to rest after M05; M00, M01, M02, M30, M06 and the next M03 wait for the remainder; left out: none"
     )
     unknown_move_s: AxisTimes = key(
         "a rapid of an axis of which the program does not give start or end: G28, G30, G53, and the first one "
         "behind them or behind M06. One number, or x, y, z",
         assumed=0.0,
     )
-    scatter: TimeScatter | None = key(
+    scatter: TimeScatter | None = optional(
         "what calibrated times scatter by, { cuts_percent = 1.1, between_cuts_s = 0.2, runs_percent = 0.3 }; `time` "
-        "gives a 95 % interval where it is stated; left out: none",
-        default=None,
+        "gives a 95 % interval where it is stated; left out: none"
     )
     open: tuple[OpenTime, ...] = key("what run logs leave open of the calibrated parameters", default=())

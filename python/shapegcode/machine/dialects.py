@@ -10,8 +10,7 @@ from functools import cache
 from importlib import resources
 from typing import Any, Literal
 
-CODE = re.compile(r"[GM]\d+(?:\.\d)?")
-"""A code of a program, as it is written."""
+CODE = re.compile(r"[GM]\d+(?:\.\d)?")  # a code of a program, as it is written
 
 DialectName = Literal["fanuc", "haas", "mitsubishi", "siemens", "linuxcnc", "klipper", "isg"]
 

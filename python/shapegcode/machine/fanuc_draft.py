@@ -115,11 +115,9 @@ def take_modes(draft: Draft, base: Machine | None, keep: str, rigid: str) -> Non
             draft.remarks[f"{key}.rigid"] = "decided when the dump was imported"
             continue
         found = ", ".join(f"{mode.frequency_hz:g} Hz" for mode in modes)
-        whose = (
-            f"; {found} of {base.name} are not taken over: --keep-modes {axis.upper()} does" if base and found else ""
-        )
+        kept = f"--keep-modes {axis.upper()} does"
+        whose = f"; {found} of {base.name} are not taken over: {kept}" if base and found else ""
         draft.remarks[f"{key}.modes"] = "not measured"
         draft.remarks[f"{key}.rigid"] = "assumed: not measured"
-        draft.miss(
-            "", f"{key}.modes: no dump holds them{whose}; identify finds them; --rigid {axis.upper()}: it has none"
-        )
+        none = f"--rigid {axis.upper()}: it has none"
+        draft.miss("", f"{key}.modes: no dump holds them{whose}; identify finds them; {none}")

@@ -65,7 +65,14 @@ def import_parameters(
     draft = Draft(read_dump(data, file, fanuc_motion.NUMBERS | fanuc_program.NUMBERS), _started(base, name, file))
     take_program(draft)
     take_motion(draft)
-    take_tables(draft, _read_tables(tables))
+    read = ControlTables()
+    for path in tables:
+        content = read_file(path, _MAX_DUMP_BYTES)
+        if not is_table(content):
+            message = "no table of offsets or variables (G10L10P1R..., G10L2P1X..., G10L85P500(...), #500=...)"
+            raise MachineError(str(path), (Problem("", "", message),))
+        read_table(content, Path(path).name, read)
+    take_tables(draft, read)
     take_modes(draft, base, keep_modes, rigid)
     _list_missing(draft)
     if draft.values.problems:
@@ -103,17 +110,6 @@ def _started(base: Machine | None, name: str | None, file: str) -> dict[str, Any
     return data
 
 
-def _read_tables(files: Sequence[str | Path]) -> ControlTables:
-    tables = ControlTables()
-    for path in files:
-        data = read_file(path, _MAX_DUMP_BYTES)
-        if not is_table(data):
-            message = "no table of offsets or variables (G10L10P1R..., G10L2P1X..., G10L85P500(...), #500=...)"
-            raise MachineError(str(path), (Problem("", "", message),))
-        read_table(data, Path(path).name, tables)
-    return tables
-
-
 def _list_missing(draft: Draft) -> None:
     for number, line in draft.dump.repeated:
         draft.miss(number, "given again (another path): the first one counts", line)
@@ -148,8 +144,8 @@ def _remark_the_rest(draft: Draft, machine: Machine, base: Machine | None) -> No
             draft.remarks[value.key] = inherited(base.name, base.remarks.get(value.key, ""))
 
 
-def _assume_limits(draft: Draft) -> None:
-    """Limits of acceleration and feed for a control without such parameters, from its time constants."""
+def _require_limits(draft: Draft, file: str) -> None:
+    """Limits of the axes; those of acceleration and feed that a control has no parameter for, from time constants."""
     ramp_s = draft.get("controller.time_constant_s")
     for axis in "xyz":
         feed_key, acceleration_key = f"axes.{axis}.max_feed_mm_per_min", f"axes.{axis}.max_acceleration_mm_s2"
@@ -161,9 +157,6 @@ def _assume_limits(draft: Draft) -> None:
             why = "no 1660: acceleration for the largest cutting feed with the time constant after interpolation"
             draft.assume_key(acceleration_key, round(feed / 60.0 / ramp_s, 3), why)
 
-
-def _require_limits(draft: Draft, file: str) -> None:
-    _assume_limits(draft)
     needed = {"max_feed_mm_per_min": "1430", "rapid_mm_per_min": "1420", "max_acceleration_mm_s2": "1660"}
     problems = [
         Problem(f"axes.{axis}.{name}", "", f"not in the dump (parameter {number}); --from MACHINE gives it")

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import math
 
+from shapegcode.io.units import MM_PER_INCH
 from shapegcode.machine.fanuc_draft import Draft
 from shapegcode.machine.fanuc_dump import LONGEST_MS, ControlTables
-from shapegcode.machine.fanuc_program import inch_factor, increment_um, shifted
+from shapegcode.machine.fanuc_program import increment_um, shifted
 from shapegcode.machine.result import ReadTable
 
 _LAW = (1401, 1420, 1422, 1430, 1432, 1602, 1603, 1604, 1610, 1620, 1621, 1622, 1623, 1660, 1730, 1731, 1732)
 _AHEAD = (1735, 1737, 1769, 1770, 1771, 1772, 1773, 1774, 1783)
-NUMBERS = frozenset((*_LAW, *_AHEAD, 1820, 1825, 1826, 2005, 2068, 2092))
-"""Parameters that are read here."""
+NUMBERS = frozenset((*_LAW, *_AHEAD, 1820, 1825, 1826, 2005, 2068, 2092))  # parameters that are read here
 
 
 def take_motion(draft: Draft) -> None:
@@ -128,13 +128,11 @@ def _after_interpolation(draft: Draft) -> None:
 
 def _shaped_filter(draft: Draft) -> None:
     """With the look-ahead off, all cutting blocks pass the filter of 1622."""
-    found = _after_interpolation_s(draft)
-    if found is None:
-        if draft.get("controller.shaped_time_constant_s") is None:
-            why = "no 1622: whether a filter after interpolation acts on shaped programs is not known"
-            draft.assume_key("controller.shaped_time_constant_s", 0.0, why)
-        return
-    _set_filter(draft, found, "shaped_time_constant_s", "shaped_bell_time_s", "shaped_filter_shape")
+    if found := _after_interpolation_s(draft):
+        _set_filter(draft, found, "shaped_time_constant_s", "shaped_bell_time_s", "shaped_filter_shape")
+    elif draft.get("controller.shaped_time_constant_s") is None:
+        why = "no 1622: whether a filter after interpolation acts on shaped programs is not known"
+        draft.assume_key("controller.shaped_time_constant_s", 0.0, why)
 
 
 def _set_filter(draft: Draft, found: tuple[float, float, str, str], *names: str) -> None:
@@ -266,7 +264,9 @@ def _tools(draft: Draft, tables: ControlTables) -> None:
 
 def _mm(draft: Draft, value: float, point: bool) -> float:
     """A value of a table: with a point in mm, or inch where that is the setting; without one in least increments."""
-    return value * (inch_factor(draft) if point else increment_um(draft)[0] / 1000)
+    if not point:
+        return value * (increment_um(draft)[0] / 1000)
+    return value * (MM_PER_INCH if draft.values.bit(0, 2) else 1.0)
 
 
 def _systems(draft: Draft, tables: ControlTables) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from shapegcode.io.units import MM_PER_INCH
 from shapegcode.machine.fanuc_draft import Draft
 
 _SERIAL = {0: 103, 1: 113, 2: 123, 3: 133}
@@ -179,8 +178,3 @@ def _serial_line(draft: Draft) -> None:
         draft.miss(number, f"{speed:g}: no transfer speed has this code (0 to {len(_BAUD) - 1})")
     elif speed:
         draft.set("controller.dnc_baud", _BAUD[int(speed)], 20, number)
-
-
-def inch_factor(draft: Draft) -> float:
-    """What values without a unit of their own are multiplied by to be mm: the setting may be inch input (0000#2)."""
-    return MM_PER_INCH if draft.values.bit(0, 2) else 1.0

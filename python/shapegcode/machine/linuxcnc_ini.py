@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,11 @@ from shapegcode.settings.keys import toml
 
 _MAX_BYTES = 1 << 20
 _PLANNER = {
-    "ARC_BLEND_RAMP_FREQ": ("ramp_frequency_hz", float), "ARC_BLEND_KINK_RATIO": ("kink_ratio", float),
-    "ARC_BLEND_OPTIMIZATION_DEPTH": ("optimization_depth", int),
-}  # fmt: skip
+    ("TRAJ", "ARC_BLEND_RAMP_FREQ"): ("ramp_frequency_hz", float),
+    ("TRAJ", "ARC_BLEND_KINK_RATIO"): ("kink_ratio", float),
+    ("TRAJ", "ARC_BLEND_OPTIMIZATION_DEPTH"): ("optimization_depth", int),
+    ("DISPLAY", "MAX_FEED_OVERRIDE"): ("max_feed_override", float),
+}
 
 
 @dataclass(frozen=True)
@@ -38,8 +40,8 @@ class _Ini:
         self.entries = ini_entries(text)
         self.problems: list[Problem] = []
 
-    def number(self, section: str, name: str, *, least: float = 0.0) -> float | None:
-        """A number above a limit; None where there is none, and where it is none, which is then a problem."""
+    def number(self, section: str, name: str) -> float | None:
+        """A number above 0; None where there is none, and where it is none, which is then a problem."""
         text, line = self.entries.get((section, name), ("", 0))
         if not line:
             return None
@@ -47,15 +49,12 @@ class _Ini:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not least < value < math.inf:
-            self.problems.append(
-                Problem(f"[{section}] {name}", toml(text), f"must be a number greater than {least:g}", line)
-            )
-            return None
-        return value
+        if 0.0 < value < math.inf:
+            return value
+        self.problems.append(Problem(f"[{section}] {name}", toml(text), "must be a number greater than 0", line))
+        return None
 
     def origin(self, section: str, name: str) -> str:
-        """Where a value comes from, for the machine file."""
         return f"parameters: {Path(self.file).name} line {self.entries[section, name][1]}: [{section}] {name}"
 
 
@@ -73,14 +72,14 @@ def read_ini(file: str | Path, *, name: str | None = None) -> IniMachine:
     if ini.problems:
         raise MachineError(str(file), tuple(ini.problems))
     own = name or ini.entries.get(("EMC", "MACHINE"), (Path(file).stem, 0))[0]
-    data: Mapping[str, Any] = {
+    data: dict[str, Any] = {
         "name": "".join(c for c in own if " " <= c <= "~")[:60] or "machine",
         "description": f"read from {Path(file).name}",
         "axes": axes, "controller": controller, "emission": {"dialect": "linuxcnc"},
     }  # fmt: skip
     if unit_mm != 1.0:  # of the tool table
-        data = {**data, "input": {"machine_unit": "inch"}}
-    machine = Machine.from_data(dict(data), str(file)).with_remarks(remarks)
+        data["input"] = {"machine_unit": "inch"}
+    machine = Machine.from_data(data, str(file)).with_remarks(remarks)
     return IniMachine(machine, len(remarks), tuple(_notes(ini)))
 
 
@@ -94,10 +93,8 @@ def _axes(ini: _Ini, unit_mm: float) -> tuple[dict[str, dict[str, float]], dict[
             ("VELOCITY", ("max_feed_mm_per_min", "rapid_mm_per_min"), 60.0),
             ("ACCELERATION", ("max_acceleration_mm_s2",), 1.0),
         ):
-            places = [
-                (f"AXIS_{axis.upper()}", f"MAX_{word}"), (f"JOINT_{number}", f"MAX_{word}"),
-                ("TRAJ", f"MAX_LINEAR_{word}"),
-            ]  # fmt: skip
+            own = f"MAX_{word}"
+            places = [(f"AXIS_{axis.upper()}", own), (f"JOINT_{number}", own), ("TRAJ", f"MAX_LINEAR_{word}")]
             found = [(value, place) for place in places if (value := ini.number(*place)) is not None]
             if not found:
                 needed = f"[AXIS_{axis.upper()}] MAX_{word}"
@@ -120,13 +117,10 @@ def _controller(ini: _Ini, remarks: dict[str, str]) -> Iterator[tuple[str, Any]]
         yield "interpolation_period_s", round(period_ns * 1e-9, 12)
         remarks["controller.interpolation_period_s"] = ini.origin("EMCMOT", "SERVO_PERIOD")
     planner: dict[str, float] = {}
-    for name, (key, kind) in _PLANNER.items():
-        if (value := ini.number("TRAJ", name)) is not None:
+    for place, (key, kind) in _PLANNER.items():
+        if (value := ini.number(*place)) is not None:
             planner[key] = min(kind(value), 1) if key == "kink_ratio" else kind(value)
-            remarks[f"controller.linuxcnc.{key}"] = ini.origin("TRAJ", name)
-    if (override := ini.number("DISPLAY", "MAX_FEED_OVERRIDE")) is not None:
-        planner["max_feed_override"] = override
-        remarks["controller.linuxcnc.max_feed_override"] = ini.origin("DISPLAY", "MAX_FEED_OVERRIDE")
+            remarks[f"controller.linuxcnc.{key}"] = ini.origin(*place)
     yield "linuxcnc", planner
 
 

@@ -49,6 +49,7 @@ from shapegcode.settings.load import (
 
 _ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
 _VARIABLE = re.compile(r"#\d+")
+_LOCK_LINES = ("lock_lines", "unlock_lines")
 _USUAL_DIAL_PERCENT = (70.0, 120.0)  # as far as operators turn it without thinking
 
 
@@ -79,45 +80,30 @@ class Machine(TomlTable):
         tick = self.controller.interpolation_period_s
         ratio = period / tick
         if round(ratio) < 1 or not math.isclose(ratio, round(ratio), rel_tol=0, abs_tol=1e-6):
-            raise KeyProblem(
-                "emission.block_period_s",
-                period,
-                f"must be a whole multiple of controller.interpolation_period_s = {toml(tick)}",
-            )
+            limit = f"must be a whole multiple of controller.interpolation_period_s = {toml(tick)}"
+            raise KeyProblem("emission.block_period_s", period, limit)
         shortest = self.controller.block_time_s
         if period < shortest * (1 - 1e-9):
-            raise KeyProblem(
-                "emission.block_period_s", period, f"must not be below controller.block_time_s = {toml(shortest)}"
-            )
+            limit = f"must not be below controller.block_time_s = {toml(shortest)}"
+            raise KeyProblem("emission.block_period_s", period, limit)
         return self
 
     @model_validator(mode="after")
     def _dialect_runs_the_blocks(self) -> Machine:
-        own = dialect_of(self.emission.dialect)
-        shortest = own.least_block_s if own is not None else None
-        if own is not None and shortest is not None and self.controller.block_time_s < shortest * (1 - 1e-9):
-            raise KeyProblem(
-                "controller.block_time_s",
-                self.controller.block_time_s,
-                f"must not be below {toml(shortest)} with emission.dialect = {toml(self.emission.dialect)}: "
-                f"{own.facts['shortest block'].text}",
-            )
-        emission = self.emission
-        written = {
-            "prologue": emission.prologue,
-            "epilogue": emission.epilogue,
-            "lock_lines": emission.locking,
-            "unlock_lines": emission.unlocking,
-        }
-        for name, lines in written.items():
+        emission, given_s = self.emission, self.controller.block_time_s
+        own, dialect = dialect_of(emission.dialect), f"emission.dialect = {toml(emission.dialect)}"
+        if own is None:
+            return self
+        shortest = own.least_block_s
+        if shortest is not None and given_s < shortest * (1 - 1e-9):
+            limit = f"must not be below {toml(shortest)} with {dialect}: {own.facts['shortest block'].text}"
+            raise KeyProblem("controller.block_time_s", given_s, limit)
+        for name, lines in zip(("prologue", "epilogue", *_LOCK_LINES), emission.around_cuts.values(), strict=True):
             for code in map(code_name, CODE.findall(" ".join(lines))):
-                if own is not None and code in own.means:
-                    raise KeyProblem(
-                        f"emission.{name}",
-                        list(lines),
-                        f"{code} is {fanuc_meaning(code)} on FANUC, and {own.means[code]} on {own.control}: "
-                        f"these lines are written for emission.dialect = {toml(self.emission.dialect)}",
-                    )
+                if code in own.means:
+                    meanings = f"{fanuc_meaning(code)} on FANUC, and {own.means[code]} on {own.control}"
+                    limit = f"{code} is {meanings}: these lines are written for {dialect}"
+                    raise KeyProblem(f"emission.{name}", list(lines), limit)
         return self
 
     @model_validator(mode="after")
@@ -125,11 +111,9 @@ class Machine(TomlTable):
         for index, (letter, axis) in enumerate(zip("xyz", self.axes.as_tuple(), strict=True)):
             for number, mode in enumerate(axis.modes, start=1):
                 if not mode.excitation(index)[index]:
-                    raise KeyProblem(
-                        f"axes.{letter}.modes.{number}.excited_by",
-                        mode.excited_by.model_dump() if mode.excited_by else {},
-                        f"must have a share of {letter}: a mode is listed under an axis that excites it",
-                    )
+                    shares = mode.excited_by.model_dump() if mode.excited_by else {}
+                    limit = f"must have a share of {letter}: a mode is listed under an axis that excites it"
+                    raise KeyProblem(f"axes.{letter}.modes.{number}.excited_by", shares, limit)
         return self
 
     @model_validator(mode="after")
@@ -139,19 +123,17 @@ class Machine(TomlTable):
             return self
         own = dialect_of(emission.dialect)
         if own is None or not own.lock_word:
-            for name, lines in (("lock_lines", emission.locking), ("unlock_lines", emission.unlocking)):
+            for name, lines in zip(_LOCK_LINES, (emission.locking, emission.unlocking), strict=True):
                 if not lines:
                     none = f": no word that switches the feed override of {own.control} off is known" if own else ""
-                    raise KeyProblem(
-                        f"emission.{name}", [], f'must say something with emission.override = "lock"{none}'
-                    )
+                    limit = f'must say something with emission.override = "lock"{none}'
+                    raise KeyProblem(f"emission.{name}", [], limit)
         variables = set(_VARIABLE.findall(" ".join((*emission.locking, *emission.unlocking))))
         kept = variables - {"#3003", "#3004"}
         for name, lines in (("prologue", emission.prologue), ("epilogue", emission.epilogue)):
             if used := kept & set(_VARIABLE.findall(" ".join(lines))):
-                raise KeyProblem(
-                    f"emission.{name}", list(lines), f"uses {min(used)}, in which emission.lock_lines keep the switch"
-                )
+                limit = f"uses {min(used)}, in which emission.lock_lines keep the switch"
+                raise KeyProblem(f"emission.{name}", list(lines), limit)
         if variables and self.shaping.rapids:
             raise KeyProblem(
                 "shaping.rapids",
@@ -174,11 +156,8 @@ class Machine(TomlTable):
         if self.shaping.planner == "optimal" and self.controller.kind == "fanuc":
             missing = [f"axes.{a}.max_jerk_mm_s3" for a in "xyz" if getattr(self.axes, a).max_jerk_mm_s3 is None]
             if missing:
-                raise KeyProblem(
-                    "shaping.planner",
-                    "optimal",
-                    f'needs {", ".join(missing)}: state the largest jerk of each axis, or use "look-ahead"',
-                )
+                limit = f'needs {", ".join(missing)}: state the largest jerk of each axis, or use "look-ahead"'
+                raise KeyProblem("shaping.planner", "optimal", limit)
         return self
 
     _remarks: dict[str, str] = PrivateAttr(default_factory=dict)
@@ -186,9 +165,7 @@ class Machine(TomlTable):
 
     def __eq__(self, other: object) -> bool:
         """Whether the values are the same, wherever they come from."""
-        if not isinstance(other, Machine):
-            return NotImplemented
-        return self.__dict__ == other.__dict__
+        return self.__dict__ == other.__dict__ if isinstance(other, Machine) else NotImplemented
 
     def __hash__(self) -> int:
         """By the name: equal machines have the same one."""
@@ -271,9 +248,8 @@ class Machine(TomlTable):
             return cls.from_toml(cls.builtin_text(path_or_name), path_or_name)
         path = Path(path_or_name)
         if not path.suffix and path.name == str(path_or_name) and not path.exists():
-            names = ", ".join(cls.builtin_names())
-            problem = Problem("", "", f"no such file and no built-in machine; built in: {names}")
-            raise MachineError(str(path), (problem,))
+            limit = f"no such file and no built-in machine; built in: {', '.join(cls.builtin_names())}"
+            raise MachineError(str(path), (Problem("", "", limit),))
         return cls.from_toml(read_text(path, MachineError), str(path))
 
     @classmethod
@@ -393,10 +369,8 @@ class Machine(TomlTable):
     @staticmethod
     def builtin_names() -> tuple[str, ...]:
         """Names of the machines that come with shapegcode, sorted."""
-        folder = resources.files("shapegcode") / "data"
-        return tuple(
-            sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
-        )
+        names = (entry.name for entry in (resources.files("shapegcode") / "data").iterdir())
+        return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
 
     @classmethod
     def builtin_text(cls, name: str) -> str:

@@ -4,32 +4,35 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
+from shapegcode.machine.axes import optional
 from shapegcode.machine.dialects import DialectName, code_name, dialect_of
 from shapegcode.settings.keys import Bool, Float, NonNegative, Positive, Text, TomlTable, key, toml
 
-_OFFSET_NAME = re.compile(r"G5[4-9]|G54\.1P[1-9][0-9]{0,2}")
 
-
-def _named(pattern: str, wrong: str) -> AfterValidator:
+def _named(pattern: str, wrong: str, shown: Callable[[str], str] = json.dumps) -> AfterValidator:
     """Refuse a table with a name that does not have the form."""
 
     def check(table: dict[str, Any]) -> dict[str, Any]:
         for name in table:
             if not re.fullmatch(pattern, name):
-                raise ValueError(f"{json.dumps(name)} {wrong}")
+                raise ValueError(f"{shown(name)} {wrong}")
         return table
 
     return AfterValidator(check)
 
 
+_OFFSETS = _named(
+    r"G5[4-9]|G54\.1P[1-9][0-9]{0,2}", 'is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"', str
+)
 _NUMBERED = _named("[1-9][0-9]{0,7}", 'is no number; names are whole numbers, for example "1"')
 _G_CODED = _named(r"[1-9][0-9]{0,3}(\.[1-9])?", 'is no G code; names are for example "120" or "120.1"')
 _RETAINED = _named("[5-9][0-9]{2}", 'is no variable that the control keeps: "500" ... "999"')
+_Whole = Annotated[int, Strict(), Field(ge=0)]
 _Lengths = Annotated[dict[str, Float], _NUMBERED]
 _Programs = dict[str, Annotated[int, Strict(), Field(ge=1, le=99_999_999)]]
 
@@ -49,7 +52,7 @@ class Input(TomlTable):
         "axes whose position is not known after M06, until they are programmed again; letters of XYZ in this order",
         assumed="XYZ",
     )
-    work_offsets: dict[str, tuple[Float, Float, Float]] = key(
+    work_offsets: Annotated[dict[str, tuple[Float, Float, Float]], _OFFSETS] = key(
         'work offsets, for programs that use more than one: G54 = [x, y, z]; "G54.1P5" = [x, y, z]; one that '
         "is left out is zero",
         unit="mm",
@@ -83,11 +86,10 @@ class Input(TomlTable):
     compensation_start_up: Literal["A", "B"] = key(
         "kind of the start-up and cancel moves of cutter compensation", fanuc="5003#0, #1", assumed="A"
     )
-    material_side: Literal["left", "right"] | None = key(
+    material_side: Literal["left", "right"] | None = optional(
         "side of the programmed tool path on which the workpiece lies, seen along the travel: right where the contour "
         "is cut as with G41, left as with G42; with it deviations are reported as gouge and excess; left out: not "
-        "known",
-        default=None,
+        "known"
     )
     scale_unit: Annotated[Positive, Field(le=1)] = key(
         "unit of the factors P, I, J, K of scaling G51 without a decimal point", unit="1", fanuc="5400#7", assumed=0.001
@@ -111,7 +113,7 @@ class Input(TomlTable):
         "the folder of the calling file comes first",
         default=(),
     )
-    opaque_programs: tuple[Annotated[int, Strict(), Field(ge=0)], Annotated[int, Strict(), Field(ge=0)]] = key(
+    opaque_programs: tuple[_Whole, _Whole] = key(
         "first and last O number of programs of the machine builder or of a probe: a call of one that is not available "
         "is left unchanged, and position and variables are unknown after it; outside of this range a missing program "
         "is an error",
@@ -132,14 +134,6 @@ class Input(TomlTable):
     max_line_length: Annotated[int, Strict(), Field(ge=20, le=100_000)] = key(
         "a longer line is an error", unit="characters", assumed=250
     )
-
-    @field_validator("work_offsets")
-    @classmethod
-    def _known_offsets(cls, offsets: dict[str, Any]) -> dict[str, Any]:
-        for name in offsets:
-            if not _OFFSET_NAME.fullmatch(name):
-                raise ValueError(f'{name} is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"')
-        return offsets
 
 
 _BLOCK_CHARACTERS = re.compile(r"[A-Z0-9 .,+\-*/=#\[\]()<>_:;&]*")
@@ -167,16 +161,14 @@ class Emission(TomlTable):
         "a control",
         default="constant",
     )
-    decimals: Annotated[int, Strict(), Field(ge=2, le=6)] | None = key(
+    decimals: Annotated[int, Strict(), Field(ge=2, le=6)] | None = optional(
         "decimals of positions in mm in shaped blocks, one more in inch; left out: those of the dialect, else those of "
         "controller.least_increment_mm",
         unit="digits",
-        default=None,
     )
-    block_period_s: Annotated[Positive, Field(le=1)] | None = key(
+    block_period_s: Annotated[Positive, Field(le=1)] | None = optional(
         "duration of a short block: a whole multiple of controller.interpolation_period_s and not below "
-        "controller.block_time_s; left out: chosen for the shortest shaper",
-        default=None,
+        "controller.block_time_s; left out: chosen for the shortest shaper"
     )
     prologue: tuple[Text, ...] = key(
         'lines written before each shaped cut, for example ["G05.1 Q0"] to switch a look-ahead mode off', default=()
@@ -271,17 +263,11 @@ class Emission(TomlTable):
         return lines
 
     @model_validator(mode="after")
-    def _lines_fit(self) -> Emission:
+    def _fits_its_lines_and_dialect(self) -> Emission:
         for line in (*self.prologue, *self.epilogue, *self.lock_lines, *self.unlock_lines):
             if len(line) > self.max_line_length:
-                raise ValueError(
-                    f"the line {json.dumps(line)} has {len(line)} characters, emission.max_line_length is "
-                    f"{self.max_line_length}"
-                )
-        return self
-
-    @model_validator(mode="after")
-    def _has_another_dialect(self) -> Emission:
+                limit = f"emission.max_line_length is {self.max_line_length}"
+                raise ValueError(f"the line {json.dumps(line)} has {len(line)} characters, {limit}")
         for name, stated in (("words", self.words), ("decimals", self.decimals)):
             if stated and self.dialect == "fanuc":
                 raise ValueError(f"{name} counts only where emission.dialect is another one than fanuc")
@@ -295,18 +281,18 @@ class Emission(TomlTable):
     @property
     def locking(self) -> tuple[str, ...]:
         """Lines that switch the feed override off, the dialect's own in place of FANUC's; none where it is not."""
-        if self.override != "lock":
-            return ()
-        own = dialect_of(self.dialect)
-        return self.lock_lines if own is None or self.lock_lines != _FANUC_LOCK[0] else own.lock[0]
+        return self._override_lines(0, self.lock_lines)
 
     @property
     def unlocking(self) -> tuple[str, ...]:
         """Lines that switch it on again, likewise."""
+        return self._override_lines(1, self.unlock_lines)
+
+    def _override_lines(self, rank: int, stated: tuple[str, ...]) -> tuple[str, ...]:
         if self.override != "lock":
             return ()
         own = dialect_of(self.dialect)
-        return self.unlock_lines if own is None or self.unlock_lines != _FANUC_LOCK[1] else own.lock[1]
+        return stated if own is None or stated != _FANUC_LOCK[rank] else own.lock[rank]
 
     @property
     def around_cuts(self) -> Mapping[str, tuple[str, ...]]:
@@ -392,10 +378,9 @@ class Shaping(TomlTable):
         "this and the direction changes by 45 degrees or more: a shaper must not mix plunges with other cuts",
         default=15.0,
     )
-    part_mass_kg: NonNegative | None = key(
+    part_mass_kg: NonNegative | None = optional(
         "mass of the part on the table, for modes with a table over mass_kg; left out: not known, and their "
-        "nominal frequency holds",
-        default=None,
+        "nominal frequency holds"
     )
 
 

@@ -6,6 +6,7 @@ either program are put in order by themselves, and aligned by what they do (Myer
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from collections.abc import Iterable, Iterator
@@ -241,21 +242,14 @@ class Comparison(Result):
         """The one thing to do next, in one sentence."""
         first = next(self.refused, None)
         if first is None:
-            return (
-                "nothing: the programs do the same, but for what was allowed."
-                if self.differences
-                else ("nothing: the programs do the same.")
-            )
+            return f"nothing: the programs do the same{', but for what was allowed' if self.differences else ''}."
         if first.kind == "emission" and first.original_line is not None:
-            return (
-                f"look at {first.place}: the other program lacks lines that a shaped cut needs for its verdict to hold."
-            )
-        words = [word for word in self.allow if not word.startswith("path=")] if first.kind == "path" else [*self.allow]
-        words.append(
-            f"path={math.ceil(max(each.distance_um for each in self.refused))}um"
-            if first.kind == "path"
-            else first.kind.replace("emission", "blocks")
-        )
+            lacks = "the other program lacks lines that a shaped cut needs for its verdict to hold"
+            return f"look at {first.place}: {lacks}."
+        words = [*self.allow, first.kind.replace("emission", "blocks")]
+        if first.kind == "path":
+            words = [word for word in self.allow if not word.startswith("path=")]
+            words.append(f"path={math.ceil(max(each.distance_um for each in self.refused))}um")
         return f"look at {first.place}; if that is meant, allow it: --allow {','.join(words)}."
 
     def key_figures(self) -> tuple[Figure, ...]:
@@ -269,15 +263,9 @@ class Comparison(Result):
 
     def tables(self) -> list[Table]:
         """Number of differences of each kind, then the differences, with those that are not allowed first."""
+        what = Column("what", value=lambda row: _noun(row.kind), left=True)
         counts = Table(
-            "",
-            (
-                Column("what", value=lambda row: _noun(row.kind), left=True),
-                Column("original", value="original"),
-                Column("other", value="emitted"),
-                Column("unchanged", value="unchanged"),
-            ),
-            self.counts,
+            "", (what, Column("original"), Column("other", value="emitted"), Column("unchanged")), self.counts
         )
         if not self.differences:
             return [counts]
@@ -285,7 +273,7 @@ class Comparison(Result):
         shown = [*refused, *(each for each in self.differences if each.allowed)][:_SHOWN]
         more = len(self.differences) - len(shown)
         columns = (
-            Column("kind", value="kind", left=True),
+            Column("kind", left=True),
             Column("line", value="original_line"),
             Column("other line", value="emitted_line"),
             Column(Path(self.original).name, value="original", text=True),
@@ -335,13 +323,13 @@ def compare(
     machine = Machine.of(machine)
     allowed = allow if isinstance(allow, Allowed) else Allowed.of(allow)
     (first, first_is_cut), (second, second_is_cut) = _read(original, machine), _read(emitted, machine)
-    core = _core.compare_programs(
-        first.core,
-        second.core,
-        reader_options(machine),
-        _emission_lines(machine, first.core.expanded_radii_mm),
-        _joint_path_um(allowed, machine) * 1e-3,
-    )
+    # Within which cuts of other lengths are the same: a conversion allows any, and judges it later.
+    joint_um = allowed.path_um if allowed.path_um < math.inf else _JOINT_TOLERANCES * machine.tolerance.contour_um
+    emission = machine.emission
+    lines = [line for group in emission.around_cuts.values() for line in group]
+    lines += [*emission.prefill_lines, *guard_lines(first.core.expanded_radii_mm, machine)]
+    written = ["".join(re.sub(r"\([^)]*\)", "", line).split()) for line in lines]  # as the core compares them
+    core = _core.compare_programs(first.core, second.core, reader_options(machine), written, joint_um * 1e-3)
     is_shaped = second.stamp is not None
     differences = [
         ProgramDifference(
@@ -358,7 +346,10 @@ def compare(
     ]
     differences += _compensation(first, second, allowed)
     if (first_is_cut or second_is_cut) and not any(each.kind == "end" for each in differences):
-        differences.append(_end(first, second, allowed, first_ends=first_is_cut))
+        ends = [max(1, program.text.rstrip().count(b"\n") + 1) for program in (first, second)]
+        texts = [f"ends early at line {line}" for line in ends]
+        texts[1 if first_is_cut else 0] = "has an end"
+        differences.append(ProgramDifference("end", ends[0], ends[1], texts[0], texts[1], allowed.covers("end")))
     return Comparison(
         original=first.source,
         emitted=second.source,
@@ -372,13 +363,6 @@ def compare(
         differences=tuple(differences),
         allow=allowed.words,
     )
-
-
-def _joint_path_um(allowed: Allowed, machine: Machine) -> float:
-    """Distance within which cuts of other lengths are the same: a conversion allows any, and judges it later."""
-    if allowed.path_um < math.inf:
-        return allowed.path_um
-    return _JOINT_TOLERANCES * machine.tolerance.contour_um
 
 
 def _name(kind: _core.ComparedKind) -> str:
@@ -398,22 +382,10 @@ def _read(program: Program | str | Path, machine: Machine) -> tuple[Program, boo
         text = program_bytes(program, machine.controller.max_program_bytes)
         whole_lines = text[: text.rfind(b"\n") + 1]
         for kept in (text, whole_lines):
-            try:
-                return (
-                    Program.from_text(kept + b"\n%\n", machine, source=str(program), folder=Path(program).parent),
-                    True,
-                )
-            except ProgramError:
-                continue
+            with contextlib.suppress(ProgramError):
+                found = Program.from_text(kept + b"\n%\n", machine, source=str(program), folder=Path(program).parent)
+                return found, True
         raise
-
-
-def _emission_lines(machine: Machine, radii_mm: dict[int, float]) -> list[str]:
-    """The lines that `convert` writes around shaped cuts for this machine, as the core compares them."""
-    emission = machine.emission
-    locks = (*emission.locking, *emission.unlocking)
-    lines = [*emission.prologue, *emission.epilogue, *locks, *emission.prefill_lines, *guard_lines(radii_mm, machine)]
-    return ["".join(re.sub(r"\([^)]*\)", "", line).split()) for line in lines]
 
 
 def _compensation(first: Program, second: Program, allowed: Allowed) -> Iterator[ProgramDifference]:
@@ -422,23 +394,12 @@ def _compensation(first: Program, second: Program, allowed: Allowed) -> Iterator
     for number in sorted(radii[0].keys() | radii[1].keys()):
         if radii[0].get(number) == radii[1].get(number):
             continue
-        has = [
-            (_line_of(program, _COMPENSATED), f"G41 or G42 with D{number}") if number in known else (None, "worked out")
-            for program, known in zip((first, second), radii, strict=True)
-        ]
-        (line, text), (other_line, other_text) = has
-        yield ProgramDifference("compensation", line, other_line, text, other_text, allowed.covers("compensation"))
-
-
-def _line_of(program: Program, pattern: re.Pattern[bytes]) -> int | None:
-    text = program.text
-    found = pattern.search(text)
-    return None if found is None else 1 + text.count(b"\n", 0, found.start())
-
-
-def _end(first: Program, second: Program, allowed: Allowed, *, first_ends: bool) -> ProgramDifference:
-    """One program has neither an end nor anything less than the other."""
-    lines = [max(1, program.text.rstrip().count(b"\n") + 1) for program in (first, second)]
-    early = f"ends early at line {lines[0 if first_ends else 1]}"
-    ours, theirs = (early, "has an end") if first_ends else ("has an end", early)
-    return ProgramDifference("end", lines[0], lines[1], ours, theirs, allowed.covers("end"))
+        lines: list[int | None] = [None, None]
+        texts = ["worked out", "worked out"]
+        for at, program in enumerate((first, second)):
+            if number in radii[at]:
+                found = _COMPENSATED.search(program.text)
+                lines[at] = None if found is None else 1 + program.text.count(b"\n", 0, found.start())
+                texts[at] = f"G41 or G42 with D{number}"
+        is_allowed = allowed.covers("compensation")
+        yield ProgramDifference("compensation", lines[0], lines[1], texts[0], texts[1], is_allowed)

@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode._core import ProgramError
+from shapegcode.machine import Machine
 from shapegcode.program import MM_PER_INCH, Program, located_error
 from shapegcode.program.computer import require_memory
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from shapegcode.machine import Machine
 
 RADIUS_NOT_KNOWN = "the radius of offset D"
 """Start of the reader's warning about a G41 or G42 whose radius is not given."""
 
 _ZERO_RADIUS = re.compile(r"offset D(\d+) has a radius of 0\b")
 _KEPT = "cutter compensation is on and not expanded"
-_MEMORY_PER_BLOCK = 100
-"""Bytes of memory for each block that a conversion writes (docs/evidence/benchmarks.md)."""
+_MEMORY_PER_BLOCK = 100  # bytes of memory for each block that a conversion writes (docs/evidence/benchmarks.md)
 _SLACK_MM = 0.0005  # a radius that differs by more is another one
 
 
@@ -59,9 +53,8 @@ def require_decision(program: Program, machine: Machine) -> None:
     if policy == "expand":
         for line, _, _, message, file in core.warnings:
             if message.startswith(RADIUS_NOT_KNOWN):
-                raise _undecided(
-                    program, line, file, f"{message.partition(' (')[0]}: its path cannot be shaped", machine
-                )
+                sentence = f"{message.partition(' (')[0]}: its path cannot be shaped"
+                raise _undecided(program, line, file, sentence, machine)
         refuse_zero_radius(program)
         if core.kept_compensated_moves:
             raise ProgramError(f"{program.source}:1:1: read the program with expand_compensation=True to expand it")
@@ -144,7 +137,12 @@ def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.R
         yield from ((region, region) for region in program.regions)
         return
     if nominal.core.kept_compensated_moves > program.core.kept_compensated_moves:
-        raise _core.ArgumentError(_unknown_radius(nominal))
+        sentence = (warning for warning in nominal.warnings if RADIUS_NOT_KNOWN in warning)
+        why = next(sentence, f"{nominal.source}: cutter compensation is on and not expanded").partition(" (")[0]
+        raise _core.ArgumentError(
+            f"{why}: the path of the original is not known, and a shaped program cannot be measured against it: set "
+            "input.tool_radius_mm to the radius that it was shaped with, in the machine file or with --set"
+        )
     candidates = iter(program.regions)
     for region in nominal.regions:
         for candidate in candidates:
@@ -157,15 +155,6 @@ def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.R
                 f"{nominal.source} has in {nominal.lines(region)}: it was not made from that program; leave out "
                 "--against"
             )
-
-
-def _unknown_radius(nominal: Program) -> str:
-    sentence = (warning for warning in nominal.warnings if RADIUS_NOT_KNOWN in warning)
-    why = next(sentence, f"{nominal.source}: cutter compensation is on and not expanded").partition(" (")[0]
-    return (
-        f"{why}: the path of the original is not known, and a shaped program cannot be measured against it: set "
-        "input.tool_radius_mm to the radius that it was shaped with, in the machine file or with --set"
-    )
 
 
 def _same_ends(one: _core.Path, other: _core.Path) -> bool:

@@ -9,8 +9,7 @@ from pathlib import Path
 from shapegcode._core import ProgramError
 
 _CGROUP = Path("/sys/fs/cgroup")
-_PER_LINE = 130
-"""Bytes for each line that is read: blocks, path and plan (docs/evidence/benchmarks.md)."""
+_PER_LINE = 130  # bytes for each line that is read: blocks, path and plan (docs/evidence/benchmarks.md)
 _SMALL_BYTES = 2**20
 MEMORY_NEEDED = "bytes of memory are needed"
 """Start of the message when there is not enough memory; a batch with a memory limit recognizes it."""

@@ -8,11 +8,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.errors import ProgramError, located_error
 from shapegcode.io.units import MM_PER_INCH
+from shapegcode.machine import Machine
 from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.foreign.read import CONTROLS, LOOKED_AT_BYTES, ForeignProgram, doubtful_word, foreign_program
 from shapegcode.program.reading import (
@@ -25,9 +25,6 @@ from shapegcode.program.reading import (
     signs_of_turning,
 )
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict
-
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
 
 _KEPT_CALL = re.compile(r"program O(\d+) .*: the call is kept")
 _ARC_OFF_RADIUS = "off its radius"
@@ -84,8 +81,6 @@ class Program:
             ProgramError: the text is no program that can be read; the message starts with ``file:line:column``.
             OSError: the file cannot be read.
         """
-        from shapegcode.machine import Machine
-
         machine = Machine.of(machine or "vx500")
         text, source, folder = given_text(path, machine)
         return cls.from_text(
@@ -135,8 +130,6 @@ class Program:
         Raises:
             ProgramError: the text is no program that can be read; the message starts with ``source:line:column``.
         """
-        from shapegcode.machine import Machine
-
         machine = Machine.of(machine or "vx500")
         data = text.encode() if isinstance(text, str) else text
         require_memory_for_lines(data, source)
@@ -314,14 +307,11 @@ class Program:
 
     @cached_property
     def doubt(self) -> tuple[int, str] | None:
-        """A warning about a word with another meaning on another control, if the program's control is not
-        recognized."""
-        stated = self.reading.machine.controller.dialect != "auto"
-        return (
-            None
-            if stated or self.reading.emitted or self.foreign is not None
-            else doubtful_word(self.text_slice(0, LOOKED_AT_BYTES))
-        )
+        """A warning about a word that means another thing on another control, if the control is not recognized."""
+        is_stated = self.reading.machine.controller.dialect != "auto"
+        if is_stated or self.reading.emitted or self.foreign is not None:
+            return None
+        return doubtful_word(self.text_slice(0, LOOKED_AT_BYTES))
 
     @property
     def expanded_text(self) -> bytes:

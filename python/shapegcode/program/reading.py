@@ -5,6 +5,7 @@ calls, and files that hold several programs, as a control punches its memory.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import os
 import re
@@ -13,17 +14,20 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.io.data_file import named_errors, open_file
+from shapegcode.machine import Machine
+from shapegcode.machine.programs import Input
 from shapegcode.program.computer import require_memory
-from shapegcode.program.foreign.read import COMMENT, LOOKED_AT_BYTES, program_folders, refuse_words_behind_semicolon
+from shapegcode.program.foreign.read import (
+    COMMENT,
+    LOOKED_AT_BYTES,
+    ForeignSettings,
+    program_folders,
+    refuse_words_behind_semicolon,
+)
 from shapegcode.settings.keys import toml
-
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
-    from shapegcode.program.foreign.read import ForeignSettings
 
 _PLACE = re.compile(r"#([1-9][0-9]{0,8})")
 _NUMBER = re.compile(r"[Oo:]?0*([1-9][0-9]{0,7})")
@@ -59,7 +63,8 @@ def programs_of(text: bytes) -> tuple[ProgramPlace, ...]:
     long = [f"{entry.folder.rstrip('/')}/{own}" for entry, own in zip(entries, short, strict=True)]
     plain, full = Counter(short), Counter(long)
     # A line that ends with LF CR CR ends behind both.
-    begins = [entry.text_begin + _carriage_returns(text, entry.text_begin) for entry in entries]
+    heads = ((entry.text_begin, text[entry.text_begin : entry.text_begin + 2]) for entry in entries)
+    begins = [begin + len(head) - len(head.lstrip(b"\r")) for begin, head in heads]
     ends = [*begins[1:], entries[-1].text_end]
     places = []
     for index, (entry, own, whole) in enumerate(zip(entries, short, long, strict=True)):
@@ -83,11 +88,12 @@ def place_of(text: bytes, wanted: str, source: str) -> int:
         ]
     if len(found) == 1:
         return found[0]
-    known = ", ".join(places[index].address for index in found) or _listed([place.address for place in places])
-    reason = (
-        f"holds several programs {wanted}: say which, {known}" if found else f"holds no program {wanted} (but {known})"
-    )
-    raise _core.ProgramError(f"{source}:1:1: the file {reason}")
+    if found:
+        known = ", ".join(places[index].address for index in found)
+        raise _core.ProgramError(f"{source}:1:1: the file holds several programs {wanted}: say which, {known}")
+    known = ", ".join(place.address for place in places[:_LISTED])
+    more = f" and {len(places) - _LISTED} more" if len(places) > _LISTED else ""
+    raise _core.ProgramError(f"{source}:1:1: the file holds no program {wanted} (but {known}{more})")
 
 
 def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
@@ -133,41 +139,26 @@ def alone_with(program: bytes | memoryview, text: bytes, needed: Sequence[Progra
     return b"".join([whole[:end], *(text[place.text_begin : place.text_end] for place in needed), whole[end:]])
 
 
-def _carriage_returns(text: bytes, at: int) -> int:
-    return len(text[at : at + 2]) - len(text[at : at + 2].lstrip(b"\r"))
-
-
 def _own_name(entry: _core.ProgramEntry) -> str:
     return f"O{entry.number:04d}" if entry.number >= 0 else entry.name
 
 
-def _listed(addresses: list[str], most: int = 20) -> str:
-    more = len(addresses) - most
-    return ", ".join(addresses[:most]) + (f" and {more} more" if more > 0 else "")
-
-
+_LISTED = 20  # addresses in a message
 _NO_LIMIT = 2**63
 _ANY_PROGRAM = (0, 99_999_999)
 _PLAIN_LINE = 1000  # characters: a plain program's lines are no longer than the words of a block
 _SHOWN_CHARACTERS = 60  # of a value in a message: a table of tools may be long
 
 _CONTROLLER_KEYS = (
-    "calculator_decimal_point",
-    "least_increment_mm",
-    "least_increment_inch",
-    "arc_radius_tolerance_mm",
-    "offset_memory",
-    "nesting_limit_subprogram",
-    "dialect",
-)
+    "calculator_decimal_point", "least_increment_mm", "least_increment_inch", "arc_radius_tolerance_mm",
+    "offset_memory", "nesting_limit_subprogram", "dialect",
+)  # fmt: skip
 """Of `controller`: what changes how a text is read; limits of memory and time do not."""
 
-_NOT_READ = ("compensation", "material_side")
-"""Of `input`: what is decided of a program that was read."""
+_NOT_READ = ("compensation", "material_side")  # of `input`: what is decided of a program that was read
 
 
-Finder = Callable[[int], tuple[str, bytes] | None]
-"""Name and text of a program that another one calls, by its O number."""
+Finder = Callable[[int], tuple[str, bytes] | None]  # name and text of a program that another one calls, by its O number
 
 
 @dataclass(frozen=True)
@@ -262,31 +253,35 @@ def is_program_text(given: object) -> bool:
 def reader_options(machine: Machine, *, emitted: bool = False) -> _core.ReaderOptions:
     """Settings with which the core reads a program of this machine."""
     options = _core.ReaderOptions()
-    options.calculator_decimal_point = machine.controller.calculator_decimal_point
-    options.absolute_arc_centres = machine.input.arc_centre == "absolute" and not emitted
-    options.least_increment_mm = machine.controller.least_increment_mm
-    options.least_increment_inch = machine.controller.least_increment_inch
-    options.arc_without_centre_is_line = machine.input.arc_without_centre == "line"
-    options.arc_tolerance_mm = machine.controller.arc_radius_tolerance_mm
-    options.max_line_length = machine.input.max_line_length
-    options.unknown_after_tool_change = [axis in machine.input.tool_change_unknown_axes for axis in "XYZ"]
-    offsets = machine.input.work_offsets
-    if offsets:
+    controller, given = machine.controller, machine.input
+    options.calculator_decimal_point = controller.calculator_decimal_point
+    options.absolute_arc_centres = given.arc_centre == "absolute" and not emitted
+    options.least_increment_mm = controller.least_increment_mm
+    options.least_increment_inch = controller.least_increment_inch
+    options.arc_without_centre_is_line = given.arc_without_centre == "line"
+    options.arc_tolerance_mm = controller.arc_radius_tolerance_mm
+    options.max_line_length = given.max_line_length
+    options.unknown_after_tool_change = [axis in given.tool_change_unknown_axes for axis in "XYZ"]
+    if offsets := given.work_offsets:
         options.work_offsets_mm = [offsets.get(f"G{code}", (0.0, 0.0, 0.0)) for code in range(54, 60)]
-        options.extra_work_offsets_mm = {
-            int(name[6:]): offset for name, offset in offsets.items() if name.startswith("G54.1P")
-        }
-    options.tool_offsets = _tool_offsets(machine)  # type: ignore[assignment]
-    options.offset_memory = machine.controller.offset_memory
-    options.retained_variables = {int(name): value for name, value in machine.input.variables.items()}
-    options.bindings = _bindings(machine)
-    options.opaque_programs = list(machine.input.opaque_programs)
-    options.subprogram_nesting = machine.controller.nesting_limit_subprogram
+        extra = (each for each in offsets.items() if each[0].startswith("G54.1P"))
+        options.extra_work_offsets_mm = {int(name[6:]): offset for name, offset in extra}
+    options.tool_offsets = _tool_offsets(given)  # type: ignore[assignment]
+    options.offset_memory = controller.offset_memory
+    options.retained_variables = {int(name): value for name, value in given.variables.items()}
+    bindings = _core.CodeBindings()
+    bindings.g_macros = {round(float(name) * 10): program for name, program in given.g_macros.items()}
+    bindings.m_macros = {int(name): program for name, program in given.m_macros.items()}
+    bindings.m_subprograms = {int(name): program for name, program in given.m_subprograms.items()}
+    bindings.tool_program = given.tool_program or -1
+    options.bindings = bindings
+    options.opaque_programs = list(given.opaque_programs)
+    options.subprogram_nesting = controller.nesting_limit_subprogram
     options.limits = _limits(machine, emitted=emitted)
-    options.block_skip = [{"unknown": None, "on": True, "off": False}[machine.input.block_skip]] * 9
-    options.compensation_start_up = machine.input.compensation_start_up
-    options.peck_clearance_mm = machine.input.peck_clearance_mm
-    options.scale_unit = machine.input.scale_unit
+    options.block_skip = [{"unknown": None, "on": True, "off": False}[given.block_skip]] * 9
+    options.compensation_start_up = given.compensation_start_up
+    options.peck_clearance_mm = given.peck_clearance_mm
+    options.scale_unit = given.scale_unit
     state = _core.ModalState()
     names = {"path_mode": "exact_stop", "work_offset": "coordinate_system"}
     for name, code in vars(machine.power_on).items():
@@ -312,27 +307,12 @@ def _limits(machine: Machine, *, emitted: bool) -> _core.WorkLimits:
     return limits
 
 
-def _tool_offsets(machine: Machine) -> dict[int, _core.ToolOffset]:
+def _tool_offsets(given: Input) -> dict[int, _core.ToolOffset]:
     offsets: dict[int, _core.ToolOffset] = {}
-    tables = machine.input
-    for table, field in (
-        (tables.tool_length_mm, "length_mm"),
-        (tables.tool_length_wear_mm, "length_wear_mm"),
-        (tables.tool_radius_mm, "radius_mm"),
-        (tables.tool_radius_wear_mm, "radius_wear_mm"),
-    ):
-        for name, value in table.items():
+    for field in ("length_mm", "length_wear_mm", "radius_mm", "radius_wear_mm"):
+        for name, value in getattr(given, f"tool_{field}").items():
             setattr(offsets.setdefault(int(name), _core.ToolOffset()), field, value)
     return offsets
-
-
-def _bindings(machine: Machine) -> _core.CodeBindings:
-    bindings = _core.CodeBindings()
-    bindings.g_macros = {round(float(name) * 10): program for name, program in machine.input.g_macros.items()}
-    bindings.m_macros = {int(name): program for name, program in machine.input.m_macros.items()}
-    bindings.m_subprograms = {int(name): program for name, program in machine.input.m_subprograms.items()}
-    bindings.tool_program = machine.input.tool_program or -1
-    return bindings
 
 
 PROGRAM_SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".TAP", ".prg", ".PRG", ".ngc")
@@ -358,12 +338,11 @@ def program_loader(folders: Sequence[Path], most: int) -> Finder:
     """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix."""
 
     def load(number: int) -> tuple[str, bytes] | None:
-        for folder in folders:
-            for stem in (f"O{number:04d}", f"O{number}", f"o{number:04d}", f"{number:04d}", f"O{number:08d}"):
-                for suffix in PROGRAM_SUFFIXES:
-                    path = folder / (stem + suffix)
-                    if path.is_file():
-                        return str(path), program_bytes(path, most)
+        stems = (f"O{number:04d}", f"O{number}", f"o{number:04d}", f"{number:04d}", f"O{number:08d}")
+        for folder, stem, suffix in itertools.product(folders, stems, PROGRAM_SUFFIXES):
+            path = folder / (stem + suffix)
+            if path.is_file():
+                return str(path), program_bytes(path, most)
         return None
 
     return load

@@ -84,14 +84,11 @@ def no_room(room_bytes: int) -> str:
     return f"convert the original with --max-bytes {room_bytes}; or memory card, data server or drip feed (DNC)"
 
 
-REGION_MARK = "(SHAPED)"
-"""Comment before each shaped region."""
+REGION_MARK = "(SHAPED)"  # comment before each shaped region
 
-RAPID_MARK = "(SHAPED RAPID)"
-"""Comment before shaped blocks that replace a rapid."""
+RAPID_MARK = "(SHAPED RAPID)"  # comment before shaped blocks that replace a rapid
 
-STAMP_BEGIN = b"(SHAPEGCODE "
-"""How the header begins."""
+STAMP_BEGIN = b"(SHAPEGCODE "  # how the header begins
 
 _WIDTH = 60
 # One length, so that the verdict can take its place without moving a line; likewise the mark of the text.

@@ -92,15 +92,11 @@ class Answers(TomlTable):
         return answer
 
     @model_validator(mode="after")
-    def _likely(self) -> Answers:
+    def _is_likely(self) -> Answers:
         for name, (low, high, example) in _LIKELY.items():
             answer = getattr(self, name)
             if answer is not None and not all(low <= value <= high for value in answer.as_tuple()):
                 raise KeyProblem(name, answer, f"must be {low:g} to {high:g} ({example})")
-        return self
-
-    @model_validator(mode="after")
-    def _baud_of_a_line(self) -> Answers:
         if self.control == "linuxcnc" and self.look_ahead not in (None, "none"):
             raise KeyProblem("look_ahead", self.look_ahead, 'is a code of FANUC controls, and control is "linuxcnc"')
         if self.dnc_baud is not None and self.delivery != "dnc":

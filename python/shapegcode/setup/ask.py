@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, get_args
 
@@ -51,8 +51,12 @@ def ask_all() -> Answers:
     given: dict[str, Any] = {}
     asked: list[str] = []
     questions = [name for name in Answers.model_fields if name != "modes"] + [f"modes.{axis}" for axis in "xyz"]
-    while open_ones := _open_questions(questions, asked, given):
-        name = open_ones[0]
+    while True:
+        needless = set(_left_out(given))
+        behind = questions[questions.index(asked[-1]) + 1 :] if asked else questions
+        name = next((name for name in behind if name not in needless), None)
+        if name is None:
+            return read_answers(given)
         answer = _vibration(name[-1]) if name.startswith("modes.") else _asked(name, given)
         if answer == _BACK:
             if asked:
@@ -66,14 +70,6 @@ def ask_all() -> Answers:
         if not name.startswith("modes.") or "modes" in given:
             name = name.partition(".")[0]
             print(f"  {EXPLAINED[name](getattr(read_answers(_alone(name, given)), name))}")
-    return read_answers(given)
-
-
-def _open_questions(questions: Sequence[str], asked: Sequence[str], given: Mapping[str, Any]) -> list[str]:
-    """The remaining questions that the answers so far do not make superfluous."""
-    needless = set(_left_out(given))
-    behind = questions[questions.index(asked[-1]) + 1 :] if asked else questions
-    return [name for name in behind if name not in needless]
 
 
 def _alone(name: str, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from shapegcode.setup.result import MachineSetup, OpenQuestion
 _ANSWERED = "answered"
 _IN_WORDS = {"name": "name", "control": "description"}
 _ASSUMED_RAPID_MM_PER_MIN = 24_000.0
-_ASSUMED_ACCELERATION_MM_S2 = 3000.0
+_ASSUMED_MM_S2 = 3000.0
 _LOOK_AHEAD = {"G05.1": (["G05.1 Q0"], ["G05.1 Q1"]), "G08": (["G08 P0"], ["G08 P1"])}
 _LIMITS = ("max_feed_mm_per_min", "rapid_mm_per_min", "max_acceleration_mm_s2")
 
@@ -46,18 +46,18 @@ def set_up(answers: Answers) -> MachineSetup:
     remarks |= {key: remark for key, (_, remark) in values.items()}
     machine = machine.with_remarks(_for_axes(machine, remarks))
     text = machine.to_toml(short=True)
-    for axis, answer in answers.modes.model_dump().items():
-        if answer in ("rigid", "unknown") or is_mode(answer):
+    known = {axis: answer for axis, answer in answers.modes.model_dump().items() if answer not in ("rigid", "unknown")}
+    for axis, answer in known.items():
+        if is_mode(answer):
             continue
         found = identify(answer)
         if not found.modes:
             raise ArgumentError(f"modes.{axis} = {answer!r}: no mode that the data support: {found.answer}")
-        update = update_modes(text, axis, found.modes, source=found.source, refused=found.refused, file=answers.name,
-                              keep_modes=_with_modes(answers, axis))  # fmt: skip
-        notes.append(
-            f"{axis.upper()}: {', '.join(f'{mode.frequency_hz.value:g} Hz' for mode in found.modes)} from {answer}"
-        )
-        text = update.text
+        others = "".join(other for other in known if other != axis)  # their modes are this machine's
+        text = update_modes(text, axis, found.modes, source=found.source, refused=found.refused, file=answers.name,
+                            keep_modes=others).text  # fmt: skip
+        frequencies = ", ".join(f"{mode.frequency_hz.value:g} Hz" for mode in found.modes)
+        notes.append(f"{axis.upper()}: {frequencies} from {answer}")
     machine = Machine.from_toml(text, answers.name)
     # Name and kind of control go into words that have no origin.
     named = {key for name, key in _IN_WORDS.items() if getattr(answers, name) != Answers.model_fields[name].default}
@@ -87,8 +87,7 @@ def _started(answers: Answers) -> tuple[Machine, list[str]]:
 
 
 def _imported(answers: Answers, rigid: str) -> ParameterImport:
-    """The machine of the parameter file; limits that it does not contain are those of the answers, or assumed and
-    marked so."""
+    """The machine of the parameter file; limits that it does not contain are answered, or assumed and marked so."""
     dump = answers.dump
     assert dump is not None
     try:
@@ -97,17 +96,14 @@ def _imported(answers: Answers, rigid: str) -> ParameterImport:
         if any(problem.value or problem.key.rpartition(".")[2] not in _LIMITS for problem in error.problems):
             raise
     found = import_parameters(dump, _plain(answers), name=answers.name, rigid=rigid)
+    read = {each.key for each in found.read}
     own = {
         f"axes.{axis}.max_feed_mm_per_min": getattr(found.machine.axes, axis).rapid_mm_per_min
         for axis in "xyz"
-        if answers.max_feed_mm_per_min is None and f"axes.{axis}.max_feed_mm_per_min" not in _read_keys(found)
+        if answers.max_feed_mm_per_min is None and f"axes.{axis}.max_feed_mm_per_min" not in read
     }
     machine = found.machine.with_values(own, source=answers.name) if own else found.machine
     return replace(found, machine=machine.with_remarks(dict(found.machine.remarks)))
-
-
-def _read_keys(found: ParameterImport) -> set[str]:
-    return {each.key for each in found.read}
 
 
 def dump_problem(file: str, control: str | None = None) -> str:
@@ -147,16 +143,11 @@ def _plain(answers: Answers) -> Machine:
         limits = {
             "max_feed_mm_per_min": (feed, own, "the rapid rate"),
             "rapid_mm_per_min": (rapid, own, "24 m/min, usual for a machining centre"),
-            "max_acceleration_mm_s2": (
-                acceleration,
-                _ASSUMED_ACCELERATION_MM_S2,
-                "0.3 g, usual for a machining centre",
-            ),
+            "max_acceleration_mm_s2": (acceleration, _ASSUMED_MM_S2, "0.3 g, usual for a machining centre"),
         }
-        axes[axis] = {
-            name: assumed if answer is None else getattr(answer, axis) for name, (answer, assumed, _) in limits.items()
-        }
-        for name, (answer, _, why) in limits.items():
+        axes[axis] = {}
+        for name, (answer, assumed, why) in limits.items():
+            axes[axis][name] = assumed if answer is None else getattr(answer, axis)
             remarks[f"axes.{axis}.{name}"] = f"assumed: {why}" if answer is None else _ANSWERED
     control = {
         "fanuc": "FANUC control", "linuxcnc": "LinuxCNC", "other": "control that reads FANUC's G-code",
@@ -216,20 +207,12 @@ def _for_axes(machine: Machine, remarks: dict[str, str]) -> dict[str, str]:
     return found
 
 
-def _with_modes(answers: Answers, axis: str) -> str:
-    """The other axes whose modes are in the answers: they are this machine's."""
-    answer = answers.modes.model_dump()
-    return "".join(other for other in "xyz" if other != axis and answer[other] not in ("rigid", "unknown"))
-
-
 def _open(machine: Machine) -> Iterator[OpenQuestion]:
     """Parameters without an answer to which a verdict may be sensitive: axes without modes first."""
     for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True):
         if not axis.modes and not axis.rigid:
-            why = "taken as rigid until it is tapped"
-            yield OpenQuestion(
-                f"axes.{letter}.modes", "none", why, f"shapegcode identify TAP.csv --axis {letter} --update MACHINE"
-            )
+            command = f"shapegcode identify TAP.csv --axis {letter} --update MACHINE"
+            yield OpenQuestion(f"axes.{letter}.modes", "none", "taken as rigid until it is tapped", command)
     for value in machine.values():
         if value.origin == "assumed" and not value.key.endswith(".modes"):
             unit = "" if value.unit == "1" else value.unit

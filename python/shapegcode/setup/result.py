@@ -61,15 +61,15 @@ class MachineSetup(Result):
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
         file = self.file or "MACHINE"
-        return (
-            f"`shapegcode machine show {file} --for part.nc` ranks the unknown values by their effect on your program."
-        )
+        command = f"`shapegcode machine show {file} --for part.nc`"
+        return f"{command} ranks the unknown values by their effect on your program."
 
     def tables(self) -> list[Table]:
         """The values that are not known; axes with the same text share a row."""
         shared: dict[tuple[str, str, str], list[str]] = {}
         for each in self.open:
-            stem, axis, name = _split(each.key)
+            found = re.fullmatch(r"(axes\.)([xyz])(\..*)", each.key)
+            stem, axis, name = found.groups() if found else (each.key, "", "")
             shared.setdefault((f"{stem}{{}}{name}", each.value, each.why), []).append(axis)
         rows = [(key.format(", ".join(axes)), value, why) for (key, value, why), axes in shared.items()]
         columns = (
@@ -78,9 +78,3 @@ class MachineSetup(Result):
             Column("why", value=lambda row: row[2], text=True),
         )
         return [Table("", columns, rows)] if rows else []
-
-
-def _split(key: str) -> tuple[str, str, str]:
-    """What stands before the letter of an axis, the letter, and what stands behind it."""
-    found = re.fullmatch(r"(axes\.)([xyz])(\..*)", key)
-    return (found[1], found[2], found[3]) if found else (key, "", "")

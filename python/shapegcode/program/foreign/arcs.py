@@ -15,8 +15,7 @@ import numpy.typing as npt
 
 Vector = npt.NDArray[np.float64]
 
-PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
-"""First and second axis of a plane, and the axis across it."""
+PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}  # first and second axis of a plane, and the axis across it
 
 _STRAIGHT = 1e-9  # sine of an angle below which a direction is one
 _FULL_TURN = 1e-9  # rad

@@ -10,12 +10,9 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from itertools import accumulate
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from shapegcode.machine import Machine
 from shapegcode.program.foreign.read import ForeignProgram, ForeignSettings, Note, number_text, refusal
-
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
 
 _AS_FANUC = frozenset((
     "0", "1", "2", "3", "4", "9", "10", "17", "18", "19", "20", "21", "28", "40", "41", "42", "43", "49", "52", "53",
@@ -167,7 +164,6 @@ def _code(text: str) -> str:
 
 
 def _refuse(codes: list[str], code: str) -> None:
-    """Words that are not read."""
     for name in codes:
         if name in _REFUSED:
             raise ValueError(f"G{name} is {_REFUSED[name]} on a Haas: it is not read")
@@ -183,9 +179,8 @@ def _refuse(codes: list[str], code: str) -> None:
         raise ValueError("M96 jumps if an input is not set, which is known only at the machine: it is not supported")
     if "10" in codes and (word := re.search(r"L[ \t]*(1[23])(?!\d)", code, re.IGNORECASE)):
         raise ValueError(
-            f"G10 L{word[1]}: a diameter or a radius, depending on setting 40 of a Haas; FANUC's is a "
-            "radius: write the "
-            "radius into input.tool_radius_mm"
+            f"G10 L{word[1]}: a diameter or a radius, depending on setting 40 of a Haas; FANUC's is a radius: write "
+            "the radius into input.tool_radius_mm"
         )
     if "10" in codes and re.search(r"L[ \t]*2(?!\d)", code, re.IGNORECASE) and re.search(r"P[ \t]*0+(?!\d)", code):
         raise ValueError("G10 L2 P0 sets the origin of G52 on a Haas, and an external offset on FANUC: it is not read")

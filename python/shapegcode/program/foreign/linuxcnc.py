@@ -11,15 +11,15 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from shapegcode.io.ini import UNITS_MM
+from shapegcode.machine import Machine
+from shapegcode.program.foreign.arcs import PLANES
 from shapegcode.program.foreign.linuxcnc_blocks import BlockRunner
 from shapegcode.program.foreign.linuxcnc_cycles import PECK_CLEARANCE_MM
 from shapegcode.program.foreign.linuxcnc_expression import Block, Scanner, evaluate, read_block, without_comments
-from shapegcode.program.foreign.linuxcnc_parameters import MAX_ARGUMENTS, Frame, ParameterTable
-from shapegcode.program.foreign.linuxcnc_source import KEYWORDS, OLine, SourceFile, subroutine_file
-from shapegcode.program.foreign.linuxcnc_state import Modes, State, find_tool_table, normal_axis
+from shapegcode.program.foreign.linuxcnc_parameters import MAX_ARGUMENTS, Frame, OLine, ParameterTable, SourceFile
+from shapegcode.program.foreign.linuxcnc_state import Modes, State, find_tool_table
 from shapegcode.program.foreign.read import (
     ForeignProgram,
     ForeignSettings,
@@ -29,10 +29,8 @@ from shapegcode.program.foreign.read import (
     refusal,
 )
 
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
-
 _MAX_NESTING = 10  # INTERP_SUB_ROUTINE_LEVELS
+_FILE_NAME = re.compile(r"[\w.+-]+")
 
 # No word that means another thing on FANUC, and no number with more digits than FANUC's reader takes.
 _NUMBER = r"[-+]?(?=[\d.]{1,9}(?![\d.]))\d*\.?\d*"
@@ -77,14 +75,16 @@ class _Interpreter:
         self._parameters = ParameterTable(self._state, self._frames)
         self._n_words = Counter(_N_WORD.findall(source))
         self._next = 0
-        self._steps = 0
+        self._steps, self._read_lines = 0, self._main.count
         self._broke = False
-        self._read_lines = self._main.count
 
     def run(self) -> ForeignProgram:
-        """Execute the program."""
         here = self._enter_main()
-        self._begin()
+        power_on = self._machine.power_on
+        given = (power_on.plane, power_on.distance, power_on.feed_mode, power_on.path_mode)
+        own = ("G17", "G90", "G94", "G64")  # in which LinuxCNC begins
+        if codes := [code for code, other in zip(own, given, strict=True) if code != other]:
+            self._runner.put("".join(codes))
         try:
             while not self._runner.ended and self._next < self._file.count:
                 here = self._next
@@ -97,11 +97,8 @@ class _Interpreter:
             message = "the values of this line are nested too deep to be worked out"
             raise refusal(self._file.name, here + 1, message + self._call_stack()) from None
         if not self._runner.ended and not self._main.text.lstrip().startswith("%"):
-            raise refusal(
-                self._main.name,
-                self._main.count,
-                "the program has neither M2 or M30 nor '%' lines: LinuxCNC refuses it, it may be truncated",
-            )
+            message = "the program has neither M2 or M30 nor '%' lines: LinuxCNC refuses it, it may be truncated"
+            raise refusal(self._main.name, self._main.count, message)
         if not self._runner.ended:
             self._plain.put("M30", self._main.count)
         blends = self._runner.path_tolerances
@@ -127,14 +124,6 @@ class _Interpreter:
                 break
         return 0
 
-    def _begin(self) -> None:
-        """Modes in which LinuxCNC begins and the machine file's power_on says otherwise."""
-        power_on = self._machine.power_on
-        given = (power_on.plane, power_on.distance, power_on.feed_mode, power_on.path_mode)
-        own = ("G17", "G90", "G94", "G64")
-        if codes := [code for code, other in zip(own, given, strict=True) if code != other]:
-            self._runner.put("".join(codes))
-
     def _fast(self) -> bool:
         """Take lines in which nothing differs as they are."""
         modes, begin = self._state.modes, self._file.starts[self._next]
@@ -146,7 +135,7 @@ class _Interpreter:
         if match is None:
             return False
         text = match[0]
-        across = "ijk"[normal_axis(modes.plane)]
+        across = "ijk"[PLANES[modes.plane // 10][2]]
         if across in text or across.upper() in text:
             return False  # the slow way says what is wrong
         if modes.feed <= 0.0 and _LAST_WORD["F"].search(text) is None:
@@ -183,7 +172,6 @@ class _Interpreter:
                 position[axis] = here + unit * sum(map(float, _EVERY_WORD[letter].findall(text)))
 
     def _step(self, index: int) -> None:
-        """Execute one line."""
         self._next = index + 1
         self._steps += 1
         self._runner.line, self._runner.file, self._runner.number = index + 1, self._file.index, ""
@@ -199,20 +187,23 @@ class _Interpreter:
             if block is None:
                 return
         words = [(letter, evaluate(value, self._parameters)) for letter, value in block.words]
-        self._set(block)
+        settings = [
+            (name if isinstance(name, str) else evaluate(name, self._parameters), evaluate(value, self._parameters))
+            for name, value in block.settings
+        ]
+        for name, value in settings:  # together, after all values are evaluated
+            self._parameters.set(name, value)
         if words or block.comments:
             special = [int(value) for letter, value in words if letter == "m" and value in {70, 71, 72, 73, 98, 99}]
             if special:
                 self._special(special[0], dict(words), index)
                 words = [(letter, value) for letter, value in words if letter not in "mpl"]
             if words or block.comments:
-                self._runner.number = self._n_word(dict(words).get("n", 0.0))
+                number = f"{dict(words).get('n', 0.0):g}"
+                # Of the main program, once, and where no other line has the same.
+                if self._file is self._main and self._n_words.pop(number, 0) == 1:
+                    self._runner.number = f"N{number}"
                 self._runner.run(words, block.comments)
-
-    def _n_word(self, number: float) -> str:
-        """The N word of a line of the main program, once; empty: it has none, or another line has the same."""
-        stands_once = self._file is self._main and self._n_words.pop(f"{number:g}", 0) == 1
-        return f"N{number:g}" if stands_once else ""
 
     def _block(self, index: int) -> Block | None:
         """The words of a line; None: an empty one, or `%`."""
@@ -233,34 +224,62 @@ class _Interpreter:
         if switch == "on":
             return None
         if switch == "unknown":
-            self._plain.note(
-                self._runner.line,
-                "`/` lines are executed, as with the block-skip switch off; input.block_skip states its position",
-                "block skip",
-            )
+            text = "`/` lines are executed, as with the block-skip switch off; input.block_skip states its position"
+            self._plain.note(self._runner.line, text, "block skip")
         return block
-
-    def _set(self, block: Block) -> None:
-        """Assign the parameters of a line together, after all its values are evaluated."""
-        worked_out = [
-            (setting.name if isinstance(setting.name, str) else evaluate(setting.name, self._parameters),
-             evaluate(setting.value, self._parameters))
-            for setting in block.settings
-        ]  # fmt: skip
-        for name, value in worked_out:
-            self._parameters.set(name, value)
 
     # ---- control flow ----------------------------------------------------------------------------------------
 
     def _control(self, index: int, line: OLine) -> None:
-        """An O word."""
         if line.keyword == "":
             if line.rest.strip() and not line.rest.strip().startswith(("(", ";")):
                 raise ValueError(f"O{line.label}{line.rest[:20]}: no keyword of LinuxCNC")
             return  # the head of a program that M98 calls
-        if line.keyword not in KEYWORDS:
+        if line.keyword == "call":
+            self._call(index, line)
+        elif line.keyword in {"return", "endsub"}:
+            self._return(line)
+        elif line.keyword == "while":
+            self._while(index, line)
+        elif line.keyword == "sub":
+            self._next = self._behind(index, line, "endsub") + 1
+        elif line.keyword == "if":
+            while not self._condition(line):
+                index = self._behind(index, line, "elseif", "else", "endif")
+                line = self._file.o_lines[index]
+                if line.keyword != "elseif":
+                    break
+            self._next = index + 1
+        elif line.keyword in {"elseif", "else"}:
+            self._next = self._behind(index, line, "endif") + 1
+        elif line.keyword == "endwhile":
+            self._next = self._opening(index, line, "while")
+        elif line.keyword == "repeat":
+            count = round(self._condition(line))  # 2.7 is 3, 2.5 is 2: as rs274 2.9 repeats
+            if count > 0:
+                self._frames[-1].repeats[self._file.index, index] = count
+            else:
+                self._next = self._behind(index, line, "endrepeat") + 1
+        elif line.keyword == "endrepeat":
+            opening = self._opening(index, line, "repeat")
+            left = self._frames[-1].repeats.get((self._file.index, opening))
+            if left is None:
+                raise ValueError(f"O{line.label} ENDREPEAT without REPEAT")
+            self._frames[-1].repeats[self._file.index, opening] = left - 1
+            if left > 1:
+                self._next = opening + 1
+        elif line.keyword in {"break", "continue"}:
+            self._broke |= line.keyword == "break"
+            self._next = self._loop_end(index, line) + (line.keyword == "break")
+        elif line.keyword not in {"do", "endif"}:
             raise ValueError(f"O{line.label} {line.keyword.upper()} is no keyword of LinuxCNC")
-        getattr(self, f"_on_{line.keyword}")(index, line)
+
+    def _opening(self, index: int, line: OLine, keyword: str) -> int:
+        """The line of the loop that an ENDWHILE or ENDREPEAT closes."""
+        opening = self._file.before(index, line.label, (keyword,))
+        if opening is None:
+            raise ValueError(f"O{line.label} {line.keyword.upper()} without {keyword.upper()}")
+        return opening
 
     def _values(self, line: OLine) -> list[float]:
         """The values in brackets behind a keyword."""
@@ -284,10 +303,7 @@ class _Interpreter:
             raise ValueError(f"O{line.label} {line.keyword.upper()}: no {' or '.join(keywords).upper()} behind it")
         return place
 
-    def _on_sub(self, index: int, line: OLine) -> None:
-        self._next = self._behind(index, line, "endsub") + 1
-
-    def _on_call(self, index: int, line: OLine) -> None:
+    def _call(self, index: int, line: OLine) -> None:
         label = line.label
         if label.startswith("["):
             label = str(round(evaluate(Scanner("".join(label.split()).lower()).value(), self._parameters)))
@@ -301,19 +317,17 @@ class _Interpreter:
         self._parameters.set("_value_returned", 0.0)
 
     def _subroutine(self, label: str, keyword: str) -> tuple[SourceFile, int]:
-        """File and line of a subroutine."""
         if (line := self._file.find(label, keyword)) is not None:
             return self._file, line
         if (line := self._main.find(label, keyword)) is not None:
             return self._main, line
         if label not in self._files:
-            path = subroutine_file(label, self._folders)
+            name = label.strip("<>")
+            files = (folder / (name + suffix) for folder in self._folders for suffix in (".ngc", ".NGC", ".nc"))
+            path = next((file for file in files if file.is_file()), None) if _FILE_NAME.fullmatch(name) else None
             if path is None:
-                name = label.strip("<>")
-                raise ValueError(
-                    f"subroutine O{label} is neither in the file nor is there {name}.ngc beside it or in "
-                    "input.program_folders"
-                )
+                where = f"in the file nor is there {name}.ngc beside it or in input.program_folders"
+                raise ValueError(f"subroutine O{label} is neither {where}")
             text = called_source(path, self._machine)
             self._plain.names.append(str(path))
             self._files[label] = SourceFile(str(path), text, len(self._plain.names))
@@ -337,7 +351,7 @@ class _Interpreter:
             self._runner.restore(frame.saved)
         self._file, self._next = frame.caller, frame.back
 
-    def _on_return(self, _: int, line: OLine) -> None:
+    def _return(self, line: OLine) -> None:
         if len(self._frames) == 1 or self._frames[-1].by_m98:
             raise ValueError(f"O{line.label} {line.keyword.upper()} outside of a subroutine")
         values = self._values(line)
@@ -348,70 +362,17 @@ class _Interpreter:
             self._parameters.set("_value_returned", 1.0)
         self._leave()
 
-    _on_endsub = _on_return
-
-    def _on_if(self, index: int, line: OLine) -> None:
-        while not self._condition(line):
-            index = self._behind(index, line, "elseif", "else", "endif")
-            line = self._file.o_lines[index]
-            if line.keyword != "elseif":
-                break
-        self._next = index + 1
-
-    def _on_elseif(self, index: int, line: OLine) -> None:
-        self._next = self._behind(index, line, "endif") + 1
-
-    _on_else = _on_elseif
-
-    def _on_endif(self, _: int, __: OLine) -> None:
-        pass
-
-    def _on_while(self, index: int, line: OLine) -> None:
+    def _while(self, index: int, line: OLine) -> None:
         holds = self._condition(line) != 0.0
         if self._file.closes_do(index, line.label):
             opening = self._file.before(index, line.label, ("do",))
             if holds and opening is not None:
                 if self._broke:
-                    self._plain.note(
-                        index + 1,
-                        "a DO loop behind a BREAK: read as documented; LinuxCNC 2.9.0~pre1 runs it once only",
-                        "DO behind BREAK",
-                    )
+                    text = "a DO loop behind a BREAK: read as documented; LinuxCNC 2.9.0~pre1 runs it once only"
+                    self._plain.note(index + 1, text, "DO behind BREAK")
                 self._next = opening + 1
         elif not holds:
             self._next = self._behind(index, line, "endwhile") + 1
-
-    def _on_endwhile(self, index: int, line: OLine) -> None:
-        opening = self._file.before(index, line.label, ("while",))
-        if opening is None:
-            raise ValueError(f"O{line.label} ENDWHILE without WHILE")
-        self._next = opening
-
-    _on_do = _on_endif
-
-    def _on_repeat(self, index: int, line: OLine) -> None:
-        count = round(self._condition(line))  # 2.7 is 3, 2.5 is 2: as rs274 2.9 repeats
-        if count <= 0:
-            self._next = self._behind(index, line, "endrepeat") + 1
-            return
-        self._frames[-1].repeats[self._file.index, index] = count
-
-    def _on_endrepeat(self, index: int, line: OLine) -> None:
-        opening = self._file.before(index, line.label, ("repeat",))
-        key = self._file.index, -1 if opening is None else opening
-        left = self._frames[-1].repeats.get(key)
-        if opening is None or left is None:
-            raise ValueError(f"O{line.label} ENDREPEAT without REPEAT")
-        self._frames[-1].repeats[key] = left - 1
-        if left > 1:
-            self._next = opening + 1
-
-    def _on_break(self, index: int, line: OLine) -> None:
-        self._broke = True
-        self._next = self._loop_end(index, line) + 1
-
-    def _on_continue(self, index: int, line: OLine) -> None:
-        self._next = self._loop_end(index, line)
 
     def _loop_end(self, index: int, line: OLine) -> int:
         """The last line of the loop of this label around a line."""
@@ -427,7 +388,7 @@ class _Interpreter:
     def _special(self, code: int, values: Mapping[str, float], index: int) -> None:
         frame = self._frames[-1]
         if code in {70, 73}:
-            frame.saved, frame.restores = self._state.modes.copy(), code == 73
+            frame.saved, frame.restores = replace(self._state.modes), code == 73
             if code == 73 and len(self._frames) == 1:
                 raise ValueError("M73 outside of a subroutine")
         elif code == 71:
@@ -492,7 +453,6 @@ def _first_state(machine: Machine, folder: Path | None) -> State:
 
 
 def _last_number(text: str, letter: str) -> float | None:
-    """The number of the last word of a letter."""
     at = max(text.rfind(letter), text.rfind(letter.lower()))
     match = _LAST_WORD[letter].match(text, at) if at >= 0 else None
     return None if match is None else float(match[1])

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-from shapegcode.program.foreign.arcs import centre_by_radius, sweep_of
+from shapegcode.program.foreign.arcs import PLANES, centre_by_radius, sweep_of
 from shapegcode.program.foreign.linuxcnc_codes import SYSTEMS, by_group_of, refuse_unused, sorted_words
 from shapegcode.program.foreign.linuxcnc_cycles import drill
 from shapegcode.program.foreign.linuxcnc_offsets import Offsets
-from shapegcode.program.foreign.linuxcnc_state import AXES, CYCLES, Modes, State, given_axes, plane_axes, system_words
+from shapegcode.program.foreign.linuxcnc_state import AXES, CYCLES, Modes, State, given_axes, system_words
 from shapegcode.program.foreign.read import PlainProgram, number_text, words_of
 
 _BEFORE_MOTION = (6, 19, 3, 4, 5, 7, 8, 9, 48, 49)
@@ -28,11 +29,8 @@ class BlockRunner:
     """Executes blocks and writes the lines that they become."""
 
     def __init__(self, state: State, plain: PlainProgram) -> None:
-        """Begin in this state."""
-        self.state = state
-        self.plain = plain
-        self.line = 1
-        self.file = 0
+        self.state, self.plain = state, plain
+        self.line, self.file = 1, 0
         self.number = ""  # N word that the next block takes
         self.written_distance = 900  # what the plain program's reader takes for granted
         self.written_motion: int | None = None  # None: what is in force there is not followed
@@ -61,13 +59,24 @@ class BlockRunner:
             self.put(f"({text})")
         if not words:
             return
-        self._feed(by_group.get("feed"), values)
+        modes, mode = self.state.modes, by_group.get("feed")
+        if mode not in {None, modes.feed_mode}:
+            modes.feed_mode, modes.feed, self.written_feed = mode or 0, 0.0, 0.0
+        if "f" in values:
+            if values["f"] < 0.0:
+                raise ValueError(f"F{values['f']:g} is negative")
+            modes.feed = values["f"]
         self._functions(functions, values)
         if "dwell" in by_group:
             self._dwell(values)
         pending = self._modal_codes(by_group, values)
         self._axes(by_group, values, pending)
-        self._stop(functions)
+        for function in functions:
+            if function in _STOPS:
+                self.put(f"M{0 if function == 60 else function:02d}")
+                self.ended = self.ended or function in {2, 30}
+                if function == 60:
+                    self.note("M60 changes the pallet and stops: kept as M00", "M60")
 
     def sync(self) -> None:
         """Before lines that are taken as they are: G90 or G91 and F are in force in the plain program too."""
@@ -89,15 +98,6 @@ class BlockRunner:
         return f"F{number_text(self.written_feed)}"
 
     # ---- what comes before the move --------------------------------------------------------------------------
-
-    def _feed(self, mode: int | None, values: Mapping[str, float]) -> None:
-        modes = self.state.modes
-        if mode not in {None, modes.feed_mode}:
-            modes.feed_mode, modes.feed, self.written_feed = mode or 0, 0.0, 0.0
-        if "f" in values:
-            if values["f"] < 0.0:
-                raise ValueError(f"F{values['f']:g} is negative")
-            modes.feed = values["f"]
 
     def _functions(self, functions: Sequence[int], values: Mapping[str, float]) -> None:
         """S, T and the M codes that come before a move."""
@@ -132,14 +132,12 @@ class BlockRunner:
             self.put("".join(line[start : start + 3]))
 
     def _dwell(self, values: Mapping[str, float]) -> None:
-        if "p" not in values:
+        if (seconds := values.get("p")) is None:
             raise ValueError("G4 needs P, the dwell in seconds")
-        if values["p"] < 0.0:
-            raise ValueError(f"G4 P{values['p']:g} is negative")
-        self.put(f"G04X{number_text(values['p'])}")
-        self.note(
-            f"G4 P{values['p']:g} is a dwell of {values['p']:g} s on LinuxCNC; on FANUC P counts milliseconds", "G4 P"
-        )
+        if seconds < 0.0:
+            raise ValueError(f"G4 P{seconds:g} is negative")
+        self.put(f"G04X{number_text(seconds)}")
+        self.note(f"G4 P{seconds:g} is a dwell of {seconds:g} s on LinuxCNC; on FANUC P counts milliseconds", "G4 P")
 
     def _modal_codes(self, by_group: Mapping[str, int], values: Mapping[str, float]) -> list[str]:
         """Codes that change a mode; those that may stand in the block of a move."""
@@ -195,11 +193,8 @@ class BlockRunner:
             self.note("G61.1 stops at the end of every block: FANUC's G61", "G61.1")
             return "G61"
         if code == 610:
-            self.note(
-                "G61 follows the path exactly and does not stop where it is smooth; FANUC's G61 would stop in every "
-                "block: read as G64",
-                "G61",
-            )
+            what = "G61 follows the path exactly and does not stop where it is smooth"
+            self.note(f"{what}; FANUC's G61 would stop in every block: read as G64", "G61")
             self.path_tolerances |= {(None, None), (0.0, 0.0)}  # more than one
         else:
             p, q = (values[name] * self.state.unit_mm if name in values else None for name in "pq")
@@ -258,20 +253,17 @@ class BlockRunner:
             raise ValueError("a drilling cycle in G93")
         feed = self._written_f() if modes.feed > 0.0 else ""
         self.written_motion = None
-        lines = list(self._holes(values, fresh=fresh))
+        times = 1
+        if "@" in values or "^" in values:  # each repetition goes on from the hole before it
+            times = int(values.get("l", 1.0))
+            values = {letter: value for letter, value in values.items() if letter != "l"}
+        lines: list[str] = []
+        for time in range(times):
+            lines += drill(self.state, modes.motion, self._cartesian(values), fresh and time == 0)
         if code := self._distance(900):
             self.put(code)
         for index, line in enumerate(lines):
             self.put(line + (feed if index == 0 or line.startswith("G01") else ""))
-
-    def _holes(self, values: Mapping[str, float], *, fresh: bool) -> Iterator[str]:
-        """The lines of a block of a cycle; with polar words each repetition goes on from the hole before it."""
-        times = 1
-        if "@" in values or "^" in values:
-            times = int(values.get("l", 1.0))
-            values = {letter: value for letter, value in values.items() if letter != "l"}
-        for time in range(times):
-            yield from drill(self.state, self.state.modes.motion, self._cartesian(values), fresh and time == 0)
 
     def _move(self, values: Mapping[str, float], codes: Sequence[str], *, machine: bool) -> None:
         """G0 to G3."""
@@ -337,7 +329,7 @@ class BlockRunner:
     def _arc(self, values: Mapping[str, float], start: Sequence[float | None], *, incremental: bool) -> list[str]:
         """Words of an arc and its F: one block, and one more for each further full turn."""
         state, modes, unit = self.state, self.state.modes, self.state.unit_mm
-        first, second = plane_axes(modes.plane)
+        first, second, normal = PLANES[modes.plane // 10]
         names = "ijk"[first], "ijk"[second]
         turns = values.get("p", 1.0)
         if turns != int(turns) or turns < 1:
@@ -356,7 +348,12 @@ class BlockRunner:
         turn = 1 if modes.motion == 30 else -1
         given = complex(values.get(names[0], 0.0), values.get(names[1], 0.0)) * unit
         if "r" in values:
-            centre = _centre_of_radius(here, to, values["r"] * unit, turn)
+            radius, chord = values["r"] * unit, abs(to - here)
+            if chord == 0.0 or radius == 0.0:
+                raise ValueError("an arc with R ends where it begins, or its R is 0")
+            if chord / 2.0 - abs(radius) > 0.00127:
+                raise ValueError(f"R{abs(radius):g} mm is too small for a chord of {chord:g} mm")
+            centre = centre_by_radius(here, to, radius, turn)
         elif modes.centres == 901 and any(name not in values for name in names):
             raise ValueError(f"G90.1 needs {names[0].upper()} and {names[1].upper()}")
         else:
@@ -366,7 +363,6 @@ class BlockRunner:
         total = abs(sweep_of(here, to, centre, turn)) + (turns - 1.0) * math.tau
         feed = self._arc_feed(values, total, abs(here - centre), start)
         blocks: list[str] = []
-        normal = 3 - first - second
         rise = values.get(AXES[normal])
         name = AXES[normal].upper()
         last = {letter: value for letter, value in values.items() if letter in "xyzabc"}
@@ -390,27 +386,18 @@ class BlockRunner:
         if self.state.modes.feed_mode != 930:
             return self._feed_word(values)
         self._feed_word(values)
-        normal = 3 - sum(plane_axes(self.state.modes.plane))
+        normal = PLANES[self.state.modes.plane // 10][2]
         begin, end = start[normal], self.state.position[normal]
         rise = 0.0 if begin is None or end is None else end - begin
         length = math.hypot(radius * sweep, rise)
         self.note("in G93 F counts the whole arc on LinuxCNC; FANUC's counts its radius: worked out", "G93")
         return f"F{number_text(self.state.modes.feed * length / radius)}"
 
-    def _stop(self, functions: Sequence[int]) -> None:
-        for function in functions:
-            if function in _STOPS:
-                self.put(f"M{0 if function == 60 else function:02d}")
-                self.ended = self.ended or function in {2, 30}
-                if function == 60:
-                    self.note("M60 changes the pallet and stops: kept as M00", "M60")
-
     def restore(self, saved: Modes) -> None:
         """Modes of M72: what differs is written."""
         modes, state = self.state.modes, self.state
         state.select_system(saved.system)
-        kept = saved.copy()
-        kept.motion = modes.motion
+        kept = replace(saved, motion=modes.motion)
         codes = [f"G{getattr(kept, name) // 10}" for name in ("plane", "units", "retract")
                  if getattr(kept, name) != getattr(modes, name)]  # fmt: skip
         if kept.feed_mode != modes.feed_mode:
@@ -436,13 +423,3 @@ def _plain_comment(text: str) -> str:
     if text.lower().startswith(("msg,", "debug,", "print,", "log", "probe")):
         return ""
     return "".join(c for c in text.upper() if " " <= c <= "~" and c not in "()%;").strip()
-
-
-def _centre_of_radius(here: complex, to: complex, radius: float, turn: int) -> complex:
-    """The centre of an arc with R."""
-    chord = abs(to - here)
-    if chord == 0.0 or radius == 0.0:
-        raise ValueError("an arc with R ends where it begins, or its R is 0")
-    if chord / 2.0 - abs(radius) > 0.00127:
-        raise ValueError(f"R{abs(radius):g} mm is too small for a chord of {chord:g} mm")
-    return centre_by_radius(here, to, radius, turn)

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from shapegcode.program.foreign.linuxcnc_state import CYCLES, Modes, normal_axis
+from shapegcode.program.foreign.arcs import PLANES
+from shapegcode.program.foreign.linuxcnc_state import CYCLES, Modes
 
 _MOTION = frozenset({0, 10, 20, 30, 800}) | CYCLES
 _ONE_SHOT = frozenset({40, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923})
@@ -116,7 +117,7 @@ def refuse_unused(
                 f"{letter.upper()}{values[letter]:g} and no word in the block that uses it: LinuxCNC refuses it"
             )
     plane = by_group.get("plane", modes.plane)
-    if motion in _ARCS and (across := "ijk"[normal_axis(plane)]) in values:
+    if motion in _ARCS and (across := "ijk"[PLANES[plane // 10][2]]) in values:
         raise ValueError(f"{across.upper()} is no centre of an arc in {code_text(plane)}: LinuxCNC refuses it")
     if motion in CYCLES and (axis := next((name for name in "abc" if name in values), None)):
         raise ValueError(f"{axis.upper()} in a drilling cycle: LinuxCNC refuses it")

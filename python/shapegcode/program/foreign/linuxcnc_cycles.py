@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from shapegcode.program.foreign.linuxcnc_state import AXES, CycleWords, State, normal_axis, plane_axes
+from shapegcode.program.foreign.arcs import PLANES
+from shapegcode.program.foreign.linuxcnc_state import AXES, CycleWords, State
 from shapegcode.program.foreign.read import number_text, words_of
 
 PECK_CLEARANCE_MM = 0.254
@@ -21,8 +22,7 @@ _REVERSED = {3: 4, 4: 3}
 def drill(state: State, code: int, words: Mapping[str, float], fresh: bool) -> Iterator[str]:
     """The lines of one block of a drilling cycle; the state is behind it then."""
     modes, unit = state.modes, state.unit_mm
-    normal = normal_axis(modes.plane)
-    first, second = sorted(plane_axes(modes.plane))
+    *plane_axes, normal = PLANES[modes.plane // 10]
     row = state.cycle
     if row is None:
         row = state.cycle = CycleWords(state.position[normal])
@@ -31,7 +31,11 @@ def drill(state: State, code: int, words: Mapping[str, float], fresh: bool) -> I
     if code in {740, 840} and row.dwell is None:
         row.dwell = state.cycle_dwell
     state.cycle_dwell = row.dwell if row.dwell is not None else state.cycle_dwell
-    r, bottom = _levels(row, incremental, unit, AXES[normal])
+    r, bottom = (row.r or 0.0) * unit, (row.bottom or 0.0) * unit
+    if incremental:
+        if row.initial is None:
+            raise ValueError(f"the position of {AXES[normal].upper()} is not known, from which G91 counts")
+        r, bottom = row.initial + r, row.initial + r + bottom
     if bottom > r:
         raise ValueError(f"R {r / unit:g} is below the bottom {bottom / unit:g} of the hole")
     repeats = words.get("l", 1.0)
@@ -51,7 +55,7 @@ def drill(state: State, code: int, words: Mapping[str, float], fresh: bool) -> I
     level = clear if modes.retract == 980 else None if here is None else max(here, r)
     lift = None if level == here else level
     for _ in range(int(repeats)):
-        for axis in (first, second):
+        for axis in sorted(plane_axes):
             given = words.get(AXES[axis])
             if given is None:
                 continue
@@ -59,7 +63,7 @@ def drill(state: State, code: int, words: Mapping[str, float], fresh: bool) -> I
             if incremental and here is None:
                 raise ValueError(f"the position of {AXES[axis].upper()} is not known, from which G91 counts")
             state.position[axis] = given * unit + ((here or 0.0) if incremental else 0.0)
-        known = ((axis, state.position[axis]) for axis in (first, second))
+        known = ((axis, state.position[axis]) for axis in sorted(plane_axes))
         place = words_of({AXES[axis]: value / unit for axis, value in known if value is not None})
         if lift is not None:
             yield f"G00{place}{AXES[normal].upper()}{number_text(lift / unit)}"
@@ -84,24 +88,14 @@ def _read_words(row: CycleWords, code: int, words: Mapping[str, float], normal: 
         raise ValueError(f"{_NEEDS_DWELL[code]} needs P, the dwell in seconds")
 
 
-def _levels(row: CycleWords, incremental: bool, unit: float, normal: str) -> tuple[float, float]:
-    """R and bottom in the program's coordinates, mm."""
-    r, bottom = (row.r or 0.0) * unit, (row.bottom or 0.0) * unit
-    if not incremental:
-        return r, bottom
-    if row.initial is None:
-        raise ValueError(f"the position of {normal.upper()} is not known, from which G91 counts")
-    return row.initial + r, row.initial + r + bottom
-
-
 def _hole(state: State, code: int, row: CycleWords, place: str, levels: tuple[float, float, float]) -> Iterator[str]:
-    """One hole."""
     unit = state.unit_mm
     r, _, clear = levels
-    axis = AXES[normal_axis(state.modes.plane)].upper()
+    normal = PLANES[state.modes.plane // 10][2]
+    axis = AXES[normal].upper()
     at_r, at_bottom, at_clear = (f"{axis}{number_text(level / unit)}" for level in levels)
     dwell = row.dwell or 0.0
-    begun = state.position[normal_axis(state.modes.plane)]
+    begun = state.position[normal]
     if _moves_as_fanuc(code, row, levels, unit, returns_to_r=clear == r) and (
         clear == r or clear in {row.entered, begun}
     ):
@@ -118,7 +112,11 @@ def _hole(state: State, code: int, row: CycleWords, place: str, levels: tuple[fl
     yield f"G00{place}" if place else "G00"
     yield f"G00{at_r}"
     if code in {730, 830}:
-        yield from _pecks(code, row, levels, axis, unit)
+        for depth in _depths(row.peck or 0.0, levels, unit):
+            yield f"G01{axis}{number_text(depth)}"
+            if code == 830:
+                yield f"G00{at_r}"
+            yield f"G00{axis}{number_text(depth + PECK_CLEARANCE_MM / unit)}"
     yield f"G01{at_bottom}"
     spindle = state.modes.spindle
     if code in {840, 740}:
@@ -135,15 +133,6 @@ def _hole(state: State, code: int, row: CycleWords, place: str, levels: tuple[fl
         yield "M05"
     if code in {840, 740, 860}:
         yield f"M{spindle:02d}"
-
-
-def _pecks(code: int, row: CycleWords, levels: tuple[float, float, float], axis: str, unit: float) -> Iterator[str]:
-    """The pecks before the last one."""
-    for depth in _depths(row.peck or 0.0, levels, unit):
-        yield f"G01{axis}{number_text(depth)}"
-        if code == 830:
-            yield f"G00{axis}{number_text(levels[0] / unit)}"
-        yield f"G00{axis}{number_text(depth + PECK_CLEARANCE_MM / unit)}"
 
 
 def _depths(peck: float, levels: tuple[float, float, float], unit: float) -> Iterator[float]:

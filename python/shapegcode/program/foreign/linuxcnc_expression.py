@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
     from shapegcode.program.foreign.linuxcnc_parameters import ParameterTable
@@ -20,12 +20,7 @@ _EQUAL = 1e-4  # EQ, NE: values nearer to each other are equal; in later version
 Value = Callable[["ParameterTable"], float]
 
 
-@dataclass(frozen=True)
-class Setting:
-    """`#5 = ...`, or `#<name> = ...`."""
-
-    name: str | Value
-    value: Value
+Setting: TypeAlias = tuple["str | Value", "Value"]  # `#5 = ...`, or `#<name> = ...`: what is set, and to what
 
 
 @dataclass(frozen=True)
@@ -117,7 +112,6 @@ class Scanner:
     """Reads values and words of one line, whose blanks are gone and letters small."""
 
     def __init__(self, text: str) -> None:
-        """Begin at the first character."""
         self.text = text
         self.at = 0
 
@@ -163,7 +157,7 @@ class Scanner:
             name = _worked_out(self.value())
         if not self.take("="):
             raise ValueError(f"= is expected at {self.left[:12]!r}")
-        return Setting(name, _worked_out(self.value()))
+        return name, _worked_out(self.value())
 
     def _parameter(self) -> Value:
         if (named := _NAME.match(self.text, self.at)) is not None:

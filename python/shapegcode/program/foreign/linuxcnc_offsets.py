@@ -14,7 +14,6 @@ class Offsets:
     """Changes offsets in the state and writes what FANUC's reader must know of it."""
 
     def __init__(self, state: State, put: Callable[[str], None]) -> None:
-        """Write through `put`."""
         self.state = state
         self._put = put
 
@@ -69,14 +68,11 @@ class Offsets:
                     raise ValueError(
                         "G53 G1: a cutting move in machine coordinates needs the work offset (input.work_offsets)"
                     )
-                self._machine(values)
+                self._in_absolute(f"G53G00{words_of(values)}")
+                self._forget(given_axes(values))
                 return {}
             found[AXES[axis]] = values[AXES[axis]] - sum(part or 0.0 for part in parts) / state.unit_mm
         return found
-
-    def _machine(self, values: Mapping[str, float]) -> None:
-        self._in_absolute(f"G53G00{words_of(values)}")
-        self._forget(given_axes(values))
 
     def _forget(self, axes: Sequence[int]) -> None:
         for axis in axes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from shapegcode.io.data_file import read_file
@@ -39,10 +39,6 @@ class Modes:
     spindle: int = 5
     mist: bool = False
     flood: bool = False
-
-    def copy(self) -> Modes:
-        """Another one with the same values."""
-        return replace(self)
 
 
 @dataclass
@@ -112,16 +108,6 @@ class CycleWords:
     entered: float | None = None  # level at which the plain program's row began, None: it is in none
 
 
-def normal_axis(plane: int) -> int:
-    """The axis of drilling in G17, G18, G19."""
-    return {170: 2, 180: 1, 190: 0}[plane]
-
-
-def plane_axes(plane: int) -> tuple[int, int]:
-    """First and second axis of the plane, in the sense in which G03 turns."""
-    return {170: (0, 1), 180: (2, 0), 190: (1, 2)}[plane]
-
-
 def system_words(system: int) -> str:
     """A work coordinate system in FANUC's words."""
     return f"G{53 + system}" if system <= 6 else f"G54.1 P{system - 6}"
@@ -168,9 +154,7 @@ def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | 
     """The tool table that `input.tool_table` (or an INI file there) states, else `tool.tbl` of the folder; or None."""
     if not stated:
         beside = folder / "tool.tbl" if folder is not None else None
-        if beside is None or not beside.is_file():
-            return None
-        return read_tool_table(beside, unit)
+        return read_tool_table(beside, unit) if beside is not None and beside.is_file() else None
     path = Path(stated).expanduser()
     if path.suffix.lower() != ".ini":
         return read_tool_table(path, unit)

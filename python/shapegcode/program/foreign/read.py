@@ -8,17 +8,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from shapegcode.errors import ProgramError, located_error
 from shapegcode.io.data_file import read_file
-
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
+from shapegcode.machine import Machine
 
 _MAX_CALLED_BYTES = 10_000_000
-MAX_DIGITS = 8
-"""Digits of a word in FANUC's words (alarm 0003)."""
+MAX_DIGITS = 8  # digits of a word in FANUC's words (alarm 0003)
 
 
 @dataclass(frozen=True)
@@ -159,6 +156,8 @@ _PERCENT = re.compile(rb"(?m)^[ \t]*%[ \t\r]*$")
 _WRITTEN_FOR = re.compile(rb"(?m)^[ \t]*[;(] ?DIALECT (KLIPPER|ISG)\b")
 COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
 
+_PATH_TOLERANCE = "tolerance of the path; FANUC's G64 has no P"
+_DWELLS = (b"G4F", b"G04F", b"G4 ", b"G04 ")
 _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ...] = (
     (
         "linuxcnc",
@@ -171,12 +170,7 @@ _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ..
     ),
     ("linuxcnc", (b"#<",), re.compile(rb"#<[^>\n]+>"), "named parameter"),
     ("linuxcnc", (b"G90.1", b"G91.1"), re.compile(rb"G9[01]\.1(?!\d)"), "centres of arcs"),
-    (
-        "linuxcnc",
-        (b"G64", b"G064"),
-        re.compile(rb"G0*64[ \t]*P[ \t]*[\d.]+"),
-        "tolerance of the path; FANUC's G64 has no P",
-    ),
+    ("linuxcnc", (b"G64", b"G064"), re.compile(rb"G0*64[ \t]*P[ \t]*[\d.]+"), _PATH_TOLERANCE),
     ("linuxcnc", (b"G59.",), re.compile(rb"G59\.[123](?!\d)"), "work coordinate system 7 to 9"),
     ("linuxcnc", (b"G38.",), re.compile(rb"G38\.[2-5](?!\d)"), "straight probe"),
     ("haas", (b"G154",), re.compile(rb"G154[ \t]*P[ \t]*\d+"), "additional work offset"),
@@ -186,12 +180,7 @@ _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ..
     ("haas", (b"G150",), re.compile(rb"G150(?!\d)"), "general pocket milling"),
     ("siemens", (b"CR",), re.compile(rb"(?<![A-Z])CR[ \t]*="), "radius of an arc"),
     ("siemens", (b"MSG",), re.compile(rb"(?<![A-Z])MSG(?=\s|\()"), "message"),
-    (
-        "siemens",
-        (b"G4F", b"G04F", b"G4 ", b"G04 "),
-        re.compile(rb"G0*4[ \t]*F[ \t]*[\d.]+"),
-        "dwell in seconds; FANUC's F is a feed",
-    ),
+    ("siemens", _DWELLS, re.compile(rb"G0*4[ \t]*F[ \t]*[\d.]+"), "dwell in seconds; FANUC's F is a feed"),
     ("siemens", (b"%_N_",), re.compile(rb"%_N_\w+"), "name of a program"),
     ("siemens", (b"=",), re.compile(rb"(?<![A-Z])R\d+[ \t]*="), "R parameter"),
     ("siemens", (b"AC", b"IC"), re.compile(rb"=[ \t]*[AI]C(?![A-Z])"), "absolute or incremental word"),
@@ -237,7 +226,8 @@ def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]
     Only words that a control alone knows count; the first 64 KiB are looked at, comments left out.
     """
     code = re.sub(rb";[^\n]*", b"", COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
-    code = code[: _end(code)]
+    ends = [match.end() for match in _PERCENT.finditer(code)] if b"%" in code else []
+    code = code[: ends[1]] if len(ends) > 1 else code  # no control reads beyond its second `%` line
     signs = [(each[0], *each[2:]) for each in _SIGNS if any(hint in code for hint in each[1])]
     found = _first_signs(code, signs)
     if found or of_fanuc:
@@ -271,30 +261,12 @@ def doubtful_word(text: bytes) -> tuple[int, str] | None:
         return None
     match = min(found, key=lambda each: each.start())
     value = int(match[1])
-    dwells = match.re is _SHORT_DWELL
     sentence = (
         f"G04 P{value} is read as {value} ms (FANUC, Haas); on LinuxCNC it is {value} s"
-        if dwells
+        if match.re is _SHORT_DWELL
         else f"P{value} of an arc is not read, as FANUC knows none; on LinuxCNC the arc has {value} turns"
     )
     return code.count(b"\n", 0, match.start()) + 1, f"{sentence}: state which with controller.dialect"
-
-
-def words_behind_semicolon(text: bytes) -> int | None:
-    """The first line with words behind a semicolon, which is a comment for other controls and a block for FANUC."""
-    if b";" not in text:
-        return None
-    match = next((each for each in _BEHIND_SEMICOLON.finditer(text) if each[1]), None)
-    return None if match is None else text.count(b"\n", 0, match.start()) + 1
-
-
-def _end(code: bytes) -> int:
-    """End of a program: no control reads beyond its second `%` line."""
-    ends = [match.end() for match in _PERCENT.finditer(code)] if b"%" in code else []
-    return ends[1] if len(ends) > 1 else len(code)
-
-
-Reader = Callable[..., ForeignProgram]
 
 
 def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | None) -> ForeignProgram | None:
@@ -309,32 +281,30 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
         return None
     text = data.removeprefix(BOM_UTF8).decode("latin-1")
     # Loaded when a program of its dialect is read: most are FANUC's.
-    read: Reader = getattr(import_module(f"shapegcode.program.foreign.{dialect}"), f"read_{dialect}")
+    read: Callable[..., ForeignProgram] = getattr(
+        import_module(f"shapegcode.program.foreign.{dialect}"), f"read_{dialect}"
+    )
     program = read(text, file=source, machine=machine, folder=folder)
     return replace(program, reason=reason)
 
 
 def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
     """A semicolon ends a block for FANUC, and begins a comment for other controls."""
-    line = words_behind_semicolon(data)
-    if line is not None:
-        raise refusal(
-            source,
-            line,
+    found = next((each for each in _BEHIND_SEMICOLON.finditer(data) if each[1]), None) if b";" in data else None
+    if found is not None:
+        message = (
             "words behind `;`: FANUC begins a block there, LinuxCNC, a Haas and a Sinumerik have a comment; write a "
-            "line end or ( ), or state the control: --set controller.dialect=linuxcnc, haas or siemens",
+            "line end or ( ), or state the control: --set controller.dialect=linuxcnc, haas or siemens"
         )
+        raise refusal(source, data.count(b"\n", 0, found.start()) + 1, message)
 
 
 def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]:
     """The dialect of a program."""
     if written := _WRITTEN_FOR.search(data[:LOOKED_AT_BYTES]):
         control = {b"KLIPPER": "Klipper", b"ISG": "the ISG kernel"}[written[1]]
-        raise refusal(
-            source,
-            data.count(b"\n", 0, written.start()) + 1,
-            f"emitted for {control}, whose programs are written and not read: keep the original",
-        )
+        message = f"emitted for {control}, whose programs are written and not read: keep the original"
+        raise refusal(source, data.count(b"\n", 0, written.start()) + 1, message)
     stated = machine.controller.dialect
     # A machine of FANUC's kind and a program without foreign words: the usual case takes one look.
     expected = stated if stated != "auto" else machine.controller.kind
@@ -342,23 +312,21 @@ def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]
     if stated != "auto":
         for sign in signs:
             if sign.dialect != stated:
-                raise refusal(
-                    source,
-                    sign.line,
+                message = (
                     f"this is a program for {CONTROLS[sign.dialect]}: {sign.words} ({sign.meaning}), which "
                     f"{CONTROLS[stated]} does not know; controller.dialect is {stated}: "
-                    f"--set controller.dialect={sign.dialect} reads it",
+                    f"--set controller.dialect={sign.dialect} reads it"
                 )
+                raise refusal(source, sign.line, message)
         return stated, f"controller.dialect = {stated}"
     if len(signs) > 1:
         first, second = signs[0], signs[1]
-        raise refusal(
-            source,
-            second.line,
+        message = (
             f"{second.words} is a word of {CONTROLS[second.dialect]} ({second.meaning}), and {first.words} in line "
             f"{first.line} one of {CONTROLS[first.dialect]} ({first.meaning}): the program mixes them; state the "
-            "control with controller.dialect",
+            "control with controller.dialect"
         )
+        raise refusal(source, second.line, message)
     if signs:
         return signs[0].dialect, signs[0].reason
     if machine.controller.kind == "linuxcnc":

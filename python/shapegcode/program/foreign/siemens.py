@@ -8,7 +8,6 @@ was found for is *assumed* and marked so in docs/reference/input_siemens.md.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -56,8 +55,7 @@ def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | Non
 
     Subprograms are looked for in the text, in `folder` and in `input.program_folders`: NAME.SPF, then NAME.MPF.
     """
-    run = _Run(source, file, machine, folder)
-    return run.program()
+    return _Run(source, file, machine, folder).program()
 
 
 class _Run:
@@ -77,7 +75,6 @@ class _Run:
         self._moves_left = machine.controller.max_expansion_moves + lines
 
     def program(self) -> ForeignProgram:
-        """Run it all."""
         main = self._store.main
         self.path.line = main.first
         name = re.sub(r"[^A-Z0-9 _.-]", "", main.name).replace("_", " ")[:32]
@@ -251,17 +248,13 @@ class _Run:
                 variable.write(parameter.name, (), start(self), word.column)
             variables[parameter.name] = variable
             if parameter.by_reference and value is not None:
-                references[parameter.name] = self._reference(value, word)
+                probe = _Probe()
+                value(probe)
+                if len(probe.found) != 1 or not self.knows(probe.found[0][0]):
+                    raise word.error(f"{word.name}: a value for a parameter with VAR must be a variable")
+                name, index = probe.found[0]
+                references[parameter.name] = Word(name, word.column, None, "", tuple(map(constant, index)))
         return variables, references
-
-    def _reference(self, value: Expression, word: Word) -> Word:
-        """The variable that is handed over by VAR."""
-        probe = _Probe()
-        value(probe)
-        if len(probe.found) != 1 or not self.knows(probe.found[0][0]):
-            raise word.error(f"{word.name}: a value for a parameter with VAR must be a variable")
-        name, index = probe.found[0]
-        return Word(name, word.column, None, "", tuple(constant(each) for each in index))
 
     # ---- control flow ------------------------------------------------------------------------------------------------
 
@@ -301,7 +294,14 @@ class _Run:
         elif kind == "AGAIN":
             return flow.again(block, index, whole(block.condition(self), "P", block.column) if block.condition else 1)
         elif kind == "DEF":
-            self._define(block)
+            for each in block.definitions:
+                if each.name in self._locals[-1]:
+                    continue  # reached again by a jump
+                shape = tuple(whole(size(self), f"size of {each.name}", each.column) for size in each.shape)
+                variable = Variable(each.kind, shape)
+                if each.start is not None:
+                    variable.write(each.name, (), convert(each.start(self), each.kind, each.column), each.column)
+                self._locals[-1][each.name] = variable
         return index + 1
 
     def _is_true(self, condition: Expression | None) -> bool:
@@ -320,16 +320,6 @@ class _Run:
         assert block.condition is not None
         now, end = self._counter(block), number(block.condition(self), block.column)
         return is_equal(now, end) or now < end
-
-    def _define(self, block: SiemensBlock) -> None:
-        for each in block.definitions:
-            if each.name in self._locals[-1]:
-                continue  # reached again by a jump
-            shape = tuple(whole(size(self), f"size of {each.name}", each.column) for size in each.shape)
-            variable = Variable(each.kind, shape)
-            if each.start is not None:
-                variable.write(each.name, (), convert(each.start(self), each.kind, each.column), each.column)
-            self._locals[-1][each.name] = variable
 
 
 class _Probe:
@@ -396,7 +386,7 @@ class _Store:
         self.main, self._machine = programs[0], machine
         self._known: dict[str, ProgramLines | None] = {each.name: each for each in programs}
         self._folders = program_folders(machine, folder)
-        self._files: Mapping[str, Path] | None = None
+        self._files: dict[str, Path] = {}  # by name in capitals; found when the first one is looked for
 
     def find(self, name: str) -> ProgramLines | None:
         """A program by its name; None: there is none."""
@@ -405,14 +395,12 @@ class _Store:
         return self._known[name]
 
     def _read(self, name: str) -> ProgramLines | None:
-        if self._files is None:
-            files: dict[str, Path] = {}
-            for folder in self._folders:
-                for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-                    files.setdefault(path.name.upper(), path)
-            self._files = files
-        for known in (f"{name}.SPF", f"{name}.MPF", f"_N_{name}_SPF", f"_N_{name}_MPF"):
-            if known in self._files:
-                path = self._files[known]
-                return replace(programs_of_source(called_source(path, self._machine), str(path))[0], name=name)
-        return None
+        for folder in self._folders:
+            for each in sorted(folder.iterdir()) if folder.is_dir() else ():
+                self._files.setdefault(each.name.upper(), each)
+        self._folders = []
+        known = (f"{name}.SPF", f"{name}.MPF", f"_N_{name}_SPF", f"_N_{name}_MPF")
+        path = next((self._files[file] for file in known if file in self._files), None)
+        if path is None:
+            return None
+        return replace(programs_of_source(called_source(path, self._machine), str(path))[0], name=name)

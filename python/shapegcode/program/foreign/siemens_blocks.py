@@ -91,12 +91,6 @@ _ENDS_OF = {"ELSE": "IF", "ENDIF": "IF", "ENDWHILE": "WHILE", "ENDFOR": "FOR", "
 _HEADING = re.compile(r"\s*%\s*(?:_N_)?([A-Z0-9_]+?)(?:_(MPF|SPF))?\s*$")
 
 
-def in_capitals(text: str) -> str:
-    """A line in capitals, but for its strings."""
-    parts = text.split('"')
-    return '"'.join(part if index % 2 else part.upper() for index, part in enumerate(parts))
-
-
 def split_comment(line: str) -> tuple[str, str]:
     """A line without its comment, and the comment."""
     if '"' not in line:
@@ -115,7 +109,8 @@ def split_comment(line: str) -> tuple[str, str]:
 def block_of(line: str) -> SiemensBlock:
     """Read a line."""
     code, comment = split_comment(line.rstrip())
-    scan = SiemensScanner(in_capitals(code))
+    parts = code.split('"')  # strings keep their small letters
+    scan = SiemensScanner('"'.join(part if index % 2 else part.upper() for index, part in enumerate(parts)))
     head = _HEAD.match(scan.text)
     assert head is not None  # all of it may be left out
     scan.at = head.end()
@@ -401,7 +396,11 @@ def programs_of_source(source: str, file: str) -> list[ProgramLines]:
     """The programs of a text: one, or several with heads `%_N_NAME_SPF`."""
     # A block ends with LF alone: str.splitlines would end a comment at a form feed or at a byte of an "Å", too.
     lines = source.replace("\r\n", "\n").replace("\r", " ").removesuffix("\n").split("\n")
-    heads = [(index, head) for index, line in enumerate(lines) if (head := _heading(line)) is not None]
+    heads = [
+        (index, head)
+        for index, line in enumerate(lines)
+        if line.lstrip().startswith("%") and (head := _HEADING.match(split_comment(line)[0].upper()))
+    ]
     stem = re.sub(r"(?i)^_N_|_(MPF|SPF)$|\.[A-Z0-9]+$", "", re.split(r"[/\\]", file)[-1]).upper()
     if not heads:
         return [ProgramLines(stem, file, 1, tuple(lines))]
@@ -410,7 +409,3 @@ def programs_of_source(source: str, file: str) -> list[ProgramLines]:
         ProgramLines(head[1], file, index + 2, tuple(lines[index + 1 : end]))
         for (index, head), end in zip(heads, ends, strict=True)
     ]
-
-
-def _heading(line: str) -> re.Match[str] | None:
-    return _HEADING.match(split_comment(line)[0].upper()) if line.lstrip().startswith("%") else None

@@ -12,8 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-Value = float | int | bool | str
-"""Value of an expression: REAL, INT, BOOL or STRING."""
+Value = float | int | bool | str  # value of an expression: REAL, INT, BOOL or STRING
 
 
 class WordError(ValueError):
@@ -41,8 +40,7 @@ class Scope(Protocol):
         """Value of a variable, an R parameter or an element of an array."""
 
 
-Expression = Callable[[Scope], Value]
-"""Function that returns its value in a scope."""
+Expression = Callable[[Scope], Value]  # function that returns its value in a scope
 
 _SPACE = re.compile(r"[ \t]*")
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?")
@@ -56,6 +54,7 @@ _LEVELS = (
     ("==", "<>", ">", "<", ">=", "<="), ("<<",), ("OR",), ("XOR",), ("AND",), ("B_OR",), ("B_XOR",), ("B_AND",),
     ("+", "-"), ("*", "/", "DIV", "MOD"),
 )  # fmt: skip
+_RANKS = {operator: rank for rank, operators in enumerate(_LEVELS) for operator in operators}
 _RELATIVE = 1e-12
 
 
@@ -109,23 +108,18 @@ class SiemensScanner:
             raise self.error(f"{self.rest or 'the end of the block'} where {what} is expected")
 
 
-def expression(scan: SiemensScanner) -> Expression:
-    """Read an expression, as far as it reaches."""
-    return _level(scan, 0)
-
-
-def _level(scan: SiemensScanner, level: int) -> Expression:
-    if level == len(_LEVELS):
-        return _unary(scan)
-    left = _level(scan, level + 1)
+def expression(scan: SiemensScanner, above: int = -1) -> Expression:
+    """Read an expression, as far as it reaches, or as operators of a higher rank do."""
+    left = _unary(scan)
     while True:
         scan.skip()
         begin = scan.at
         operator = scan.take(_OPERATOR)
-        if operator not in _LEVELS[level]:
+        rank = _RANKS.get(operator, -1)
+        if rank <= above:
             scan.at = begin
             return left
-        left = _binary(operator, left, _level(scan, level + 1), begin + 1)
+        left = _binary(operator, left, expression(scan, rank), begin + 1)
 
 
 def _binary(operator: str, left: Expression, right: Expression, column: int) -> Expression:

@@ -105,7 +105,6 @@ class SiemensPath:
     """Follows the moves of a program and writes them for FANUC."""
 
     def __init__(self, machine: Machine, out: PlainProgram) -> None:
-        """Begin where nothing is known."""
         self.machine, self.out = machine, out
         self.modes = SiemensModes()
         self.at = np.full(3, math.nan)  # in the coordinates of the work offset
@@ -138,10 +137,8 @@ class SiemensPath:
 
     def set_frame(self, frame: SiemensFrame) -> None:
         """Another programmable frame."""
-        changed = np.abs(frame.linear - self.modes.frame.linear).max(axis=1) + np.abs(
-            frame.offset - self.modes.frame.offset
-        )
-        self.modes.frame = frame
+        before, self.modes.frame = self.modes.frame, frame
+        changed = np.abs(frame.linear - before.linear).max(axis=1) + np.abs(frame.offset - before.offset)
         self.shifted = [was or change > 1e-12 for was, change in zip(self.shifted, changed, strict=True)]
 
     def set_plane(self, plane: int) -> None:
@@ -241,9 +238,8 @@ class SiemensPath:
         for axis, (value, incremental, column) in given.axes.items():
             if incremental and self.shifted[axis]:
                 setting = "whether the control adds that depends on a setting (SD42440, SD42442)"
-                wanted = "it must be programmed absolutely before"
-                name = "XYZ"[axis]
-                raise WordError(f"{name} incrementally behind a change of its offset: {setting}; {wanted}", column)
+                what = f"{'XYZ'[axis]} incrementally behind a change of its offset: {setting}"
+                raise WordError(f"{what}; it must be programmed absolutely before", column)
             target[axis] = here[axis] + value if incremental else value
             if not incremental:
                 self.shifted[axis] = False
@@ -331,7 +327,12 @@ class SiemensPath:
         first, second, _ = PLANES[modes.plane]
         tolerance = self.machine.controller.arc_radius_tolerance_mm
         if modes.motion == "CIP":
-            return arcs.through(here, self._middle(given, here), target)
+            middle = here.copy()
+            for axis, (value, incremental, _) in given.middle.items():
+                middle[axis] = here[axis] + value if incremental else value
+            if len(given.middle) < 2:
+                raise ValueError("CIP: the intermediate point must be given by two or three of I1=, J1=, K1=")
+            return arcs.through(here, middle, target)
         if modes.motion == "CT":
             if self.direction is None:
                 raise ValueError("CT needs the direction of a move before it, whose start is known")
@@ -357,14 +358,6 @@ class SiemensPath:
             raise ValueError(f"{modes.motion} without I, J, K, CR= or AR=: one of them must be given")
         return arcs.by_centre(here, target, centre, modes.plane, turn, tolerance)
 
-    def _middle(self, given: Given, here: Vector) -> Vector:
-        middle = here.copy()
-        for axis, (value, incremental, _) in given.middle.items():
-            middle[axis] = here[axis] + value if incremental else value
-        if len(given.middle) < 2:
-            raise ValueError("CIP: the intermediate point must be given by two or three of I1=, J1=, K1=")
-        return middle
-
     def _in_offset(self, element: Element, column: int) -> Element:
         """An arc in the coordinates of the work offset."""
         frame = self.modes.frame
@@ -374,15 +367,14 @@ class SiemensPath:
             return Element(start, end)
         first, second, across = PLANES[element.plane]
         linear = frame.linear
-        scale = math.sqrt(
-            abs(linear[first, first] * linear[second, second] - linear[first, second] * linear[second, first])
-        )
         inner = linear[np.ix_([first, second], [first, second])]
+        turned = inner[0, 0] * inner[1, 1] - inner[0, 1] * inner[1, 0]  # its determinant
+        scale = math.sqrt(abs(turned))
         tilt = np.abs(np.r_[linear[across, [first, second]], linear[[first, second], across]]).max()
         if tilt > 1e-9 or np.abs(inner @ inner.T - scale * scale * np.eye(2)).max() > 1e-9:
             what = "a frame that tilts its plane or makes it an ellipse (ROT, SCALE)"
             raise WordError(f"an arc in G{element.plane} under {what}: it is not read", column)
-        side = math.copysign(1.0, inner[0, 0] * inner[1, 1] - inner[0, 1] * inner[1, 0])
+        side = math.copysign(1.0, turned)
         return Element(start, end, frame.apply(element.centre), element.plane, element.sweep_rad * side)
 
     # ---- writing -----------------------------------------------------------------------------------------------------
@@ -392,9 +384,12 @@ class SiemensPath:
         ahead = element.direction_at(0.0)
         self._end_corner(element, ahead, motion, moved)
         known = bool(np.all(np.isfinite(element.start[moved])))
-        corner = self._corner_of(element, given, known)
-        if corner is not None:
-            self._corner = corner
+        kind, size = given.corner or ("RND", self.modes.rounding_mm)
+        is_possible = self.modes.motion != "G0" and known and size > 0.0
+        if is_possible:
+            self._corner = _HeldCorner(element, kind, size, given.corner is None, given.column)
+        elif size < 0.0 or (size > 0.0 and given.corner is not None):
+            raise given.error(f"{kind}={size:g}: it must be more than 0, in a block with a feed whose start is known")
         exact = "G09" if given.exact else ""
         if motion == "G0":
             self.put(f"{exact}G00{self._axes(element.end, moved)}")
@@ -453,10 +448,8 @@ class SiemensPath:
         total = math.log(feed / start) / slope
         acceleration = max(feed, start) * abs(slope)  # mm/min²
         count = max(1, math.ceil(total / math.sqrt(8.0 * _FLIN_ERROR_MM / acceleration)))
-        self.note(
-            "FLIN: the feed is linear along the path of a block; it is read as blocks of constant feed, within 0.5 um",
-            "FLIN",
-        )
+        how = "it is read as blocks of constant feed, within 0.5 um"
+        self.note(f"FLIN: the feed is linear along the path of a block; {how}", "FLIN")
         ends = [start * math.expm1(slope * total * k / count) / slope / length for k in range(1, count)]
         bounds = [0.0, *ends, 1.0]
         return [(bounds[k], bounds[k + 1], total / count, 0.0) for k in range(count)]
@@ -493,15 +486,6 @@ class SiemensPath:
 
     # ---- corners -----------------------------------------------------------------------------------------------------
 
-    def _corner_of(self, element: Element, given: Given, known: bool) -> _HeldCorner | None:
-        kind, size = given.corner or ("RND", self.modes.rounding_mm)
-        is_possible = self.modes.motion != "G0" and known and size > 0.0
-        if size == 0.0 or (given.corner is None and size > 0.0 and not is_possible):
-            return None
-        if not is_possible:
-            raise given.error(f"{kind}={size:g}: it must be more than 0, in a block with a feed whose start is known")
-        return _HeldCorner(element, kind, size, given.corner is None, given.column)
-
     def _end_corner(self, element: Element, ahead: Vector, motion: str, moved: list[bool]) -> None:
         """Write the corner between the block that was held and this one."""
         corner = self._corner
@@ -509,11 +493,8 @@ class SiemensPath:
             return
         first, second, across = PLANES[self.modes.plane]
         behind = corner.element.direction_at(1.0)
-        in_plane = (
-            not moved[across]
-            and abs(behind[across]) < 1e-9
-            and (element.centre is None or element.plane == self.modes.plane)
-        )
+        in_plane = element.centre is None or element.plane == self.modes.plane
+        in_plane = in_plane and not moved[across] and abs(behind[across]) < 1e-9
         cosine = float(np.clip(behind[[first, second]] @ ahead[[first, second]], -1.0, 1.0))
         if motion == "G0" or not in_plane or len(self._held) != 1:
             if not corner.is_modal:

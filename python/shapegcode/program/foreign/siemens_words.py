@@ -30,7 +30,7 @@ _FRAMES = {"TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR", "AMIRR
 _ONE_OF = (("CR", "AR"), ("RND", "CHF", "CHR"))  # words that exclude each other
 _BEHIND = {0, 1, 2, 5, 9, 30}  # M functions behind the motion of their block
 _OF_THE_MACHINE = ("G53", "G153", "SUPA")  # coordinates
-_ENDS = {"M2": "M2", "M30": "M30", "M17": "M17"}
+_ENDS = ("M17", "M2", "M30")
 
 _BLOCKS_OF_THEIR_OWN = ("G4", "G110", "G111", "G112", "G74", "G75", "G25", "G26")
 _GROUPS = (
@@ -69,7 +69,6 @@ class BlockWords:
     """Executes blocks of words."""
 
     def __init__(self, path: SiemensPath, run: Run, *, uses_m6: bool) -> None:
-        """Begin without a tool."""
         self.path, self._run = path, run
         self._uses_m6 = uses_m6
         self._tool, self._next_tool, self._edge, self._next_edge = 0, 0, -1, -1
@@ -112,8 +111,12 @@ class BlockWords:
         if name := next((name for name in _BLOCKS_OF_THEIR_OWN if name in names), ""):
             self._special(name, words)
             return ""
-        if words[0].name in ("CALL", "EXTCALL"):
-            self._called(words)
+        if (call := words[0]).name in ("CALL", "EXTCALL"):
+            called = call.given[0](self._run) if len(words) == 1 and call.given and call.given[0] else None
+            if not isinstance(called, str):
+                must = "the name of a program in quotes and brackets must follow"
+                raise call.error(f'{call.name}: {must}: {call.name}("NAME")')
+            self._run.call_named(called, call)
             return ""
         given = Given(column=block.column, start_feed=self.path.modes.feed)
         own_frame = next((word.name for word in reversed(words) if word.name in _OF_THE_MACHINE), "")
@@ -135,7 +138,8 @@ class BlockWords:
             self.path.put(f"M{code:02d}")
         if "RET" in names:
             return "M17"
-        return self._ended(functions)
+        codes = {f"M{self._whole(word)}" for word in functions if word.name == "M"}
+        return next((code for code in _ENDS if code in codes), "")
 
     def _refuse_twice(self, words: tuple[Word, ...]) -> None:
         """An address twice (alarm 12010), and the words that exclude each other."""
@@ -151,10 +155,6 @@ class BlockWords:
             seen.add(word.name)
         if "CR" in seen and (other := next((name for name in ("I", "J", "K") if name in seen), "")):
             raise words[0].error(f"CR= and {other} in one block: leave one of them out")
-
-    def _ended(self, functions: list[Word]) -> str:
-        codes = {f"M{self._whole(word)}" for word in functions if word.name == "M"}
-        return next((_ENDS[code] for code in sorted(codes) if code in _ENDS), "")
 
     # ---- values ------------------------------------------------------------------------------------------------------
 
@@ -195,7 +195,13 @@ class BlockWords:
         elif name == "G9":
             given.exact = True
         elif name in ("G60", "G64", "G641", "G642", "G643", "G644", "G645"):
-            self._path_control(name)
+            code = "G61" if name == "G60" else "G64"
+            if code != self._path_mode:
+                self._path_mode = code
+                self.path.put(code)
+            if name not in ("G60", "G64"):
+                what = "by how much the control rounds corners is its own"
+                self.path.note(f"G641 to G645 are read as G64: {what}", "G641")
         elif re.fullmatch(r"G5[4-7]|G500|G50[5-9]|G5[1-9]\d", name):
             self.path.set_offset(name)
             if int(name[1:]) >= 500:
@@ -205,14 +211,6 @@ class BlockWords:
             self.path.note(_tables()[0][name])
         elif name != "RET":
             raise self._refusal(word)
-
-    def _path_control(self, name: str) -> None:
-        code = "G61" if name == "G60" else "G64"
-        if code != self._path_mode:
-            self._path_mode = code
-            self.path.put(code)
-        if name not in ("G60", "G64"):
-            self.path.note("G641 to G645 are read as G64: by how much the control rounds corners is its own", "G641")
 
     def _refusal(self, word: Word) -> WordError:
         for pattern, reason in _tables()[2].items():
@@ -287,7 +285,6 @@ class BlockWords:
             raise word.error(f"{name}= with {self.path.modes.motion or 'no G code'}: G2 or G3 must be in force")
 
     def _go(self, given: Given, rotary: dict[str, float], own_frame: str) -> None:
-        """The motion of a block."""
         if rotary:
             if given.axes or given.polar or self.path.modes.motion != "G0":
                 name = next(iter(rotary))
@@ -422,9 +419,8 @@ class BlockWords:
     def _special(self, name: str, words: tuple[Word, ...]) -> None:
         others = [word for word in words if word.name != name]
         if name in ("G25", "G26"):
-            self.path.note(
-                f"{name} is left out: limits of the working area and the spindle change no programmed path", name
-            )
+            what = "limits of the working area and the spindle change no programmed path"
+            self.path.note(f"{name} is left out: {what}", name)
         elif name == "G4":
             self._dwell(others)
         elif name in ("G74", "G75"):
@@ -472,18 +468,8 @@ class BlockWords:
         self.path.forget(axes)
         self.path.note(f"{name} is written as G{28 if name == 'G74' else 30}", name)
 
-    def _called(self, words: tuple[Word, ...]) -> None:
-        word = words[0]
-        if word.given and word.given[0] is not None and len(words) == 1:
-            name = word.given[0](self._run)
-            if isinstance(name, str):
-                self._run.call_named(name, word)
-                return
-        raise word.error(f'{word.name}: the name of a program in quotes and brackets must follow: {word.name}("NAME")')
-
 
 def _frame_of(kind: str, values: dict[str, float], plane: int, column: int) -> SiemensFrame:
-    """One programmable frame."""
     vector = np.array([values.get(axis, 0.0) for axis in "XYZ"])
     if kind == "TRANS":
         return SiemensFrame(offset=vector)
