@@ -17,6 +17,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
+from shapegcode.cli.options import refuse_same_file
+from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import write_bytes, write_lines
 
 if TYPE_CHECKING:
@@ -106,9 +108,6 @@ def check_files(
     args: argparse.Namespace, *, also_written: Sequence[str | Path] = (), also_read: Sequence[str | Path] = ()
 ) -> None:
     """Refuse to write a file that the same run reads, or writes twice; only one of them can have standard output."""
-    from shapegcode._core import ArgumentError
-    from shapegcode.cli.options import refuse_same_file
-
     given = {name: value for name in _WRITTEN if (value := getattr(args, name, None)) is not None}
     piped = ["-o -" if name == "output" else f"--{name} -" for name, value in given.items() if value == "-"]
     if len(piped) > 1:
