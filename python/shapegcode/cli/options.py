@@ -221,17 +221,13 @@ def overridden(machine: Machine, args: argparse.Namespace, keys: Mapping[str, st
 def _facts(key: str) -> tuple[str, str, Any]:
     """Meaning, unit and type of a key of the machine file."""
     from shapegcode.machine import Machine
-    from shapegcode.settings.keys import facts, table_type
+    from shapegcode.settings.keys import facts
+    from shapegcode.settings.load import field_of
 
-    table: Any = Machine
-    *tables, last = key.split(".")
-    for name in tables:
-        table = table_type(table.model_fields[name])
-    field = table.model_fields[last]
-    kind = field.annotation
-    if isinstance(kind, UnionType):
-        kind = get_args(kind)[0]
-    if get_origin(kind) is Annotated:
+    field = field_of(Machine, key.split("."))
+    assert field is not None
+    kind: Any = field.annotation
+    while isinstance(kind, UnionType) or get_origin(kind) is Annotated:
         kind = get_args(kind)[0]
     return field.description or "", facts(field).get("unit", ""), kind
 

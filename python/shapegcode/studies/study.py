@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -45,6 +44,7 @@ from shapegcode.studies.varied import (
     Varied,
     Vary,
     index_problem,
+    salib,
     sampled_columns,
     sampled_machine,
     varied_values,
@@ -333,15 +333,12 @@ def parameter_sensitivity(
 
 def _indices(varied: Sequence[Varied], shares: FloatArray, seed: int) -> dict[str, tuple[float, ...]]:
     """First-order and total index of each value by SALib, and their errors; none where nothing changes the share."""
-    try:
-        from SALib.analyze import sobol
-    except ModuleNotFoundError as error:
-        raise ArgumentError(f"indices: need {error.name}: pip install 'shapegcode[study]'") from None
+    sobol = salib("analyze")
     if float(np.ptp(shares)) == 0.0:
         return {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found: Any = sobol.analyze(index_problem(varied), shares, calc_second_order=False, seed=seed)
+        found = sobol.analyze(index_problem(varied), shares, calc_second_order=False, seed=seed)
     return {
         each.key: tuple(float(found[name][rank]) for name in ("S1", "ST", "S1_conf", "ST_conf"))
         for rank, each in enumerate(varied)
