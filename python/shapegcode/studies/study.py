@@ -170,11 +170,8 @@ class _StudyRun:
         return texts
 
     def _row(self, index: int, *, known: bool) -> dict[str, object]:
-        return {
-            each.key: column[index]
-            for each, column in zip(self.varied, self.columns, strict=True)
-            if each.known == known
-        }
+        pairs = zip(self.varied, self.columns, strict=True)
+        return {each.key: column[index] for each, column in pairs if each.known == known}
 
     def _text(self, draws: tuple[int, ...], values: Mapping[str, object]) -> _Text:
         machine = sampled_machine(self.machine, values, f"{self.machine.name}, draw {draws[0] + 1}")
@@ -298,10 +295,11 @@ def interval_of(good: int, count: int) -> tuple[float, float]:
 def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple[BinQuantiles, ...]:
     """Quantiles of a measure over a varied value: in ten bins with equal numbers of samples, or by choice."""
     if isinstance(each.distribution, Listed):
-        places = [(str(choice), [index for index, value in enumerate(column) if value == choice])
-                  for choice in each.distribution.values]  # fmt: skip
-        groups = [(rank, name, np.array(chosen, dtype=int)) for rank, (name, chosen) in enumerate(places) if chosen]
-        return tuple(_bin(float(rank), name, values[chosen]) for rank, name, chosen in groups)
+        groups = [
+            (rank, str(choice), [index for index, value in enumerate(column) if value == choice])
+            for rank, choice in enumerate(each.distribution.values)
+        ]
+        return tuple(_bin(float(rank), name, values[chosen]) for rank, name, chosen in groups if chosen)
     numbers = np.asarray(column, dtype=float)
     order = np.argsort(numbers, kind="stable")
     count = max(1, min(_BINS, len(order) // _MIN_IN_BIN))
@@ -324,9 +322,8 @@ def parameter_sensitivity(
     for each, column in zip(varied, columns, strict=True):
         bins = bins_of(each, column, shares)
         low, high = min(bins, key=lambda one: one.median), max(bins, key=lambda one: one.median)
-        rows.append(
-            ParameterInfluence(each.key, low.median, high.median, low.name, high.name, *found.get(each.key, ()))
-        )
+        index = found.get(each.key, ())
+        rows.append(ParameterInfluence(each.key, low.median, high.median, low.name, high.name, *index))
     rank = (lambda row: row.total or 0.0) if found else (lambda row: row.high - row.low)
     return tuple(sorted(rows, key=rank, reverse=True))
 
