@@ -12,20 +12,9 @@ from dataclasses import dataclass
 from shapegcode._core import ArgumentError, DesignError, NumericError, ProgramError, ShapegcodeError
 
 __all__ = [
-    "ArgumentError",
-    "DesignError",
-    "FileError",
-    "MachineError",
-    "NumericError",
-    "Problem",
-    "ProgramError",
-    "RecordError",
-    "RoundTripError",
-    "RunsFileError",
-    "ShapegcodeError",
-    "StockError",
-    "ToolError",
-]
+    "ArgumentError", "DesignError", "FileError", "MachineError", "NumericError", "Problem", "ProgramError",
+    "RecordError", "RoundTripError", "RunsFileError", "ShapegcodeError", "StockError", "ToolError",
+]  # fmt: skip
 
 
 def located_error(source: str, line: int, column: int, message: str, alarm: int = 0) -> ProgramError:
@@ -69,12 +58,8 @@ class FileError(ShapegcodeError, ValueError):
         """Build the message ``file[:line]: key = value: limit``, one line per problem."""
         self.file = file
         self.problems = problems
-        super().__init__(
-            "\n".join(
-                f"{file}:{problem.line}: {problem}" if problem.line is not None else f"{file}: {problem}"
-                for problem in problems
-            )
-        )
+        heads = (file if problem.line is None else f"{file}:{problem.line}" for problem in problems)
+        super().__init__("\n".join(f"{head}: {problem}" for head, problem in zip(heads, problems, strict=True)))
 
 
 class MachineError(FileError):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import json
 import os
 import re
@@ -170,7 +169,7 @@ def test_options_change_the_result(folder: Path) -> None:
 )
 def test_options_that_stand_for_a_key_of_the_machine(words: str, key: str, value: object) -> None:
     parser = argparse.ArgumentParser()
-    convert.add_arguments(parser)
+    convert.CONVERT.declare(parser)
     args = parser.parse_args(["in.nc", "-m", "vx500", "-o", "out.nc", *words.split()])
     machine = sg.Machine.load("vx500")
     assert overridden(load_machine(args), args, convert.MACHINE_KEYS) == machine.with_values(key, value)
@@ -191,7 +190,7 @@ def test_an_option_has_one_name_and_one_unit_on_every_command() -> None:
 
     for command in COMMANDS:
         parser = argparse.ArgumentParser()
-        importlib.import_module(command.module).add_arguments(parser)
+        command.interface().declare(parser)
         look(parser)
     # What is written has the name of what it is, and the program of a test cut its number.
     written = {"--html", "--output", "--program"}

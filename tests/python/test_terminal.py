@@ -12,7 +12,7 @@ import pytest
 
 from command import run
 from shapegcode.cli import COMMANDS, parser_of
-from shapegcode.cli.arguments import EXAMPLES, GROUPS
+from shapegcode.cli.arguments import GROUPS, examples
 from shapegcode.results.table import Column, Table
 
 PART = "%\nO0001\nG90 G17 G21 G94\nG00 X0 Y0 Z5.\nG01 Z-1. F300\nX20. F900\nX20. Y20.\nG00 Z5.\nM30\n%\n"
@@ -33,12 +33,12 @@ def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
 
 def test_each_command_has_two_examples_that_it_understands() -> None:
     found = dict(parsers())
-    assert set(EXAMPLES) == set(found)
+    assert set(examples()) == set(found)
     for name, parser in found.items():
-        examples = EXAMPLES[name]
-        assert len(examples) == 2, name
+        lines = examples()[name]
+        assert len(lines) == 2, name
         text = parser.format_help()
-        for example in examples:
+        for example in map(str.strip, lines):
             assert f"\n  {example}\n" in text, name
             words = shlex.split(example.partition(" > ")[0])
             assert words[0] == "shapegcode"

@@ -226,7 +226,7 @@ def _as_nobody(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """Within a fork of this process: another user may not be allowed to read the package."""
     import importlib
 
-    for name in ("convert", "time", "simulate", "machine", "several"):
+    for name in ("convert", "programs", "machine", "several"):
         importlib.import_module(f"shapegcode.cli.{name}")
     run(folder, *(word.replace("out/file", "warm") for word in words))  # everything that it needs is loaded then
     reading, writing = os.pipe()

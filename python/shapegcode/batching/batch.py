@@ -8,7 +8,7 @@ import os
 import shutil
 import time
 from collections.abc import Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from shapegcode.batching.manifest import Manifest, base_folder
@@ -87,9 +87,7 @@ def batch(
         planned = plan(sources, [str(each) for each in machines], str(output), command, options, html, base)
         # A scheduler that does not answer is found before anything is written; processes of this machine end before
         # the folder goes that they work in.
-        remote: tuple[Executor, int] | None = (
-            None if cluster is None else stack.enter_context(cluster_executor(cluster, processes))
-        )
+        remote = None if cluster is None else stack.enter_context(cluster_executor(cluster, processes))
         manifest = Manifest(Path(output), resume=resume, base=base.folder)
         stack.callback(manifest.close)
         if html is not None:
@@ -101,15 +99,13 @@ def batch(
             file.unlink(missing_ok=True)
         scratch.mkdir()
         stack.callback(shutil.rmtree, scratch, ignore_errors=True)
+        executor, slots = remote or (ThreadPoolExecutor(max_workers=processes), processes)
         if remote is None:
-            remote = ThreadPoolExecutor(max_workers=processes), processes
-            stack.callback(remote[0].shutdown)
+            stack.callback(executor.shutdown)
             stack.callback(hosts.end)
-            stack.callback(remote[0].shutdown, wait=False, cancel_futures=True)
-        executor, slots = remote
-        prepare = functools.partial(
-            pack, seconds=time_limit_s, memory_bytes=memory_limit_bytes, scratch="" if cluster else str(scratch)
-        )
+            stack.callback(executor.shutdown, wait=False, cancel_futures=True)
+        where = "" if cluster else str(scratch)
+        prepare = functools.partial(pack, seconds=time_limit_s, memory_bytes=memory_limit_bytes, scratch=where)
         run = Runs(planned, manifest, folders, resume, on_progress)
         stopped = run.all(executor, slots, prepare, run_packed if cluster else hosts.run)
     rows = KeptRows(manifest.path, planned, run.places, run.earlier)

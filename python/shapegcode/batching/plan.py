@@ -83,7 +83,7 @@ def _listed(file: Path, avoid: Path) -> Iterator[Source]:
 
 
 def _matching(pattern: str, avoid: Path) -> Iterator[Source]:
-    root = _fixed_part(pattern)
+    root = os.path.dirname(re.split(r"[*?\[]", pattern, maxsplit=1)[0]) or "."  # what stands before the first wildcard
     found = False
     for file in sorted(glob.glob(pattern, recursive=True)):
         if os.path.isfile(file) and avoid not in Path(file).absolute().parents:
@@ -91,12 +91,6 @@ def _matching(pattern: str, avoid: Path) -> Iterator[Source]:
             yield Source(file, os.path.relpath(file, root))
     if not found:
         raise ArgumentError(f"{pattern}: no such file, folder or match")
-
-
-def _fixed_part(pattern: str) -> str:
-    """The folder part of a pattern before its first wildcard."""
-    fixed = pattern[: re.search(r"[*?\[]", pattern).start()] if glob.has_magic(pattern) else pattern  # type: ignore[union-attr]
-    return os.path.dirname(fixed) or "."
 
 
 def _in_folder(folder: Path, avoid: Path) -> Iterator[Source]:
@@ -211,8 +205,7 @@ class Plan:
     def files(self, rank: int) -> dict[str, bytes]:
         """What a run reads."""
         line, source = self._of(rank)
-        name = self.base.name_of(source.path)
-        found = {name: read_file(source.path)}
+        found = {self.base.name_of(source.path): read_file(source.path)}
         for called, path in called_files(source.path, line.machine, self.base.path_of(".")):
             found[self.base.name_of(called)] = read_file(path)
         return found | {key: content for key, content in self.shared.items() if key in line.files}
@@ -230,14 +223,9 @@ class Plan:
 
 
 def plan(
-    sources: Sequence[Source],
-    machines: Sequence[str],
-    output: str,
-    command: str,
-    options: Sequence[str],
-    html: str | Path | None,
-    base: Base,
-) -> Plan:
+    sources: Sequence[Source], machines: Sequence[str], output: str, command: str, options: Sequence[str],
+    html: str | Path | None, base: Base,
+) -> Plan:  # fmt: skip
     """The runs of programs on machines."""
     if not machines:
         raise ArgumentError("no machine: name one with -m")
@@ -266,10 +254,7 @@ def _with_files(options: Sequence[str], base: Base) -> tuple[list[str], list[tup
     files: list[tuple[str, str]] = []
     for word in options:
         option, sign, value = word.partition("=") if word.startswith("--") else ("", "", word)
-        if value and os.path.isfile(value):
-            name = base.name_of(value)
-            files.append((name, value))
-            words.append(f"{option}{sign}{name}")
-        else:
-            words.append(word)
+        if is_file := bool(value) and os.path.isfile(value):
+            files.append((base.name_of(value), value))
+        words.append(f"{option}{sign}{files[-1][0]}" if is_file else word)
     return words, files

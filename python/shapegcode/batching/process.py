@@ -9,7 +9,6 @@ import contextlib
 import hashlib
 import json
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -18,7 +17,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import IO, TYPE_CHECKING, Any, Literal, cast
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import named_errors
@@ -96,11 +95,10 @@ def pack(
     job: BatchJob, files: Mapping[str, bytes], *, seconds: float = 0.0, memory_bytes: int = 0, scratch: str = ""
 ) -> Packed:
     """Pickle a run for another process."""
-    version = this_version()
     hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
-    whole = json.dumps([version, list(job.words), hashes], sort_keys=True)
+    whole = json.dumps([this_version(), list(job.words), hashes], sort_keys=True)
     fingerprint = hashlib.sha256(whole.encode()).hexdigest()
-    return Packed(job.words, files, version, fingerprint, seconds, memory_bytes, scratch)
+    return Packed(job.words, files, this_version(), fingerprint, seconds, memory_bytes, scratch)
 
 
 _ENVIRONMENT = {
@@ -117,23 +115,19 @@ class _Host:
     """A process that forks one for each job; `ask` may be called by one thread at a time."""
 
     def __init__(self, command: str) -> None:
-        self._process: subprocess.Popen[bytes] = subprocess.Popen(
-            [sys.executable, "-m", "shapegcode.cli.host", command],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env={**_ENVIRONMENT, **os.environ},
-            # Ctrl-C of a terminal is for the batch alone, which ends its hosts itself.
-            start_new_session=True,
-        )
+        # Ctrl-C of a terminal is for the batch alone, which ends its hosts itself: they have a session of their own.
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "shapegcode.cli.host", command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            env={**_ENVIRONMENT, **os.environ}, start_new_session=True,
+        )  # fmt: skip
+        self._requests, self._answers = cast(IO[bytes], self._process.stdin), cast(IO[bytes], self._process.stdout)
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any] | None:
         """The host's answer; None: it is gone."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
         try:
-            self._process.stdin.write(json.dumps(request).encode() + b"\n")
-            self._process.stdin.flush()
-            line = self._process.stdout.readline()
+            self._requests.write(json.dumps(request).encode() + b"\n")
+            self._requests.flush()
+            line = self._answers.readline()
         except (OSError, ValueError):
             return None
         return json.loads(line) if line.endswith(b"\n") else None
@@ -142,16 +136,14 @@ class _Host:
         """End it, and the job that it runs."""
         # It ends its job when its input ends.
         with contextlib.suppress(OSError, ValueError):
-            if self._process.stdin is not None:
-                self._process.stdin.close()
+            self._requests.close()
         try:
             self._process.wait(2.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
         with contextlib.suppress(OSError):
-            if self._process.stdout is not None:
-                self._process.stdout.close()
+            self._answers.close()
 
 
 class Hosts:
@@ -167,11 +159,9 @@ class Hosts:
         """Run a job in a process of its own, in a folder that is gone afterwards."""
         if packed.version != (mine := this_version()):
             return JobOutcome("other version", 0, "", f"this worker has {mine}, the batch needs {packed.version}", {})
-        folder = Path(tempfile.mkdtemp(prefix="job-", dir=packed.scratch or None))
-        try:
-            return self._run_in(folder, packed)
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+        where = packed.scratch or None
+        with tempfile.TemporaryDirectory(prefix="job-", dir=where, ignore_cleanup_errors=True) as folder:
+            return self._run_in(Path(folder), packed)
 
     def end(self) -> None:
         """Kill all workers and their runs; later requests get a killed job."""
@@ -208,16 +198,13 @@ class Hosts:
             if os.sep in word and not os.path.isabs(word):  # folders of the batch exist also where a run writes
                 Path(os.path.normpath(cwd / word)).parent.mkdir(parents=True, exist_ok=True)
         host = self._host(packed.words[0])
-        answer = None
-        if host is not None:
-            answer = host.ask(
-                {"cwd": str(cwd), "logs": str(folder), "words": packed.words, "seconds": packed.seconds,
-                 "memory_bytes": packed.memory_bytes}
-            )  # fmt: skip
-            if answer is None:
-                host.end()
-                with self._lock:
-                    self._all.discard(host)
+        limits = {"seconds": packed.seconds, "memory_bytes": packed.memory_bytes}
+        job = {"cwd": str(cwd), "logs": str(folder), "words": packed.words, **limits}
+        answer = None if host is None else host.ask(job)
+        if host is not None and answer is None:
+            host.end()
+            with self._lock:
+                self._all.discard(host)
         if answer is None:
             return JobOutcome("killed", 0, "", "the process that ran it was killed", {})
         said, complained = (_text(folder / name) for name in ("out", "err"))
@@ -314,12 +301,10 @@ def cluster_executor(cluster: Cluster, processes: int) -> Iterator[tuple[Executo
             tls_client_key=cluster.tls_key or None, require_encryption=True,
         )  # fmt: skip
     with contextlib.ExitStack() as stack:
+        where: Any = scheduler
         if scheduler == LOCAL:
-            where: Any = stack.enter_context(
-                LocalCluster(n_workers=processes, threads_per_worker=1, dashboard_address=None)  # type: ignore[no-untyped-call]
-            )
-        else:
-            where = scheduler
+            where = LocalCluster(n_workers=processes, threads_per_worker=1, dashboard_address=None)  # type: ignore[no-untyped-call]
+            stack.enter_context(where)
         try:
             client = stack.enter_context(Client(where, security=security, timeout=_WAIT_S, set_as_default=False))  # type: ignore[no-untyped-call]
         except (OSError, ValueError, TypeError) as error:
@@ -337,9 +322,8 @@ def _checked_slots(client: Client, scheduler: str) -> int:
     try:
         versions = client.run(this_version)
     except ModuleNotFoundError as error:
-        raise ArgumentError(
-            f"--scheduler {scheduler}: a worker has no {error.name}: install shapegcode there"
-        ) from None
+        missing = f"a worker has no {error.name}: install shapegcode there"
+        raise ArgumentError(f"--scheduler {scheduler}: {missing}") from None
     if not versions:
         raise ArgumentError(f"--scheduler {scheduler}: the scheduler has no workers; start some with `dask worker`")
     mine = _own_version()

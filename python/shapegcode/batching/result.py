@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import itertools
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -77,13 +78,14 @@ class BatchRow(OldNames):
 
 def figures_of(report: Mapping[str, Any]) -> dict[str, Any]:
     """The figures of a row from the JSON of a command."""
+    counts = report.get("counts")
     return {
         "residual_um": _pair(report.get("residual_vibration_um"), _largest),
         "contour_um": _pair(
             _contour(report), lambda each: _number(each.get("max") if isinstance(each, dict) else each)
         ),
         "cycle_time_s": _pair(report.get("cycle_time_s"), _number),
-        "alarms": report["counts"].get("alarm") if isinstance(report.get("counts"), Mapping) else None,
+        "alarms": counts.get("alarm") if isinstance(counts, Mapping) else None,
     }
 
 
@@ -173,10 +175,8 @@ class Batch(Result):
     @cached_property
     def _tally(self) -> Counter[str]:
         """Of one look at the rows: how they ended, which were done earlier, and the machines."""
-        found = Counter[str]()
-        for row in self.rows:
-            found.update([row.ended, f"on {row.machine}", *(["earlier"] if row.earlier else [])])
-        return found
+        each = ((row.ended, f"on {row.machine}", *(["earlier"] if row.earlier else [])) for row in self.rows)
+        return Counter(itertools.chain.from_iterable(each))
 
     @property
     def ok(self) -> bool:
@@ -204,9 +204,9 @@ class Batch(Result):
             return f"mend what was refused ({self.summary} has why), then say the same again with --resume."
         if counts["not ok"]:
             return f"see the reports of runs that are not ok; {self.summary} lists them."
-        return "run one of the emitted programs above the workpiece first." if self.command == "convert" else (
-            f"open {self.summary} in a spreadsheet."
-        )  # fmt: skip
+        if self.command == "convert":
+            return "run one of the emitted programs above the workpiece first."
+        return f"open {self.summary} in a spreadsheet."
 
     def to_json(self) -> dict[str, Any]:
         """As `to_dict`, row by row."""

@@ -46,20 +46,11 @@ def row_of(job: BatchJob, outcome: JobOutcome) -> tuple[BatchRow, Mapping[str, b
     # Of a file with several programs (--program all) there is one of each: they have no figures in common.
     several = report if isinstance(report, list) else [report]
     output = next((str(each["output"]) for each in several if "output" in each), "")
-    row = BatchRow(
-        job.program,
-        job.machine,
-        ended,
-        _answer(outcome, ended),
-        **figures_of(several[0] if len(several) == 1 else {}),
-        output=output,
-        report=job.report if job.report in written else "",
-        page=next((name for name in written if name.endswith(".html")), ""),
-        earlier=False,
-        wall_s=outcome.wall_s,
-        cpu_s=outcome.cpu_s,
-        peak_bytes=outcome.peak_bytes,
-    )
+    page = next((name for name in written if name.endswith(".html")), "")
+    values = figures_of(several[0] if len(several) == 1 else {})
+    values |= {"output": output, "report": job.report if job.report in written else "", "page": page}
+    values |= {name: getattr(outcome, name) for name in ("wall_s", "cpu_s", "peak_bytes")}
+    row = BatchRow(job.program, job.machine, ended, _answer(outcome, ended), earlier=False, **values)
     return row, written
 
 
@@ -182,12 +173,9 @@ class Runs:
         self._ctrl_c = _CtrlC()
 
     def all(
-        self,
-        executor: Executor,
-        slots: int,
-        prepare: Callable[[BatchJob, Mapping[str, bytes]], Packed],
+        self, executor: Executor, slots: int, prepare: Callable[[BatchJob, Mapping[str, bytes]], Packed],
         run: Callable[[Packed], JobOutcome],
-    ) -> str:
+    ) -> str:  # fmt: skip
         """Do them; gives why it stopped before the end, or nothing."""
         waiting: dict[Future[JobOutcome], tuple[int, str]] = {}
         self._ctrl_c.begin()
@@ -220,11 +208,10 @@ class Runs:
 
     def _collect(self, waiting: dict[Future[JobOutcome], tuple[int, str]], slots: int) -> None:
         """Wait for at least one of them, and store what it returned."""
-        while True:
+        done: set[Future[JobOutcome]] = set()
+        while not done:
             self._tell(min(slots, len(waiting)))
             done, _ = concurrent.futures.wait(waiting, _TOLD_EVERY_S, return_when=concurrent.futures.FIRST_COMPLETED)
-            if done:
-                break
         for future in done:
             rank, fingerprint = waiting.pop(future)
             try:
@@ -242,10 +229,9 @@ class Runs:
         row = self._manifest.earlier(key) if self._resume else None
         if row is None or row.get("fingerprint") != fingerprint or row["ended"] == "failed":
             return False
-        if any(
-            ProvenanceFile.of("wrote", self._path_of(name)).sha256 != sha256 for name, sha256 in row["files"].items()
-        ):
-            return False
+        for name, sha256 in row["files"].items():
+            if ProvenanceFile.of("wrote", self._path_of(name)).sha256 != sha256:
+                return False
         self.earlier[rank] = 1
         self._count(rank, self._manifest.kept_at(key), row["ended"])
         return True

@@ -1,7 +1,5 @@
-"""The ``shapegcode`` command: one module of this package per command, imported only when that command runs.
-
-It offers ``add_arguments(parser)`` and ``run(args)``, which gives the exit code and imports what is slow.
-"""
+"""The ``shapegcode`` command: modules of this package hold the `Interface` of each command, and are imported only when
+it runs; a function that runs one gives the exit code and imports what is slow."""
 
 from __future__ import annotations
 
@@ -12,12 +10,12 @@ import importlib
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shapegcode.cli.arguments import CommandParser
+from shapegcode.cli.arguments import CommandParser, Interface
 
 _DEBUG = "--debug"
 _MAX_STOP_S = 15.0  # after Ctrl-C
@@ -41,17 +39,34 @@ class ExitCode:
     """The reader of standard output went away."""
 
 
+_HOMES = {
+    "programs": ("simulate", "feed", "expand", "measure", "time", "check", "compare"),
+    "machine": ("machine", "setup"),
+    "characterize": ("characterize", "testcut"),
+    "identify": ("identify", "sweep"),
+    "batch": ("batch", "study", "optimize"),
+    "others": ("shaper", "report", "demo", "completion"),
+}
+"""Modules of several commands; else a command has its own."""
+
+
 @dataclass(frozen=True)
 class Command:
     """One sub-command."""
 
-    name: str  # what the user types; also the name of its module in ``shapegcode.cli``
+    name: str  # what the user types; in capitals the name of its `Interface` in the module
     help: str  # one line for ``shapegcode --help``
 
-    @property
-    def module(self) -> str:
-        """Full name of the module that implements it."""
-        return f"{__name__}.{self.name}"
+    def interface(self) -> Interface:
+        """What it takes and does."""
+        home = next((module for module, names in _HOMES.items() if self.name in names), self.name)
+        found: Interface = getattr(importlib.import_module(f"{__name__}.{home}"), self.name.upper())
+        return found
+
+
+def command_in(words: Iterable[str]) -> str | None:
+    """The first word that names a command."""
+    return next((word for word in words if word in {command.name for command in COMMANDS}), None)
 
 
 COMMANDS: tuple[Command, ...] = (
@@ -81,7 +96,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("completion", "print the script that has bash, zsh or fish complete at TAB"),
     Command("demo", "repeat the figures of a paper beside the published ones"),
 )
-"""Every sub-command, in the order of the help text. A new one needs a row here and a module of its name."""
+"""Every sub-command, in the order of the help text. A new one needs a row here and its interface in a module."""
 
 
 class _Version(argparse.Action):
@@ -111,9 +126,7 @@ def parser_of(selected: str | None) -> argparse.ArgumentParser:
             command.name, help=command.help, description=f"{command.help[:1].upper()}{command.help[1:]}."
         )
         if command.name == selected:
-            module = importlib.import_module(command.module)
-            module.add_arguments(sub)
-            sub.set_defaults(run=module.run)
+            command.interface().declare(sub)
     return parser
 
 
@@ -199,7 +212,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Matrices of a command are small: further threads of OpenBLAS would only wait, and burn processor time.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if "_ARGCOMPLETE" in os.environ:  # a shell asks at TAB
-        importlib.import_module(f"{__name__}.completion").complete()
+        importlib.import_module(f"{__name__}.others").complete()
     ctrl_c = _Interrupts(argv is None)
     try:
         return _run([word for word in words if word != _DEBUG])

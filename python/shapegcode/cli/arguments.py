@@ -6,7 +6,10 @@ import argparse
 import math
 import re
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
 from typing import Any, NoReturn
 
 _MAX_OVERRIDE = 2.54
@@ -142,111 +145,18 @@ def number(text: str) -> float:
         raise argparse.ArgumentTypeError(f"{text!r} is no number") from None
 
 
-EXAMPLES: dict[str, tuple[str, ...]] = {
-    "convert": (
-        "shapegcode convert part.nc -m vx500 -o shaped.nc",
-        "shapegcode convert part.nc -m mine.toml -o shaped.nc --max-bytes 256k --html result.html",
-    ),
-    "shaper": (
-        "shapegcode shaper --mode 46:0.02±5% --mode 131:0.02 --block-period 5ms",
-        "shapegcode shaper -m mine.toml --objective robust --plots plots",
-    ),
-    "simulate": (
-        "shapegcode simulate part.nc -m vx500 --html motion.html",
-        "shapegcode simulate part.nc -m mine.toml --plant feed-drive --npz motion.npz --plots plots",
-    ),
-    "feed": (
-        "shapegcode feed part.nc -m vx500 --tool T8.toml --stock block.toml -o part-feed.nc",
-        "shapegcode feed part.nc -m mine.toml --tool T8.toml --stock block.toml -o out.nc --margin 3%",
-    ),
-    "expand": (
-        "shapegcode expand part.nc -m vx500 -o plain.nc",
-        "shapegcode expand memory.nc -m mine.toml --program O1234 -o - --compensation keep",
-    ),
-    "measure": (
-        "shapegcode measure part.nc shaped.nc -m vx500 --tool-diameter 3mm --plots plots",
-        "shapegcode measure part.nc -m mine.toml --tool-diameter 10mm --lines 20-40",
-    ),
-    "time": (
-        "shapegcode time part.nc -m vx500",
-        "shapegcode time part.nc -m mine.toml --override 80% --csv blocks.csv",
-    ),
-    "check": (
-        "shapegcode check part.nc -m vx500",
-        "shapegcode check memory.nc -m mine.toml --program all --json check.json",
-    ),
-    "compare": (
-        "shapegcode compare part.nc shaped.nc --allow feeds,blocks,path=30um",
-        "shapegcode compare part.nc shaped.nc -m mine.toml --allow feeds,blocks,path=0.02mm,calls --json compare.json",
-    ),
-    "batch": (
-        "shapegcode batch parts -m mine.toml -o shaped --html pages",
-        "shapegcode batch 'parts/**/*.nc' -m a.toml -m b.toml -o times --command time --resume",
-    ),
-    "study": (
-        "shapegcode study STUDY.toml --plots plots",
-        "shapegcode study STUDY.toml -m mine.toml -n 10000 --html study.html --csv draws.csv",
-    ),
-    "optimize": (
-        "shapegcode optimize STUDY.toml",
-        "shapegcode optimize STUDY.toml -m mine.toml --at-least 99% --html optimum.html --json optimum.json",
-    ),
-    "setup": ("shapegcode setup -o mine.toml", "shapegcode setup --answers answers.toml -o mine.toml --force"),
-    "machine": (
-        "shapegcode machine init vx500 -o mine.toml",
-        "shapegcode machine import CNC-PARA.TXT --from vx500 -o mine.toml",
-    ),
-    "machine init": ("shapegcode machine init", "shapegcode machine init vx500 -o mine.toml --full"),
-    "machine import": (
-        "shapegcode machine import CNC-PARA.TXT -o mine.toml",
-        "shapegcode machine import CNC-PARA.TXT TOOLOFST.TXT MACRO.TXT --from vx500 -o mine.toml",
-    ),
-    "machine show": ("shapegcode machine show vx500", "shapegcode machine show mine.toml --for part.nc"),
-    "machine diff": (
-        "shapegcode machine diff vx500 mine.toml",
-        "shapegcode machine diff old.toml mine.toml --json diff.json",
-    ),
-    "machine schema": (
-        "shapegcode machine schema -o machine.schema.json",
-        "shapegcode machine schema tool -o tool.schema.json",
-    ),
-    "characterize": (
-        "shapegcode characterize --write tests -m mine.toml --box 0:100,0:100,0:20",
-        "shapegcode characterize --fit tests/RESULTS.toml -m mine.toml -o measured.toml",
-    ),
-    "identify": (
-        "shapegcode identify tap1.csv tap2.csv tap3.csv --axis x --update mine.toml --plots plots",
-        "shapegcode identify --tap-plan -m mine.toml",
-    ),
-    "sweep": (
-        "shapegcode sweep -m mine.toml --axis x -o SWEEP-X.NC",
-        "shapegcode sweep -m mine.toml --axis y --frequencies 10:80 --acceleration 20% --travel 2 -o SWEEP-Y.NC",
-    ),
-    "testcut": (
-        "shapegcode testcut taper -m vx500 --tool em8.toml -S 1800 -F 216 -a 15 -o TAPER.NC",
-        "shapegcode testcut fit pass1.csv pass2.csv pass3.csv --cut TAPER.json -o cutting.toml",
-    ),
-    "testcut taper": (
-        "shapegcode testcut taper -m vx500 --tool em8.toml -S 1800 -F 216 -a 15 -o TAPER.NC",
-        "shapegcode testcut taper -m mine.toml --tool em8.toml -F 108,216,432 -a 10 -o TAPER.NC",
-    ),
-    "testcut corner": (
-        "shapegcode testcut corner -m vx500 --tool em8.toml -F 216 -a 15 -o CORNER.NC",
-        "shapegcode testcut corner -m mine.toml --tool em8.toml -F 216 -a 15 --interval 0.4 -o CORNER.NC",
-    ),
-    "testcut interval": (
-        "shapegcode testcut interval -m vx500 --tool em8.toml -F 216 -a 15 -o INTERVAL.NC",
-        "shapegcode testcut interval -m mine.toml --tool em8.toml -F 216 -a 15 --intervals 0.3,0.6 -o I.NC",
-    ),
-    "testcut fit": (
-        "shapegcode testcut fit pass1.csv pass2.csv pass3.csv --cut TAPER.json -o cutting.toml",
-        "shapegcode testcut fit 2=pass2.csv --cut CORNER.json --plots plots",
-    ),
-    "report": ("shapegcode report result.json", "shapegcode report result.json -o result.html --html-script beside"),
-    "completion": ("shapegcode completion bash", "shapegcode completion fish"),
-    "demo": ("shapegcode demo path", "shapegcode demo path --json path.json --html path.html"),
-}
-"""By command and action: what a user could type. Each is read by that command's parser in a test."""
+@cache
+def examples() -> dict[str, list[str]]:
+    """By command and action: what a user could type. Each is read by that command's parser in a test."""
+    found: dict[str, list[str]] = {}
+    below: list[str] = []
+    text = (resources.files("shapegcode") / "data" / "examples.txt").read_text(encoding="utf-8")
+    for line in text.splitlines():
+        if line.startswith(" "):
+            below.append(line)
+        else:
+            below = found[line.rstrip(":")] = []
+    return found
 
 
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -348,47 +258,87 @@ class CommandParser(argparse.ArgumentParser):
     def epilogue(self) -> str | None:
         """Text below the options: examples and exit codes."""
         words = self.prog.split(maxsplit=1)
-        lines = EXAMPLES.get(words[1] if len(words) > 1 else "", ())
+        lines = examples().get(words[1] if len(words) > 1 else "")
         if not lines:
             return self.epilog
         # What a command's exit codes mean stands in its description, where it is not the usual.
         description = (self.description or "").lower()
         codes = "" if "exit code 0" in description else f"\n\nexit codes: {_EXIT_CODES}."
-        return "\n".join(["examples:", *(f"  {line}" for line in lines)]) + codes + (self.epilog or "")
-
-
-def one_of(parser: argparse.ArgumentParser, title: str, *, required: bool = False) -> argparse._MutuallyExclusiveGroup:
-    """Options of which one alone can be given, in their group."""
-    group = parser.group(title) if isinstance(parser, CommandParser) else parser.add_argument_group(title)
-    return group.add_mutually_exclusive_group(required=required)
+        return "\n".join(["examples:", *lines]) + codes + (self.epilog or "")
 
 
 NEEDED = object()
 """In place of a default: the option must be given."""
 
+Row = tuple[Any, ...]
+"""An option: names, metavar, type, help and, where it is not None, the default or `NEEDED`.
 
-def add_options(parser: argparse._ActionsContainer, rows: Iterable[tuple[Any, ...]]) -> None:
-    """Declare options: names, metavar, type, help and, where it is not None, the default or `NEEDED` of each.
-
-    As type `bool` is a switch, a tuple one of its words, a list of one type that type, several times, and a dictionary
-    what argparse takes.
-    """
-    for names, metavar, kind, text, *default in rows:
-        settings: dict[str, Any] = {"default": default[0]} if default and default[0] is not NEEDED else {}
-        settings |= {"required": True} if default and default[0] is NEEDED else {}
-        if kind is bool:
-            settings["action"] = "store_true"
-        else:
-            how = {"choices": kind} if isinstance(kind, tuple) else kind if isinstance(kind, dict) else {"type": kind}
-            how = {"action": "append", "type": kind[0]} if isinstance(kind, list) else how
-            settings |= how if metavar is None else how | {"metavar": metavar}
-        parser.add_argument(*names.split(), help=text, **settings)
+As type `bool` is a switch, a tuple one of its words, a list of one type that type, several times, and a dictionary
+what argparse takes.
+"""
 
 
-def add_alias(parser: argparse.ArgumentParser, old: str, option: str) -> None:
-    """Let an option be typed by the name that it had before; no help shows that."""
-    found = next(action for action in parser._actions if option in action.option_strings)
-    parser._option_string_actions[old] = found
+@dataclass(frozen=True)
+class OneOf:
+    """Options of which one alone can be given, in their group."""
+
+    title: str
+    rows: tuple[Row, ...]
+    required: bool = False
+
+
+@dataclass(frozen=True)
+class OldName:
+    """The name that an option had before; no help shows it."""
+
+    old: str
+    option: str
+
+
+@dataclass(frozen=True)
+class Interface:
+    """What a command, or an action of it, is for, what it takes, and what it does."""
+
+    description: str  # in the help; of a command without one its line in the list of commands
+    options: tuple[Row | OneOf | OldName, ...] = ()
+    run: Callable[[argparse.Namespace], int] | None = None
+    # actions by name, each with its line in the list of actions
+    actions: Mapping[str, tuple[str, Interface]] = field(default_factory=dict)
+
+    def declare(self, parser: argparse.ArgumentParser) -> None:
+        """Declare it."""
+        parser.description = self.description or parser.description
+        for entry in self.options:
+            if isinstance(entry, OldName):
+                parser._option_string_actions[entry.old] = parser._option_string_actions[entry.option]
+            elif isinstance(entry, OneOf):
+                group = parser.group(entry.title) if isinstance(parser, CommandParser) else parser
+                choice = group.add_mutually_exclusive_group(required=entry.required)
+                for row in entry.rows:
+                    _add_option(choice, *row)
+            else:
+                _add_option(parser, *entry)
+        if self.actions:
+            below = parser.add_subparsers(dest="action", metavar="ACTION", required=True, title="actions")
+            for name, (line, action) in self.actions.items():
+                action.declare(below.add_parser(name, help=line))
+        if self.run is not None:
+            parser.set_defaults(run=self.run)
+
+
+def _add_option(
+    parser: argparse._ActionsContainer, names: str, metavar: str | None, kind: Any, text: str, default: Any = None
+) -> None:
+    settings: dict[str, Any] = (
+        {"required": True} if default is NEEDED else {} if default is None else {"default": default}
+    )
+    if kind is bool:
+        settings["action"] = "store_true"
+    else:
+        how = {"choices": kind} if isinstance(kind, tuple) else kind if isinstance(kind, dict) else {"type": kind}
+        how = {"action": "append", "type": kind[0]} if isinstance(kind, list) else how
+        settings |= how if metavar is None else how | {"metavar": metavar}
+    parser.add_argument(*names.split(), help=text, **settings)
 
 
 def _dest(names: tuple[str, ...]) -> str:

@@ -1,4 +1,5 @@
-"""``shapegcode batch``: a command over many programs and machines."""
+"""Commands of many runs. ``shapegcode batch``: a command over many programs and machines; ``study``: a program on many
+sampled machines; ``optimize``: the shortest program that stays within tolerance with a given probability."""
 
 from __future__ import annotations
 
@@ -6,50 +7,32 @@ import argparse
 import shlex
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from shapegcode.cli import runner
-from shapegcode.cli.arguments import NEEDED, add_options, count, seconds, size
-from shapegcode.cli.options import add_amount_arguments, add_cluster_arguments, cluster_of
+from shapegcode.cli import ExitCode, parser_of, runner
+from shapegcode.cli.arguments import NEEDED, Interface, Row, count, ratio, seconds, size
+from shapegcode.cli.options import (
+    AMOUNT,
+    MACHINE_OR_NONE,
+    RESULT_OF_DRAWS,
+    cluster,
+    cluster_of,
+    load_machine,
+    plots,
+)
+from shapegcode.errors import ArgumentError
+from shapegcode.io.data_file import write_lines
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+    from shapegcode.studies.study_file import StudyFile
 
 _INDEX = "index.html"
 _COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.description = (
-        "Runs a command over many programs and machines, each run in a separate process. Options of the command come "
-        "after --. Results, each complete or absent, go into the folder of -o, with batch.jsonl (what is done) "
-        "and summary.csv (all rows). Exit code 0 if all are within tolerance, 1 if some are not or were refused, 2 if "
-        "none could be started."
-    )
-    add_options(parser, (
-        ("programs", "PROGRAMS", {"nargs": "+"},
-         "files, folders (with all below them), patterns in quotes ('parts/**/*.nc'), or @LIST: a file with one of "
-         "these per line"),
-        ("-m --machine", "MACHINE", [None],
-         "machine file or built-in machine; more than one -m: every program on each of them", NEEDED),
-        ("-o --output", "DIR", None, "folder of the results", NEEDED),
-        ("--command", None, {"dest": "batch_command", "choices": _COMMANDS},
-         "what is done with each program (default: convert)", "convert"),
-        ("--resume", None, bool, "do only what is missing, failed or changed since"),
-        ("--jobs", "N", count, "processes at a time (default: one per processor)", 0),
-        ("--time-limit", "TIME", seconds, "of each run (default: 3600s)", 3600.0),
-        ("--memory-limit", "SIZE", size,
-         "of each run, such as 2G, beyond what is loaded (default: none; Linux only)", 0),
-    ))  # fmt: skip
-    add_cluster_arguments(parser, "run")
-    add_options(parser, (
-        ("--json", "FILE", None, "write all rows as JSON; - for standard output"),
-        ("--html", "DIR", None, "write a page for each run into this folder, and an index of them"),
-    ))  # fmt: skip
-    add_amount_arguments(parser)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run the batch."""
+def _batch(args: argparse.Namespace) -> int:
     from shapegcode.batching.batch import batch
-    from shapegcode.cli import ExitCode, parser_of
 
     options = list(getattr(args, "rest", ()))
     # What the command does not understand is refused before anything is done; argparse says what.
@@ -64,19 +47,10 @@ def run(args: argparse.Namespace) -> int:
             bar.say(name + text)
 
         result = batch(
-            args.programs,
-            args.machine,
-            args.output,
-            command=args.batch_command,
-            options=options,
-            jobs=args.jobs,
-            cluster=cluster_of(args),
-            resume=args.resume,
-            html=html,
-            time_limit_s=args.time_limit,
-            memory_limit_bytes=args.memory_limit,
-            on_progress=show,
-        )
+            args.programs, args.machine, args.output, command=args.batch_command, options=options, jobs=args.jobs,
+            cluster=cluster_of(args), resume=args.resume, html=html, time_limit_s=args.time_limit,
+            memory_limit_bytes=args.memory_limit, on_progress=show,
+        )  # fmt: skip
     tables = result.tables()
     if html is not None:
         args.html = str(Path(html) / _INDEX)
@@ -87,3 +61,111 @@ def run(args: argparse.Namespace) -> int:
         notes.append(f"go on with: {shlex.join(['shapegcode', 'batch', '--resume', *words[1:]])}")
     code = runner.finish(result, args, tables=tables, notes=notes, wrote=[result.summary])
     return ExitCode.INTERRUPTED if result.stopped == "Ctrl-C" else code
+
+
+BATCH = Interface(
+    "Runs a command over many programs and machines, each run in a separate process. Options of the command come "
+    "after --. Results, each complete or absent, go into the folder of -o, with batch.jsonl (what is done) "
+    "and summary.csv (all rows). Exit code 0 if all are within tolerance, 1 if some are not or were refused, 2 if "
+    "none could be started.",
+    (
+        ("programs", "PROGRAMS", {"nargs": "+"},
+         "files, folders (with all below them), patterns in quotes ('parts/**/*.nc'), or @LIST: a file with one of "
+         "these per line"),
+        ("-m --machine", "MACHINE", [None],
+         "machine file or built-in machine; more than one -m: every program on each of them", NEEDED),
+        ("-o --output", "DIR", None, "folder of the results", NEEDED),
+        ("--command", None, {"dest": "batch_command", "choices": _COMMANDS},
+         "what is done with each program (default: convert)", "convert"),
+        ("--resume", None, bool, "do only what is missing, failed or changed since"),
+        ("--jobs", "N", count, "processes at a time (default: one per processor)", 0),
+        ("--time-limit", "TIME", seconds, "of each run (default: 3600s)", 3600.0),
+        ("--memory-limit", "SIZE", size,
+         "of each run, such as 2G, beyond what is loaded (default: none; Linux only)", 0),
+        *cluster("run"),
+        ("--json", "FILE", None, "write all rows as JSON; - for standard output"),
+        ("--html", "DIR", None, "write a page for each run into this folder, and an index of them"),
+        AMOUNT,
+    ),
+    _batch,
+)  # fmt: skip
+
+# --- shapegcode study and optimize ------------------------------------------------------------------------------------
+
+
+def _study_options(what: str, draws: str) -> tuple[Row, ...]:
+    """Study file, machine and number of samples; `what` describes the file, `draws` the number."""
+    number = ("-n --draws", "N", count, f"{draws} (default: the file's)")
+    return ("input", "STUDY.toml", None, what), *MACHINE_OR_NONE, number
+
+
+def _loaded(args: argparse.Namespace) -> tuple[StudyFile, Machine]:
+    """The study file and the machine, with program and machine file added to the input files of the command."""
+    from shapegcode.studies.study_file import load_study
+
+    file = load_study(args.input)
+    args.machine = args.machine or file.machine
+    if args.machine is None:
+        raise ArgumentError(f"{args.input}: no machine: name one there, or with -m")
+    args.inputs = [file.program]
+    machine = load_machine(args)
+    runner.check_files(args)
+    return file if args.draws is None else file.model_copy(update={"n": args.draws}), machine
+
+
+def _study(args: argparse.Namespace) -> int:
+    from shapegcode.studies.study import study
+
+    file, machine = _loaded(args)
+    with runner.progress(f"{args.input}: converting", args) as bar:
+
+        def show(stage: str, share: float) -> None:
+            bar.update(share)
+            bar.say(f"{args.input}: {stage}")
+
+        result = study(file.program, machine, **file.options(), scheduler=cluster_of(args), on_progress=show)
+    if args.csv is not None:
+        write_lines(args.csv, result.csv_lines())
+    return runner.finish(result, args)
+
+
+STUDY = Interface(
+    "Converts a program once and simulates it on machines sampled as the file says (Monte Carlo): how likely it stays "
+    "within tolerance, quantiles, and which value decides. Exit code 1 if that is less likely than at_least.",
+    (
+        *_study_options("program, machine, and what is varied", "how many draws"),
+        ("--csv", "FILE", None, "write one line per draw; - for standard output"),
+        *cluster("simulate"),
+        plots("write what decides, and the quantiles over it, as pictures (PNG and SVG) into this folder"),
+        *RESULT_OF_DRAWS,
+    ),
+    _study,
+)
+
+
+def _optimize(args: argparse.Namespace) -> int:
+    from shapegcode.studies.optimize import optimize
+
+    file, machine = _loaded(args)
+    options = file.choice_options() | ({} if args.at_least is None else {"probability": args.at_least})
+    with runner.progress(f"{args.input}: converting", args) as bar:
+        result = optimize(file.program, machine, **options, on_progress=bar.update)
+    words = shlex.join([args.machine, *(word for each in args.set for word in ("--set", each))])
+    return runner.finish(replace(result, machine_words=words), args)
+
+
+OPTIMIZE = Interface(
+    "Chooses block period, shaper, tolerance that is aimed at and feed on arcs, or what [choose] of the file has, "
+    "for the shortest time at which the program stays within tolerance on enough of the sampled machines. "
+    "The file is that of `shapegcode study`. Exit code 1 if no choice is likely enough.",
+    (
+        *_study_options(
+            "program, machine, what is varied, what can be chosen", "on how many sampled machines a choice is simulated"
+        ),
+        ("--at-least", "RATIO", ratio,
+         "probability of staying within tolerance, for example 99%% (default: the file's)"),
+        plots("write time and probability of the choices as a picture (PNG and SVG) into this folder"),
+        *RESULT_OF_DRAWS,
+    ),
+    _optimize,
+)  # fmt: skip

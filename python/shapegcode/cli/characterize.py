@@ -1,61 +1,26 @@
-"""``shapegcode characterize``: measure what a controller does with blocks, and put it into the machine file."""
+"""``shapegcode characterize``: measure what a controller does with blocks, and put it into the machine file.
+
+``shapegcode testcut``: test cuts as programs, and cutting-force parameters from their measured forces.
+"""
 
 from __future__ import annotations
 
 import argparse
+import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import add_options, one_of
-from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
+from shapegcode.cli.arguments import NEEDED, Interface, OneOf, positive, program_number
+from shapegcode.cli.options import MACHINE, RESULT, load_machine, plots
+from shapegcode.errors import ArgumentError
+from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file, toml_tables
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.description = (
-        "Writes short test programs (air moves inside a stated box) with instructions, then fits the machine file to "
-        "stopwatch times or servo logs of them: interpolation period, block time, time constants, in-position times. "
-        "--servo takes any log of commands and actual positions: dead time, position gain, feed-forward, friction. "
-        "--runs learns the clock (look-ahead, tool changes, M codes, spindle) from programs and the logs of their "
-        "runs. Exit code 1 if results contradict each other, no axis tells its loop, or a run is not told within 2 %%."
-    )
-    action = one_of(parser, "what to do", required=True)
-    add_options(action, (
-        ("--write", "DIR", None, "write the test programs, RESULTS.toml to fill in, and README.txt"),
-        ("--fit", "RESULTS", None, "fit a filled-in RESULTS.toml, a folder with it and logs, or one log beside it"),
-        ("--servo", "LOG", None,
-         "fit the position loops to one half of a log and validate them with the "
-         "other: a capture of a Sinumerik control "
-         "(JSON, gzip, zip), or a CSV with columns of commands and actual positions"),
-        ("--runs", "RUNS.toml", None,
-         "calibrate the cycle-time model from programs and the logs of their runs (SHDR text, MTConnect streams, "
-         "Sinumerik Edge, CSV), which this file pairs"),
-    ))  # fmt: skip
-    add_machine_argument(parser)
-    add_options(parser, (
-        ("--look-ahead", "KIND", [None],
-         'with --runs: kind of look-ahead that is tried, for example "speed difference"; may be repeated (default: '
-         "all; the one that predicts left-out runs best is chosen)"),
-        ("-o --output", "FILE", None, "with --fit, --servo, --runs: machine file to write, with what is known"),
-        ("--axes", "X=1,Y=6,Z=2", None, "with --servo: axes of the log that are X, Y, Z (default: by their names)"),
-        ("--drive", None, bool, "with --servo: fit a drive with friction too, some ten seconds for each axis"),
-    ))  # fmt: skip
-    add_plots_argument(parser, "with --servo, --runs: write the pictures (PNG and SVG) into this folder")
-    add_options(parser, (
-        ("--units", "TIME,LENGTH", None,
-         "with --fit, --servo: of CSV logs, for example ms,um (default: from their headers)"),
-        ("--box", "X0:X1,Y0:Y1,Z0:Z1", None,
-         "where the tests may move, in mm from the point at which they are started (default: %(default)s); write "
-         "--box=-50:0,... if it begins with a minus sign", "0:100,0:100,0:20"),
-    ))  # fmt: skip
-    add_result_arguments(parser)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Write the tests or fit their results; see the module."""
+def _characterize(args: argparse.Namespace) -> int:
     _check_options(args)
     machine = load_machine(args, writes_program=args.write is not None)
     runner.check_files(args, also_read=[each for each in (args.servo, args.runs) if each is not None])
@@ -68,8 +33,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _check_options(args: argparse.Namespace) -> None:
     """Refuse options that do not go with what is asked for."""
-    from shapegcode.errors import ArgumentError
-
     for option, value in (("--axes", args.axes), ("--drive", args.drive or None)):
         if value is not None and args.servo is None:
             raise ArgumentError(f"{option}: goes with --servo alone")
@@ -107,7 +70,6 @@ def _servo(args: argparse.Namespace, machine: Machine) -> int:
 
 def _write(args: argparse.Namespace, machine: Machine) -> int:
     from shapegcode.characterization.programs import write_characterization_tests
-    from shapegcode.errors import ArgumentError
 
     for option, value in (("-o", args.output), ("--units", args.units)):
         if value is not None:
@@ -128,3 +90,205 @@ def _fit(args: argparse.Namespace, machine: Machine) -> int:
 def _machine_file(args: argparse.Namespace, found: Any) -> tuple[str, bytes] | None:
     """The machine file of ``-o``, with what is known."""
     return None if args.output is None else (args.output, found.to_toml().encode())
+
+
+CHARACTERIZE = Interface(
+    "Writes short test programs (air moves inside a stated box) with instructions, then fits the machine file to "
+    "stopwatch times or servo logs of them: interpolation period, block time, time constants, in-position times. "
+    "--servo takes any log of commands and actual positions: dead time, position gain, feed-forward, friction. "
+    "--runs learns the clock (look-ahead, tool changes, M codes, spindle) from programs and the logs of their "
+    "runs. Exit code 1 if results contradict each other, no axis tells its loop, or a run is not told within 2 %.",
+    (
+        OneOf("what to do", (
+            ("--write", "DIR", None, "write the test programs, RESULTS.toml to fill in, and README.txt"),
+            ("--fit", "RESULTS", None, "fit a filled-in RESULTS.toml, a folder with it and logs, or one log beside it"),
+            ("--servo", "LOG", None,
+             "fit the position loops to one half of a log and validate them with the other: a capture of a Sinumerik "
+             "control (JSON, gzip, zip), or a CSV with columns of commands and actual positions"),
+            ("--runs", "RUNS.toml", None,
+             "calibrate the cycle-time model from programs and the logs of their runs (SHDR text, MTConnect streams, "
+             "Sinumerik Edge, CSV), which this file pairs"),
+        ), required=True),
+        *MACHINE,
+        ("--look-ahead", "KIND", [None],
+         'with --runs: kind of look-ahead that is tried, for example "speed difference"; may be repeated (default: '
+         "all; the one that predicts left-out runs best is chosen)"),
+        ("-o --output", "FILE", None, "with --fit, --servo, --runs: machine file to write, with what is known"),
+        ("--axes", "X=1,Y=6,Z=2", None, "with --servo: axes of the log that are X, Y, Z (default: by their names)"),
+        ("--drive", None, bool, "with --servo: fit a drive with friction too, some ten seconds for each axis"),
+        plots("with --servo, --runs: write the pictures (PNG and SVG) into this folder"),
+        ("--units", "TIME,LENGTH", None,
+         "with --fit, --servo: of CSV logs, for example ms,um (default: from their headers)"),
+        ("--box", "X0:X1,Y0:Y1,Z0:Z1", None,
+         "where the tests may move, in mm from the point at which they are started (default: %(default)s); write "
+         "--box=-50:0,... if it begins with a minus sign", "0:100,0:100,0:20"),
+        *RESULT,
+    ),
+    _characterize,
+)  # fmt: skip
+
+# --- shapegcode testcut -----------------------------------------------------------------------------------------------
+
+
+def _write_cut(args: argparse.Namespace) -> int:
+    from shapegcode.cutting.tool import Tool
+    from shapegcode.testcut.design import (
+        CornerShape,
+        CutConditions,
+        corner_cut,
+        interval_cut,
+        taper_cut,
+        write_test_cut,
+    )
+
+    feed = args.feeds[0] if args.action == "taper" else args.feed
+    conditions = CutConditions(
+        load_machine(args, writes_program=True), Tool.load(args.tool), feed, args.axial_depth, args.spindle, args.up
+    )
+    if args.action == "taper":
+        design = taper_cut(conditions, args.feeds if len(args.feeds) > 1 else None, args.radial_depth, args.length)
+    else:
+        shape = CornerShape(args.allowance, args.rough_radius, args.finish_radius)
+        if args.action == "corner":
+            design = corner_cut(conditions, shape, args.interval)
+        else:
+            design = interval_cut(conditions, shape, args.intervals, args.feeds)
+    runner.check_files(args, also_written=[Path(args.output).with_suffix(".json")])
+    design = write_test_cut(design, args.output, args.program)
+    return runner.finish(design, args, wrote=design.files)
+
+
+def _fit_cut(args: argparse.Namespace) -> int:
+    from shapegcode.testcut.cut import read_test_cut
+    from shapegcode.testcut.fit import fit_test_cut
+    from shapegcode.testcut.result import TaperResult
+
+    cut = read_test_cut(args.cut)
+    if args.output is not None:
+        if cut.kind != "taper":
+            raise ArgumentError(f"{args.cut} describes a {cut.kind}: -o goes with a taper")
+        _refuse_whole_tool_file(args.output)
+    records = _records(args.files)
+    runner.check_files(args, also_read=list(records.values()))
+    with runner.progress(f"fitting {args.cut}", args):
+        found = fit_test_cut(
+            cut, records, forces_on=args.forces_on, chip_thickness=args.chip_thickness, edge_forces=args.edge_forces
+        )
+    table = found.to_toml().encode() if isinstance(found, TaperResult) else b""
+    return runner.finish(found, args, output=(args.output, table) if args.output is not None else None)
+
+
+def _records(texts: list[str]) -> dict[int, str]:
+    """The files by the number of their pass: ``2=FILE`` names it, else their order does."""
+    found: dict[int, str] = {}
+    for place, text in enumerate(texts, start=1):
+        head, sign, rest = text.partition("=")
+        number, file = (int(head), rest) if sign and head.isdigit() else (place, text)
+        if number in found:
+            raise ArgumentError(f"{text}: pass {number} is given twice: name the passes, for example 2={file}")
+        found[number] = file
+    return found
+
+
+def _refuse_whole_tool_file(name: str) -> None:
+    """Refuse to write the table [cutting] over a file that holds more than that."""
+    try:
+        more = sorted(set(toml_tables(read_file(name, MAX_SETTINGS_BYTES).decode())) - {"cutting"})
+    except (OSError, ValueError):  # not there, or nothing of ours
+        return
+    if more:
+        raise ArgumentError(
+            f"-o {name}: holds more than [cutting] ({', '.join(more)}), which would be lost: name another file and "
+            "put its table into this one"
+        )
+
+
+def _list(text: str) -> tuple[float, ...]:
+    """Numbers above 0, divided by commas."""
+    return tuple(positive(part.strip()) for part in text.split(","))
+
+
+def _pair(text: str) -> tuple[float, float]:
+    low, sign, high = text.partition(":")
+    pair = (positive(low), positive(high)) if sign else (math.nan, math.nan)
+    if not pair[0] < pair[1]:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be two lengths in mm, ascending, for example 0.4:2.8")
+    return pair
+
+
+_CUT = (
+    *MACHINE,
+    ("--tool", "T.toml", None, "tool file", NEEDED),
+    ("-o --output", "OUT.NC", None, "program; the side file is OUT.json", NEEDED),
+    ("-S --spindle", "REV", positive, "rev/min (default: feed.spindle_rev_per_min of the tool file)"),
+    ("-a --axial-depth", "MM", positive, "axial depth", NEEDED),
+    ("--program", "O1234", program_number, "number of the program (default: O7101)", 7101),
+)
+_END = (("--up", None, bool, "up milling, material on the left (default: down milling)"), *RESULT)
+_SHAPE = (
+    ("-F --feed", "F", positive, "feed in mm/min", NEEDED),
+    ("--allowance", "MM", positive, "radial depth on the walls (default: 0.1 D)"),
+    ("--rough-radius", "MM", positive, "of the rough corner (default: D)"),
+    ("--finish-radius", "MM", positive, "of the finished corner (default: D)"),
+)
+_TAPER = (
+    ("-F --feeds", "F,F,...", _list, "in mm/min; one is passed at its half, once and double", NEEDED),
+    ("--radial-depth", "MM:MM", _pair, "at begin and end of the stock (default: 0.05 to 0.35 of the diameter)"),
+    ("--length", "MM", positive, "of the stock along X (default: %(default)s)", 60.0),
+)
+_CORNER = (("--interval", "MM", positive, "of a block (default: feed_control.interval_mm of the machine)", None),)
+_INTERVAL = (
+    ("--intervals", "MM,MM,...", _list, "lengths of the blocks, one pass each (default: 0.2,0.4,0.6)", (0.2, 0.4, 0.6)),
+    ("--feeds", "F,F,...", _list, "of the blocks, the same for every pass (default: the corner's by equation 7)"),
+)
+_FIT = (
+    ("files", "CSV", {"nargs": "+"},
+     "record of a pass with a header, time_s or position_mm, fx_n, fy_n; 2=FILE names the pass"),
+    ("--cut", "OUT.json", None, "side file of the test cut", NEEDED),
+    ("--forces-on", None, ("workpiece", "tool"),
+     "on what the measured forces act; a dynamometer below the work piece measures those on it (default: %(default)s)",
+     "workpiece"),
+    ("--chip-thickness", None, ("mean", "local"),
+     "taper: to which chip thickness the power laws belong (default: %(default)s)", "mean"),
+    ("--edge-forces", None, bool, "taper: fit the forces of the edge, K_te and K_re, too"),
+    ("-o --output", "FILE", None, "taper: write the table [cutting] (TOML)"),
+    plots("write pictures (PNG and SVG) of measured and expected forces into this folder"),
+    *RESULT,
+)  # fmt: skip
+
+TESTCUT = Interface(
+    "Writes test cuts (paper 001) as programs with instructions in their heads and a side file (JSON) that "
+    "describes the cut; `fit` reads that and the measured forces. Exit code 0; 1: the fit is poor or the result "
+    "not as it should be; 2: bad input.",
+    actions={
+        "taper": (
+            "growing radial depth: for the coefficients of the cutting force (figure 4)",
+            Interface(
+                "Mills a tapered edge, then passes along it with one feed each: for k1 and k2.",
+                (*_CUT, *_TAPER, *_END), _write_cut,
+            ),
+        ),
+        "corner": (
+            "a corner unrolled on a straight line: constant feed, then modified (figure 7)",
+            Interface(
+                "Mills an edge on which a straight pass meets the radial depth of a corner, and passes it with "
+                "constant feed, then with the feed of equation 7.", (*_CUT, *_SHAPE, *_CORNER, *_END), _write_cut,
+            ),
+        ),
+        "interval": (
+            "feeds that change every 0.2, 0.4 and 0.6 mm: which the controller follows (figure 8)",
+            Interface(
+                "Passes of constant radial depth whose feed changes as in a corner, each at another interval.",
+                (*_CUT, *_SHAPE, *_INTERVAL, *_END), _write_cut,
+            ),
+        ),
+        "fit": (
+            "evaluate the measured forces of a test cut",
+            Interface(
+                "Reads the side file of a test cut and the records of its passes, in their order: of a taper the "
+                "coefficients with 95 % intervals, of a corner measured against expected resultant, of an interval "
+                "test the shortest interval that the controller follows.", _FIT, _fit_cut,
+            ),
+        ),
+    },
+)  # fmt: skip

@@ -12,8 +12,9 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli import options, runner
-from shapegcode.cli.arguments import NEEDED, add_alias, add_options, line_ranges, positive, ratio, seconds, size
+from shapegcode.cli.arguments import NEEDED, Interface, OldName, line_ranges, positive, ratio, seconds, size
 from shapegcode.cli.runner import ProgressBar
+from shapegcode.errors import ArgumentError
 
 if TYPE_CHECKING:
     from shapegcode.conversion.result import Conversion
@@ -39,49 +40,7 @@ MACHINE_KEYS = {
 """Options that stand for a key of the machine file."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.description = (
-        "Rewrites the cutting moves of a program so that they no longer excite the machine's vibration modes, and "
-        "simulates the emitted program for its verdict: vibration, contour error, time. The input is never "
-        "overwritten; a program that must not be run is written next to OUT with another suffix (exit code 1)."
-    )
-    parser.add_argument("input", metavar="IN", help="CNC program")
-    options.add_machine_argument(parser)
-    add_options(parser, (
-        ("-o --output", "OUT", None, "program to write", NEEDED),
-        ("--arc-feed", "RATIO", ratio, "feed on arcs relative to the programmed feed, for example 60%%"),
-    ))  # fmt: skip
-    options.add_override_arguments(parser, MACHINE_KEYS)
-    add_options(parser, (
-        ("--shape-all", None, bool,
-         "shape every cut within the price: also where that gains less than shaping.least_gain_um or becomes worse, "
-         "and where the original is within its tolerance; without it such a cut is left unchanged"),
-        ("--only", "A-B,...", line_ranges, "shape nothing but the cuts in these lines of IN, for example 12-80,95-240"),
-        ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines of IN unchanged", ()),
-        ("--tolerance-curve", None, {"action": argparse.BooleanOptionalAction},
-         "work out what other contour tolerances would cost in time (default: %(default)s)", True),
-        ("--block-period", "TIME", seconds,
-         "duration of the shortest block, for example 5ms (default: chosen for the modes)"),
-        ("--max-bytes", "N[k|M]", size,
-         "largest size of the emitted program, for example 256k (1k = 1024): what gains least is left unchanged"),
-        ("--baud", "N", positive,
-         "speed of the serial line that feeds the program: longer block periods, then cuts left unchanged"),
-        ("--max-blocks-per-second", "N", positive, "blocks that the control reads per second; as --baud"),
-        ("--feed-schedule", None, bool,
-         "first set the feeds so that the cut of the shaped program keeps the tool's limits, as `shapegcode feed`; "
-         "needs --tool and --stock"),
-    ))  # fmt: skip
-    options.add_cutting_arguments(parser, required=False)
-    options.add_program_argument(parser)
-    options.add_plots_argument(parser)
-    options.add_result_arguments(parser)
-    add_alias(parser, "--all", "--shape-all")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Convert one program; see the module."""
-    from shapegcode._core import ArgumentError
+def _convert(args: argparse.Namespace) -> int:
     from shapegcode.program.compensation import read_for_conversion
     from shapegcode.program.reading import alone_with
 
@@ -174,6 +133,41 @@ def _scheduled(args: argparse.Namespace, program: Program, machine: Machine, bar
     """Feeds and shaping in one go."""
     from shapegcode.conversion.scheduled import convert_scheduled
 
-    return convert_scheduled(
-        program, machine, **options.read_cutting_arguments(args), **_options(args), on_progress=bar.update
-    )
+    return convert_scheduled(program, machine, **options.read_cutting(args), **_options(args), on_progress=bar.update)
+
+
+CONVERT = Interface(
+    "Rewrites the cutting moves of a program so that they no longer excite the machine's vibration modes, and "
+    "simulates the emitted program for its verdict: vibration, contour error, time. The input is never "
+    "overwritten; a program that must not be run is written next to OUT with another suffix (exit code 1).",
+    (
+        ("input", "IN", None, "CNC program"),
+        *options.MACHINE,
+        ("-o --output", "OUT", None, "program to write", NEEDED),
+        ("--arc-feed", "RATIO", ratio, "feed on arcs relative to the programmed feed, for example 60%%"),
+        *options.override_options(MACHINE_KEYS),
+        ("--shape-all", None, bool,
+         "shape every cut within the price: also where that gains less than shaping.least_gain_um or becomes worse, "
+         "and where the original is within its tolerance; without it such a cut is left unchanged"),
+        ("--only", "A-B,...", line_ranges, "shape nothing but the cuts in these lines of IN, for example 12-80,95-240"),
+        ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines of IN unchanged", ()),
+        ("--tolerance-curve", None, {"action": argparse.BooleanOptionalAction},
+         "work out what other contour tolerances would cost in time (default: %(default)s)", True),
+        ("--block-period", "TIME", seconds,
+         "duration of the shortest block, for example 5ms (default: chosen for the modes)"),
+        ("--max-bytes", "N[k|M]", size,
+         "largest size of the emitted program, for example 256k (1k = 1024): what gains least is left unchanged"),
+        ("--baud", "N", positive,
+         "speed of the serial line that feeds the program: longer block periods, then cuts left unchanged"),
+        ("--max-blocks-per-second", "N", positive, "blocks that the control reads per second; as --baud"),
+        ("--feed-schedule", None, bool,
+         "first set the feeds so that the cut of the shaped program keeps the tool's limits, as `shapegcode feed`; "
+         "needs --tool and --stock"),
+        *options.cutting(required=False),
+        options.PROGRAM,
+        options.plots(),
+        *options.RESULT,
+        OldName("--all", "--shape-all"),
+    ),
+    _convert,
+)  # fmt: skip

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode.batching.process import FAILED_CODES
+from shapegcode.cli import main as run_command, parser_of
 from shapegcode.io.data_file import write_in_passing
 from shapegcode.results.json import this_version
 
@@ -44,8 +45,9 @@ _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl
 def main() -> int:
     """Serve until the input ends."""
     for command in sys.argv[1:]:
-        for name in (*_LOADED, f"shapegcode.cli.{command}", *_OF_COMMAND[command]):
+        for name in (*_LOADED, *_OF_COMMAND[command]):
             importlib.import_module(name)
+        parser_of(command)
     this_version()  # looked up once
     os.environ["SHAPEGCODE_THREADS"] = "1"  # other runs have the other cores
     write_in_passing()
@@ -108,7 +110,7 @@ def _be_the_command(job: Mapping[str, Any], parent: int) -> None:
         os.chdir(job["cwd"])
         if job["memory_bytes"]:
             _limit_memory(job["memory_bytes"])
-        code = importlib.import_module("shapegcode.cli").main(job["words"])
+        code = run_command(job["words"])
     except MemoryError:
         code = _CODES["out of memory"]
     except BaseException:

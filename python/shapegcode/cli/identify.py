@@ -1,4 +1,7 @@
-"""``shapegcode identify``: vibration modes from a tap test or a decay, and into the machine file with them."""
+"""``shapegcode identify``: vibration modes from a tap test or a decay, and into the machine file with them.
+
+``shapegcode sweep``: a program that shakes an axis, for modes without a hammer.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,20 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode.cli import arguments, options, runner
+from shapegcode.cli import options, runner
+from shapegcode.cli.arguments import (
+    NEEDED,
+    Interface,
+    count,
+    frequency_band,
+    nonzero,
+    positive,
+    program_number,
+    ratio,
+    seconds,
+    start_time,
+)
+from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import write_text
 
 if TYPE_CHECKING:
@@ -21,66 +37,19 @@ _OF_FILES = (
     ("--time-unit", "UNIT", None, "s, ms or us"),
     ("--force-unit", "UNIT", None, "N, kN, kgf or lbf"),
     ("--response-unit", "UNIT", None, "for example m/s^2, g, mm/s or um"),
-    ("--sample-period", "TIME", {"dest": "period_s", "type": arguments.seconds}, "between samples, such as 0.1ms"),
+    ("--sample-period", "TIME", {"dest": "period_s", "type": seconds}, "between samples, such as 0.1ms"),
     ("--quantity", None, ("acceleration", "velocity", "displacement"), "what the sensor measured"),
-    ("--force-scale", "N", arguments.nonzero, "N for 1 in the file (integer WAV: full scale)"),
-    ("--response-scale", "X", arguments.nonzero, "m/s^2, m/s or m for 1 in the file (integer WAV: full scale)"),
+    ("--force-scale", "N", nonzero, "N for 1 in the file (integer WAV: full scale)"),
+    ("--response-scale", "X", nonzero, "m/s^2, m/s or m for 1 in the file (integer WAV: full scale)"),
     ("--force-sensitivity", "mV/N", None, "of the hammer, where the force is in volts: 2.25mV/N"),
     ("--response-sensitivity", "mV/g", None, "of the sensor, where the response is in volts: 100mV/g"),
-    ("--exponential-window", "TIME", {"dest": "exponential_window_s", "type": arguments.seconds},
+    ("--exponential-window", "TIME", {"dest": "exponential_window_s", "type": seconds},
      "time constant of an exponential window that the analyser applied to the response, such as 50ms"),
     ("--response-first", None, bool, "in a WAV file the response is the first channel, not the force"),
 )  # fmt: skip
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.description = (
-        "Finds vibration modes from impact tests or frequency responses (natural frequency, damping ratio; equivalent "
-        "mass, damping and stiffness), from the decay after a rapid stop, or from a record made during a sweep "
-        "(frequency and damping ratio), each with its 95 % interval. A mode that the data do not support is refused. "
-        "Exit code 0: all modes that exceed the noise are supported; 1: some are not; 2: none is, or bad input."
-    )
-    arguments.add_options(parser, (
-        ("files", "FILE", {"nargs": "*"},
-         "CSV, UFF (dataset 58), WAV, .frf, .mat, auto servo tuning (XML), capture of command and encoder; several of "
-         "one point together"),
-        ("--sweep", "PROGRAM", None, "program that ran beside the sensor (shapegcode sweep), on the control of -m"),
-        ("--axis", None, ("x", "y", "z"),
-         "use the response along this axis; where the file names none, it is this one"),
-        ("--across", "FILE", {"nargs": "*"},
-         "find what each mode moves along the other axes too, for a tool that rocks: by a sensor of three axes, or by "
-         "these files of taps at the same point with the sensor turned"),
-        ("--update", "MACHINE.toml", None, "put the supported modes into this machine file"),
-    ))  # fmt: skip
-    options.add_modes_arguments(parser, "--keep-modes")
-    plan = "say how to do the test (for the modes of -m MACHINE), nothing else"
-    parser.add_argument("--tap-plan", action="store_true", help=plan)
-    options.add_machine_argument(parser, required=False)
-    arguments.add_options(parser, (
-        ("--modes", "N", arguments.count, "how many (default: chosen by evidence)"),
-        ("--max-modes --most-modes", "N", {"dest": "max_modes", "type": arguments.count},
-         "largest number of modes (default: 40 over frequency, 8 over time)"),
-        ("--force", None, bool, "write modes with --update even if the answer is not to use them"),
-        ("--frequencies", "LOW:HIGH", arguments.frequency_band, "look for modes between these frequencies, Hz"),
-        ("--decay --ignore-force", None, {"dest": "ignore_force", "action": "store_true"},
-         "take it as a free decay: do not use the force, even if there is one"),
-        ("--stops", None, bool,
-         "the record is of an ordinary run: use every stop in it behind which the machine rests"),
-        ("--start", "TIME", arguments.start_time,
-         "where the decay begins in the file, for example 250ms (default: found by itself)"),
-        *_OF_FILES,
-    ))  # fmt: skip
-    options.add_plots_argument(
-        parser, "write pictures (PNG and SVG) of records, fit and stabilisation into this folder"
-    )
-    options.add_result_arguments(parser)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Identify modes, or say how to do the test."""
-    from shapegcode.errors import ArgumentError
-
+def _identify(args: argparse.Namespace) -> int:
     if args.tap_plan and args.files:
         raise ArgumentError("--tap-plan says how to do the test and reads no file: leave one of both out")
     runner.check_files(args, also_read=[*(args.across or ()), *([] if args.sweep is None else [args.sweep])])
@@ -97,10 +66,10 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.sweep is not None and args.machine is None:
         raise ArgumentError("--sweep needs -m, the machine file of the control that ran the program")
-    return _identify(args)
+    return _fit(args)
 
 
-def _identify(args: argparse.Namespace) -> int:
+def _fit(args: argparse.Namespace) -> int:
     from shapegcode.identification.identify import identify
     from shapegcode.identification.update import check_updatable, update_machine
     from shapegcode.io.record import ReadOptions
@@ -151,3 +120,78 @@ def _decide(args: argparse.Namespace, machine: Machine, axis: str | None) -> Non
     found = open_modes(machine, axis)
     args.keep_modes, args.rigid = options.decided_modes(args, found, f"{args.update}: not measured on this machine:")
     require_decisions(found, args.keep_modes, args.rigid, args.update)
+
+
+IDENTIFY = Interface(
+    "Finds vibration modes from impact tests or frequency responses (natural frequency, damping ratio; equivalent "
+    "mass, damping and stiffness), from the decay after a rapid stop, or from a record made during a sweep "
+    "(frequency and damping ratio), each with its 95 % interval. A mode that the data do not support is refused. "
+    "Exit code 0: all modes that exceed the noise are supported; 1: some are not; 2: none is, or bad input.",
+    (
+        ("files", "FILE", {"nargs": "*"},
+         "CSV, UFF (dataset 58), WAV, .frf, .mat, auto servo tuning (XML), capture of command and encoder; several of "
+         "one point together"),
+        ("--sweep", "PROGRAM", None, "program that ran beside the sensor (shapegcode sweep), on the control of -m"),
+        ("--axis", None, ("x", "y", "z"),
+         "use the response along this axis; where the file names none, it is this one"),
+        ("--across", "FILE", {"nargs": "*"},
+         "find what each mode moves along the other axes too, for a tool that rocks: by a sensor of three axes, or by "
+         "these files of taps at the same point with the sensor turned"),
+        ("--update", "MACHINE.toml", None, "put the supported modes into this machine file"),
+        *options.MODES,
+        ("--tap-plan", None, bool, "say how to do the test (for the modes of -m MACHINE), nothing else"),
+        *options.MACHINE_OR_NONE,
+        ("--modes", "N", count, "how many (default: chosen by evidence)"),
+        ("--max-modes --most-modes", "N", {"dest": "max_modes", "type": count},
+         "largest number of modes (default: 40 over frequency, 8 over time)"),
+        ("--force", None, bool, "write modes with --update even if the answer is not to use them"),
+        ("--frequencies", "LOW:HIGH", frequency_band, "look for modes between these frequencies, Hz"),
+        ("--decay --ignore-force", None, {"dest": "ignore_force", "action": "store_true"},
+         "take it as a free decay: do not use the force, even if there is one"),
+        ("--stops", None, bool,
+         "the record is of an ordinary run: use every stop in it behind which the machine rests"),
+        ("--start", "TIME", start_time,
+         "where the decay begins in the file, for example 250ms (default: found by itself)"),
+        *_OF_FILES,
+        options.plots("write pictures (PNG and SVG) of records, fit and stabilisation into this folder"),
+        *options.RESULT,
+    ),
+    _identify,
+)  # fmt: skip
+
+
+def _sweep(args: argparse.Namespace) -> int:
+    from shapegcode.identification.sweep_program import plan_sweep
+
+    machine = options.load_machine(args, writes_program=True)
+    runner.check_files(args)
+    with runner.progress("planning the strokes", args):
+        found, text = plan_sweep(
+            args.output, machine, args.axis, band_hz=args.frequencies, travel_mm=args.travel,
+            acceleration_share=args.acceleration, seconds=args.seconds, number=args.program,
+        )  # fmt: skip
+    return runner.finish(found, args, output=(args.output, text.encode("ascii")))
+
+
+SWEEP = Interface(
+    "Writes a program that shakes one axis: moves back and forth whose frequency rises and falls, band by band, "
+    "with pauses. Reports the band that the control can reach and the acceleration of each part, simulated from "
+    "the written program. Any logger records accelerations while it runs; `identify --sweep` finds the "
+    "modes. Exit code 0; 2: bad input, or a band that the control does not reach.",
+    (
+        *options.MACHINE,
+        ("--axis", None, ("x", "y", "z"), "that is shaken (default: %(default)s)", "x"),
+        ("--frequencies", "LOW:HIGH", frequency_band,
+         "of the moves back and forth, Hz (default: from 8 Hz up to what the control reaches, at most 200 Hz)"),
+        ("--travel", "MM", positive,
+         "longest move, in the positive direction from the start point (default: 5)", 5.0),
+        ("--acceleration", "SHARE", ratio,
+         "amplitude, of the largest acceleration of the axis: a drive tolerates some 30%% for the whole sweep "
+         "(default: 30%%)", 0.3),
+        ("--seconds", "S", positive, "approximate duration of all moves together (default: 60)", 60.0),
+        ("-o --output", "OUT.NC", None, "program", NEEDED),
+        ("--program", "O1234", program_number, "number of the program (default: O7201)", 7201),
+        *options.RESULT,
+    ),
+    _sweep,
+)  # fmt: skip

@@ -1,4 +1,5 @@
-"""``shapegcode machine``: write a machine file to start from, import one, or explain the values of one."""
+"""``shapegcode machine``: write a machine file to start from, import one, or explain the values of one; ``setup``: make
+one by answering questions."""
 
 from __future__ import annotations
 
@@ -9,9 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.cli import runner
-from shapegcode.cli.arguments import add_options
-from shapegcode.cli.options import add_modes_arguments, add_result_arguments, decided_modes, write_new
-from shapegcode.io.data_file import write_text
+from shapegcode.cli.arguments import Interface
+from shapegcode.cli.options import MODES, QUIET, RESULT, decided_modes, file_exists, write_new
+from shapegcode.errors import ArgumentError
+from shapegcode.io.data_file import read_file, write_text
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -22,82 +24,6 @@ FILES = ("machine", "tool", "stock", "study")
 """Kinds of TOML files that have a schema."""
 
 _DEFAULT_FILE = "machine.toml"
-_DEFAULT_MACHINE = "vx500"
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the actions."""
-    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True, title="actions")
-
-    init = actions.add_parser("init", help="write a commented machine file to start from")
-    add_options(init, (
-        ("name", "NAME", {"nargs": "?"}, "built-in machine to start from (default: %(default)s)", _DEFAULT_MACHINE),
-        ("-o --output", "FILE", None, "file to write (default: %(default)s); - for standard output", _DEFAULT_FILE),
-        ("--full", None, bool, "every key with its meaning (600 lines), not only what differs from a default"),
-        ("--force", None, bool, "overwrite an existing file"),
-    ))  # fmt: skip
-
-    take = actions.add_parser(
-        "import",
-        help="make a machine file from a controller's parameter dump (CNC-PARA.TXT)",
-        description="Make a machine file from a FANUC parameter dump, and say what was read, assumed and missing. "
-        "Exit code 1 if nothing was read.",
-    )
-    add_options(take, (
-        ("dump", "DUMP", {"nargs": "+"},
-         "parameter dump as the controller punches it; with it, if wanted, its tables of tool offsets, work offsets "
-         "and variables (TOOLOFST.TXT, EXT_WKZ.TXT, MACRO.TXT)"),
-        ("-o --output", "FILE", None, "file to write (default: %(default)s)", _DEFAULT_FILE),
-        ("--from", "MACHINE", {"dest": "base"}, "machine for what the dump does not say, such as the modes"),
-    ))  # fmt: skip
-    add_modes_arguments(take, "--keep-modes")
-    add_options(take, (
-        ("--name", "NAME", None, "name of the machine (default: that of the dump's file)"),
-        ("--force", None, bool, "overwrite an existing file"),
-    ))  # fmt: skip
-    add_result_arguments(take)
-
-    show = actions.add_parser(
-        "show",
-        help="print every value with its unit, origin and meaning",
-        description="Print every value with its unit, meaning and origin: measured, from the control's dump, inherited "
-        "from another machine, assumed, a choice, stated in the file, or a default.",
-    )
-    add_options(show, (
-        ("machine", "FILE_OR_NAME", None, "machine file, or name of a built-in machine"),
-        ("--for", "PROGRAM", {"dest": "input"},
-         "convert this program, and rank the unverified parameters by how far each changes its verdict"),
-        ("--write-origins", None, bool,
-         "write where the values come from as a table [origin] into the file: of an older one, whose comments say it, "
-         "or of values with an origin beside them"),
-    ))  # fmt: skip
-    add_result_arguments(show)
-
-    diff = actions.add_parser(
-        "diff",
-        help="list the values in which two machines differ",
-        description="List the values in which two machines differ, defaults included. Exit code 0 if they have the "
-        "same values, 1 if not; where a value comes from does not count.",
-    )
-    diff.add_argument("files", metavar="MACHINE", nargs=2, help="machine file, or name of a built-in machine")
-    add_result_arguments(diff)
-
-    scheme = actions.add_parser(
-        "schema",
-        help="print the JSON Schema of machine, tool, stock or study files, for editors",
-        description="Print the JSON Schema of a TOML file. Editors with TOML support (taplo, Even Better TOML) "
-        "complete and check a file that begins with `#:schema machine.schema.json`.",
-    )
-    scheme.add_argument("kind", choices=FILES, nargs="?", default="machine", help="kind of file")
-    scheme.add_argument("-o", "--output", metavar="FILE", default="-", help="file to write (default: standard output)")
-    for action in (init, scheme):
-        action.add_argument("-q", "--quiet", action="store_true", help="only the answer, warnings and errors")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run the action."""
-    actions = {"init": _init, "import": _import, "show": _show, "diff": _diff, "schema": _schema}
-    return actions[args.action](args)
 
 
 def _init(args: argparse.Namespace) -> int:
@@ -141,8 +67,6 @@ def _modes_of(machine: Machine | None) -> dict[str, str]:
 
 def _sorted(files: list[str]) -> tuple[str, list[str]]:
     """The parameter dump among some files, and the tables."""
-    from shapegcode.errors import ArgumentError
-    from shapegcode.io.data_file import read_file
     from shapegcode.machine.fanuc_dump import is_table
 
     if len(files) == 1:
@@ -249,3 +173,113 @@ def _schema(args: argparse.Namespace) -> int:
         if not args.quiet:
             print(f"next: put `#:schema {args.output}` into the first line of a {args.kind} file")
     return 0
+
+
+_FORCE = ("--force", None, bool, "overwrite an existing file")
+
+_INIT_ACTION = Interface(
+    "",
+    (
+        ("name", "NAME", {"nargs": "?"}, "built-in machine to start from (default: %(default)s)", "vx500"),
+        ("-o --output", "FILE", None, "file to write (default: %(default)s); - for standard output", _DEFAULT_FILE),
+        ("--full", None, bool, "every key with its meaning (600 lines), not only what differs from a default"),
+        _FORCE,
+        QUIET,
+    ),
+    _init,
+)
+_IMPORT_ACTION = Interface(
+    "Make a machine file from a FANUC parameter dump, and say what was read, assumed and missing. "
+    "Exit code 1 if nothing was read.",
+    (
+        ("dump", "DUMP", {"nargs": "+"},
+         "parameter dump as the controller punches it; with it, if wanted, its tables of tool offsets, work offsets "
+         "and variables (TOOLOFST.TXT, EXT_WKZ.TXT, MACRO.TXT)"),
+        ("-o --output", "FILE", None, "file to write (default: %(default)s)", _DEFAULT_FILE),
+        ("--from", "MACHINE", {"dest": "base"}, "machine for what the dump does not say, such as the modes"),
+        *MODES,
+        ("--name", "NAME", None, "name of the machine (default: that of the dump's file)"),
+        _FORCE,
+        *RESULT,
+    ),
+    _import,
+)  # fmt: skip
+_SHOW_ACTION = Interface(
+    "Print every value with its unit, meaning and origin: measured, from the control's dump, inherited "
+    "from another machine, assumed, a choice, stated in the file, or a default.",
+    (
+        ("machine", "FILE_OR_NAME", None, "machine file, or name of a built-in machine"),
+        ("--for", "PROGRAM", {"dest": "input"},
+         "convert this program, and rank the unverified parameters by how far each changes its verdict"),
+        ("--write-origins", None, bool,
+         "write where the values come from as a table [origin] into the file: of an older one, whose comments say it, "
+         "or of values with an origin beside them"),
+        *RESULT,
+    ),
+    _show,
+)  # fmt: skip
+_DIFF_ACTION = Interface(
+    "List the values in which two machines differ, defaults included. Exit code 0 if they have the "
+    "same values, 1 if not; where a value comes from does not count.",
+    (("files", "MACHINE", {"nargs": 2}, "machine file, or name of a built-in machine"), *RESULT),
+    _diff,
+)
+_SCHEMA_ACTION = Interface(
+    "Print the JSON Schema of a TOML file. Editors with TOML support (taplo, Even Better TOML) "
+    "complete and check a file that begins with `#:schema machine.schema.json`.",
+    (
+        ("kind", None, {"choices": FILES, "nargs": "?"}, "kind of file", "machine"),
+        ("-o --output", "FILE", None, "file to write (default: standard output)", "-"),
+        QUIET,
+    ),
+    _schema,
+)
+
+MACHINE = Interface(
+    "",
+    actions={
+        "init": ("write a commented machine file to start from", _INIT_ACTION),
+        "import": ("make a machine file from a controller's parameter dump (CNC-PARA.TXT)", _IMPORT_ACTION),
+        "show": ("print every value with its unit, origin and meaning", _SHOW_ACTION),
+        "diff": ("list the values in which two machines differ", _DIFF_ACTION),
+        "schema": ("print the JSON Schema of machine, tool, stock or study files, for editors", _SCHEMA_ACTION),
+    },
+)
+
+# --- shapegcode setup -------------------------------------------------------------------------------------------------
+
+
+def _set_up(args: argparse.Namespace) -> int:
+    from shapegcode.setup.answers import read_answers
+    from shapegcode.setup.build import set_up
+
+    runner.check_files(args, also_read=[args.answers] if args.answers else [])
+    if Path(args.output).exists() and not args.force:
+        raise file_exists(args.output)  # before anybody has answered a dozen questions
+    if args.answers is not None:
+        answers = read_answers(args.answers)
+    elif sys.stdin.isatty() and sys.stdout.isatty():
+        from shapegcode.setup.ask import ask_all  # with all that asks
+
+        answers = ask_all()
+    else:
+        raise ArgumentError("setup asks at a terminal, and there is none: --answers FILE answers in place of it")
+    found = set_up(answers)
+    write_new(args, found.text)
+    return runner.finish(replace(found, file=args.output), args, notes=found.notes, wrote=[args.output])
+
+
+SETUP = Interface(
+    "Asks what a shop knows about its machine, explains what each answer changes, reads the control's parameter "
+    "file and tap tests if there are any, and writes a short machine file with the answers and their provenance; "
+    "everything else is a default. Enter means `not known yet` at every question, and < goes back to the one "
+    "before. Another machine's modes are never used.",
+    (
+        ("-o --output", "FILE", None, "machine file to write (default: %(default)s)", _DEFAULT_FILE),
+        ("--answers", "FILE", None,
+         "answers from a file (TOML, or JSON) in place of questions; the keys are in docs/howto/setup.md"),
+        _FORCE,
+        *RESULT,
+    ),
+    _set_up,
+)  # fmt: skip

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import importlib
 import io
 import shlex
 from collections.abc import Mapping
@@ -12,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode._core import ShapegcodeError
-from shapegcode.cli import COMMANDS, parser_of
+from shapegcode.cli import command_in, parser_of
+from shapegcode.cli.convert import MACHINE_KEYS
 from shapegcode.cli.options import load_machine, overridden
 from shapegcode.cli.runner import MACHINES
 from shapegcode.machine import Machine
@@ -81,8 +81,7 @@ def _typed(command: str) -> argparse.Namespace | None:
         words = shlex.split(command)[1:]
     except ValueError:
         return None
-    names = {each.name for each in COMMANDS}
-    selected = next((word for word in words if word in names), None)
+    selected = command_in(words)
     if selected is None:
         return None
     # argparse says what it does not know on standard error, and ends the process.
@@ -100,9 +99,10 @@ def _read_again(
     if not inputs:
         return None
     args.machine = str(found.get(("machine", str(args.machine)), args.machine))
-    keys = getattr(importlib.import_module(f"shapegcode.cli.{args.command}"), "MACHINE_KEYS", {})
-    machine = overridden(load_machine(args), args, keys)
+    machine = load_machine(args)
     conversion = provenance.result == "Conversion"
+    if conversion:
+        machine = overridden(machine, args, MACHINE_KEYS)
     read = read_for_conversion if conversion else Program.read
     number = None if getattr(args, "program", None) == "all" else getattr(args, "program", None)
     original = read(inputs[0], machine, program_number=number)

@@ -17,6 +17,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
+from shapegcode.cli.options import refuse_same_file
+from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import write_bytes, write_lines
 
 if TYPE_CHECKING:
@@ -26,6 +28,9 @@ if TYPE_CHECKING:
     from shapegcode.results.json import Provenance, ProvenanceFile
     from shapegcode.results.result import Result
     from shapegcode.results.table import Table
+
+Output = tuple[str | Path, bytes | memoryview]
+"""The program of a command: its file, and what goes into it."""
 
 _PIPE_WIDTH = 120
 _PIECES = 4096
@@ -106,9 +111,6 @@ def check_files(
     args: argparse.Namespace, *, also_written: Sequence[str | Path] = (), also_read: Sequence[str | Path] = ()
 ) -> None:
     """Refuse to write a file that the same run reads, or writes twice; only one of them can have standard output."""
-    from shapegcode._core import ArgumentError
-    from shapegcode.cli.options import refuse_same_file
-
     given = {name: value for name in _WRITTEN if (value := getattr(args, name, None)) is not None}
     piped = ["-o -" if name == "output" else f"--{name} -" for name, value in given.items() if value == "-"]
     if len(piped) > 1:
@@ -147,7 +149,7 @@ def progress(description: str, args: argparse.Namespace) -> Iterator[ProgressBar
             bar.bar.stop()
 
 
-def write_results(report: object, json: str | None, output: tuple[str | Path, bytes | memoryview] | None) -> None:
+def write_results(report: object, json: str | None, output: Output | None) -> None:
     """Write the JSON and the program of a command."""
     if json not in (None, "-"):
         write_json(report, str(json))
@@ -162,11 +164,7 @@ def write_results(report: object, json: str | None, output: tuple[str | Path, by
 
 
 def _write_page(
-    result: Result,
-    args: argparse.Namespace,
-    report: dict[str, Any],
-    output: tuple[str | Path, bytes | memoryview] | None,
-    wrote: Sequence[str | Path],
+    result: Result, args: argparse.Namespace, report: dict[str, Any], output: Output | None, wrote: Sequence[str | Path]
 ) -> list[str]:
     """Write provenance into the JSON, and the page of --html; return the files."""
     html = getattr(args, "html", None)
@@ -175,7 +173,7 @@ def _write_page(
 
     from shapegcode.results.json import plain
 
-    provenance = provenance_of(result, args, output, wrote)
+    provenance = _provenance(result, args, output, wrote)
     report["provenance"] = plain(provenance)
     if html is None:
         return []
@@ -194,50 +192,36 @@ def finish(
     warnings: Sequence[str] | None = None,
     notes: Sequence[str] = (),
     wrote: Sequence[str | Path] = (),
-    output: tuple[str | Path, bytes | memoryview] | None = None,
+    output: Output | None = None,
 ) -> int:
     """Write --json, --html, --plots and the program, and say it: answer, tables, warnings, notes, files, next step."""
     report = result.to_json()
-    plots = getattr(args, "plots", None)
-    pictures: list[str] = []
-    if plots is not None:
-        pictures = result.save_plots(plots)
-        report["plots"] = pictures
+    last = []
+    if (plots := getattr(args, "plots", None)) is not None:
+        pictures = report["plots"] = result.save_plots(plots)
+        last.append(f"pictures: {', '.join(pictures[::2]) or 'there are none of this result'}")
+    written = [*wrote, *([] if output is None else [output[0]])]
     if output is not None:
         report["output"] = str(output[0])
-    written = [str(file) for file in (*wrote, *([output[0]] if output is not None else []))]
-    step = report["next_step"] = result.next_step_after(written[0]) if written else result.next_step
+    step = report["next_step"] = result.next_step_after(str(written[0])) if written else result.next_step
     pages = _write_page(result, args, report, output, wrote)
     several = getattr(args, "several", None)
     if several is not None:
         several.add(report, output)
     else:
         write_results(report, getattr(args, "json", None), output)
-    pictured = [f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: there are none of this result"]
-    _say(
-        result,
-        args,
-        result.tables() if tables is None else tables,
-        result.warnings if warnings is None else warnings,
-        notes,
-        [
-            *(f"wrote {file}" for file in (*wrote, *pages)),
-            *([f"wrote {output[0]}"] if output is not None and several is None else []),
-            *(pictured if plots is not None else []),
-            f"next: {step}",
-        ],
-    )
+    # Programs of one file are written together, behind the last of them.
+    there = [*wrote, *pages, *([output[0]] if output is not None and several is None else [])]
+    tables = result.tables() if tables is None else tables
+    warnings = result.warnings if warnings is None else warnings
+    _say(result, args, tables, warnings, notes, [*(f"wrote {file}" for file in there), *last, f"next: {step}"])
     return result.exit_code
 
 
 def _say(
-    result: Result,
-    args: argparse.Namespace,
-    tables: Sequence[Table],
-    warnings: Sequence[str],
-    notes: Sequence[str],
+    result: Result, args: argparse.Namespace, tables: Sequence[Table], warnings: Sequence[str], notes: Sequence[str],
     last: Sequence[str],
-) -> None:
+) -> None:  # fmt: skip
     """Say it on standard output: first of all the answer; with --quiet nothing but that and the warnings."""
     from shapegcode.results.table import warning_table
 
@@ -269,37 +253,27 @@ def _say(
         console.print(line, markup=False, soft_wrap=True)
 
 
-READ = (
-    "input", "inputs", "files", "machine", "tool", "stock", "against", "records", "cut", "update", "dump", "base",
-)  # fmt: skip
-"""Options that name a file which a command reads."""
-
-
+# Options that name a file which a command reads; those of them that may name a built-in machine.
+_READ = ("input", "inputs", "files", "machine", "tool", "stock", "against", "cut", "update", "dump", "base")
 MACHINES = ("machine", "base", "files")
-"""Those of them that may name a built-in machine."""
 
 
 def given_files(args: argparse.Namespace) -> Iterator[tuple[str, str]]:
     """The values of all options that name files to read."""
-    for role in READ:
+    for role in _READ:
         value = getattr(args, role, None)
         for entry in value if isinstance(value, list | tuple) else [value]:
             if entry is not None:
                 yield role, str(entry)
 
 
-def provenance_of(
-    result: Result,
-    args: argparse.Namespace,
-    output: tuple[str | Path, bytes | memoryview] | None = None,
-    wrote: Sequence[str | Path] = (),
+def _provenance(
+    result: Result, args: argparse.Namespace, output: Output | None, wrote: Sequence[str | Path]
 ) -> Provenance:
-    """Command, version and files of a result."""
     from shapegcode.results.json import FORMAT, Provenance, ProvenanceFile, this_version
 
     files = [_read(role, name) for role, name in given_files(args)]
     if output is not None:
-        # Programs of one file are written together, behind the last of them.
         alone = getattr(args, "several", None) is None
         files.append(ProvenanceFile.of("output" if alone else "output of all", output[0], output[1]))
     files += [ProvenanceFile.of("wrote", name) for name in wrote if Path(name).is_file()]

@@ -106,11 +106,13 @@ def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left:
             report["output"] = output
     write_results(several.reports, target, None if output is None else (output, several.joined()))
     console = output_console(standard_output(args))
-    if called:
-        console.print(f"called by others and done there: {several.names(called)}", markup=False, soft_wrap=True)
-    if left:
-        reason = "subprograms that nothing calls any more, as the shaped programs hold their moves"
-        console.print(f"{reason}: {several.names(left)}", markup=False, soft_wrap=True)
+    for reason, indices in (
+        ("called by others and done there", called),
+        ("subprograms that nothing calls any more, as the shaped programs hold their moves", left),
+    ):
+        if indices:
+            names = ", ".join(several.places[index].address for index in sorted(indices))
+            console.print(f"{reason}: {names}", markup=False, soft_wrap=True)
     if output is not None:
         console.print(f"wrote {output}", markup=False, soft_wrap=True)
 
@@ -131,10 +133,6 @@ class Gathered:
     def address(self) -> str:
         """Of the program that is being done."""
         return self.places[self.at].address
-
-    def names(self, indices: set[int]) -> str:
-        """Addresses of some of the programs, in their order."""
-        return ", ".join(self.places[index].address for index in sorted(indices))
 
     def add(self, report: dict[str, Any], output: tuple[Path | str, bytes | memoryview] | None) -> None:
         """Keep what a run wants written."""

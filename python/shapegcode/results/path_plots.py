@@ -86,7 +86,11 @@ def plot_path(
     if magnification is not None and not (math.isfinite(magnification) and magnification > 0):
         raise ValueError(f"magnification = {magnification}: must be finite and greater than 0")
 
-    drawn = [(trace, *_deviation(trace, polyline, quantity, whole is None)) for trace in traces]
+    drawn = []
+    for trace in traces:
+        points = trace.response_mm if quantity == "response" else trace.command_mm
+        along, feet = follow(trace.command_mm, points, polyline, complete=trace.stops and whole is None)
+        drawn.append((trace, along, feet, points - feet))
     largest_mm = max(float(np.linalg.norm(deviation, axis=1).max()) for *_, deviation in drawn)
     size_mm = float(np.linalg.norm(np.ptp(polyline, axis=0)))
     factor = magnification or plot.round_below(max(0.1 * size_mm / largest_mm, 1.0) if largest_mm > 0 else 1.0)
@@ -135,15 +139,6 @@ def _checked_polyline(name: str, points: npt.ArrayLike) -> FloatArray:
     if polyline.ndim != 2 or polyline.shape[1] != 3 or len(polyline) < 2 or not np.isfinite(polyline).all():
         raise ValueError(f"{name} has shape {polyline.shape}: must be (m, 3), m >= 2, and finite")
     return polyline
-
-
-def _deviation(
-    trace: Trace, polyline: FloatArray, quantity: str, is_whole: bool
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Where each sample belongs on the path, as distance along it and as place, and how far it is from there."""
-    points = trace.response_mm if quantity == "response" else trace.command_mm
-    along, feet = follow(trace.command_mm, points, polyline, complete=trace.stops and is_whole)
-    return along, feet, points - feet
 
 
 def _at_corners(along: FloatArray, polyline: FloatArray, curve: FloatArray, apart_mm: float) -> npt.NDArray[np.intp]:
@@ -238,26 +233,23 @@ COARSE_STEP_RAD = 0.05
 
 
 def follow(
-    command_mm: FloatArray, points_mm: FloatArray, polyline_mm: FloatArray, *, complete: bool
+    command_mm: FloatArray, points: FloatArray, polyline_mm: FloatArray, *, complete: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Where on a polyline are samples that follow it? Where it passes a point twice, the distance travelled decides."""
-    vertices = _refine(polyline_mm)
-    gone = _distances(command_mm)
-    if complete and gone[-1] > 0:
-        gone *= _distances(vertices)[-1] / gone[-1]
-    return _feet(points_mm, vertices, gone, _PROGRESS_WEIGHT)
+    """Points of a polyline nearest to samples that follow it, as distances along it and positions.
 
-
-def _feet(points: FloatArray, vertices: FloatArray, gone: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:
-    """Nearest points of the polyline, as distances along it and positions."""
+    Where it passes a point twice, the distance travelled decides.
+    """
     from scipy.spatial import KDTree
 
+    vertices = _refine(polyline_mm)
     if len(vertices) < 2:
         return np.zeros(len(points)), np.broadcast_to(vertices[0], points.shape).copy()
-    distance = _distances(vertices)
+    gone, distance = _distances(command_mm), _distances(vertices)
+    if complete and gone[-1] > 0:
+        gone *= distance[-1] / gone[-1]
     lengths = np.diff(distance)
-    tree = KDTree(np.column_stack([vertices, weight * distance]))
-    nearest = tree.query(np.column_stack([points, weight * gone]), workers=-1)[1]
+    tree = KDTree(np.column_stack([vertices, _PROGRESS_WEIGHT * distance]))
+    nearest = tree.query(np.column_stack([points, _PROGRESS_WEIGHT * gone]), workers=-1)[1]
     feet, best = np.empty_like(points), np.full(len(points), np.inf)
     progress = np.zeros(len(points))
     # The foot lies on a segment near the nearest vertex.
@@ -288,8 +280,7 @@ def _refine(polyline: FloatArray) -> FloatArray:
     return np.concatenate([split, polyline[-1:]])
 
 
-def piece_of(polyline: FloatArray, begin_mm: float, end_mm: float) -> FloatArray:
-    """What lies between two distances along a polyline."""
+def _piece_of(polyline: FloatArray, begin_mm: float, end_mm: float) -> FloatArray:
     along = _distances(polyline)
     inside = (along > begin_mm) & (along < end_mm)
     ends = [[np.interp(s, along, polyline[:, axis]) for axis in range(3)] for s in (begin_mm, end_mm)]
@@ -392,28 +383,23 @@ class _Scene:
         traces, programmed = simulated.traces, polyline_of(simulated.path)
         if max(len(trace.command_mm) * trace.period_s for trace in traces) <= _WHOLE_S:
             return cls((View(traces),), simulated.part, traces, simulated.part, programmed)
-        worst = _worst_place(traces, programmed, simulated.path)
-        at = f"at {worst.time_s:.2f} s"
+        near, piece, time_s = _worst_place(traces, programmed, simulated.path)
+        at = f"at {time_s:.2f} s"
         around = f"{2 * _AROUND_S:g} s around the worst place of the {traces[0].label} ({at})"
-        views = [View(worst.traces, f"the worst place, {at}", "time from the worst place in s")]
+        views = [View(near, f"the worst place, {at}", "time from the worst place in s")]
         if all(trace.stops for trace in traces):
             stop = tuple(trace.part(trace.rest_s - _BEFORE_STOP_S, math.inf, trace.rest_s) for trace in traces)
             views.append(View(stop, f"the stop, at {traces[0].rest_s:.2f} s", "time from the stop in s"))
         near_part = "; ".join(filter(None, (simulated.part, around)))
         whole = simulated.path.polyline(COARSE_STEP_RAD)
-        return cls(tuple(views), simulated.part, worst.traces, near_part, worst.piece, whole)
+        return cls(tuple(views), simulated.part, near, near_part, piece, whole)
 
 
-@dataclass(frozen=True, eq=False)
-class _Worst:
-    """The neighbourhood of the point where the first trace is furthest from the path."""
-
-    traces: tuple[Trace, ...]  # the stretches of all traces that pass it; each is there at time 0
-    piece: FloatArray  # of the programmed path, (m, 3), mm
-    time_s: float  # instant of the first trace
-
-
-def _worst_place(traces: tuple[Trace, ...], programmed: FloatArray, path: _core.Path) -> _Worst:
+def _worst_place(
+    traces: tuple[Trace, ...], programmed: FloatArray, path: _core.Path
+) -> tuple[tuple[Trace, ...], FloatArray, float]:
+    """Where the first trace is furthest from the path: the parts of all traces around it, each there at time 0; the
+    piece of the programmed path, (m, 3), mm; the instant of the first trace."""
     first = traces[0]
     away = _core.PathFollower(path).step(first.command_mm, first.response_mm)
     at = int(np.argmax(np.linalg.norm(away, axis=1)))
@@ -430,7 +416,7 @@ def _worst_place(traces: tuple[Trace, ...], programmed: FloatArray, path: _core.
         begin, place, end = (float(time) for time in trace.times_s[ranks])
         near.append(trace.part(begin, end, place))
     assert limits is not None
-    return _Worst(tuple(near), piece_of(programmed, float(limits[0]), float(limits[2])), float(first.times_s[at]))
+    return tuple(near), _piece_of(programmed, float(limits[0]), float(limits[2])), float(first.times_s[at])
 
 
 def _progress(trace: Trace, programmed: FloatArray) -> FloatArray:

@@ -65,7 +65,7 @@ def grid(
         whole = parent.add_subfigure(place)
         ax.set_axis_off()
         parent.sca(ax)
-    heading(whole, title, part)
+    whole.suptitle(title + (f"\n{part}" if part else ""), x=0.01, ha="left", fontsize=11)
     found = whole.subplots(rows, columns, squeeze=False, **subplots)
     for panel in found.flat:
         _style(panel)
@@ -81,11 +81,6 @@ def _style(panel: Axes) -> None:
     panel.grid(True, color="#e4e4e4", linewidth=0.6)
     panel.set_axisbelow(True)
     panel.spines[["top", "right"]].set_visible(False)
-
-
-def heading(figure: Figure, text: str, part: str) -> None:
-    """Title of the whole picture, and which part of the program it shows."""
-    figure.suptitle(text + (f"\n{part}" if part else ""), x=0.01, ha="left", fontsize=11)
 
 
 def aligned(panels: Sequence[Axes]) -> Axes:
@@ -108,6 +103,14 @@ def round_below(value: float) -> float:
     """The largest of 1, 2 and 5 times a power of ten that is not above a value."""
     decade = 10.0 ** math.floor(math.log10(value))
     return float(max(step * decade for step in (1, 2, 5) if step * decade <= value * (1 + 1e-9)))
+
+
+def note(panel: Axes, text: str, x: float, y: float, *, shift: int = 4, **options: Any) -> None:
+    """Text beside a point: to its right, or with a negative shift (in points) to its left."""
+    side = "left" if shift > 0 else "right"
+    panel.annotate(
+        text, (x, y), xytext=(shift, 0), textcoords="offset points", ha=side, va="center", fontsize=8, **options
+    )
 
 
 def legend_above(panel: Axes, *, columns: int = 4) -> None:
@@ -148,8 +151,6 @@ def save_all(plots: Mapping[str, Callable[..., Axes]], folder: str | Path) -> li
 
 def save(drawn: Axes | Figure, file: str | Path) -> None:
     """Write the picture to which the axes belong as PNG or SVG, by the file's ending; same data, same bytes."""
-    import matplotlib
-
     figure: Any = drawn.figure.figure  # of axes in a part of a figure: the whole
     path = Path(file)
     suffix = path.suffix.lower()
@@ -157,11 +158,17 @@ def save(drawn: Axes | Figure, file: str | Path) -> None:
         raise ValueError(f"{path}: the ending of a picture must be one of {', '.join(FORMATS)}")
     stream = io.BytesIO()
     if suffix == ".svg":
-        with matplotlib.rc_context({"svg.hashsalt": "shapegcode", "svg.fonttype": "none"}):
-            figure.savefig(stream, format="svg", metadata={"Date": None})
+        _save_svg(figure, stream)
     else:
         figure.savefig(stream, format="png", dpi=150, metadata={"Software": None})
     write_bytes(path, stream.getvalue())
+
+
+def _save_svg(figure: Figure, stream: Any, **options: Any) -> None:
+    import matplotlib
+
+    with matplotlib.rc_context({"svg.hashsalt": "shapegcode", "svg.fonttype": "none"}):
+        figure.savefig(stream, format="svg", metadata={"Date": None}, **options)
 
 
 _MANY_POINTS = 6000
@@ -170,17 +177,13 @@ _ID = re.compile(r'(\bid="|xlink:href="#|\bhref="#|url\(#)')
 
 def svg_text(drawn: Axes | Figure, key: str, *, label: str) -> str:
     """The whole picture of the axes as an `svg` element of a page, very many points as pixels; same data, same text."""
-    import matplotlib
-
     figure: Any = drawn.figure.figure
     for artist in figure.findobj(_is_heavy):
         artist.set_rasterized(True)
     stream = io.StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": "shapegcode", "svg.fonttype": "none"}):
-        figure.savefig(stream, format="svg", dpi=150, metadata={"Date": None})
+    _save_svg(figure, stream, dpi=150)
     text = stream.getvalue()
-    text = text[text.index("<svg") :]
-    head, _, body = text.partition(">")
+    head, _, body = text[text.index("<svg") :].partition(">")
     box = re.search(r'viewBox="[^"]*"', head)
     assert box is not None
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)

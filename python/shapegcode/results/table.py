@@ -97,10 +97,8 @@ class Table:
 
     def cells(self) -> list[list[str]]:
         """Headings and rows as texts, without the columns that are empty in every row."""
-        filled = [[column.cell(row) for column in self.columns] for row in self.rows]
-        kept = [rank for rank in range(len(self.columns)) if not filled or any(cells[rank] for cells in filled)]
-        whole = [[column.heading for column in self.columns], *filled]
-        return [[cells[rank] for rank in kept] for cells in whole]
+        shown = self.shown()
+        return [[column.heading for column in shown], *([column.cell(row) for column in shown] for row in self.rows)]
 
     def shown(self) -> list[Column]:
         """The columns that are not empty in every row, as `cells` has them."""

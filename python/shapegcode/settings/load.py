@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -66,7 +66,7 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
         elif detail["type"] == "value_error" and isinstance(value, dict):
             problem = Problem(key, "", limit)
         elif detail["type"] == "string_pattern_mismatch":
-            field = _field(model, location)
+            field = field_of(model, location)
             problem = Problem(key, _short(value), f"malformed; {field.description if field else limit}")
         else:
             problem = Problem(key, _short(value), limit + _unit_remark(model, location))
@@ -131,7 +131,7 @@ def _locate(location: tuple[int | str, ...], data: object, kind: str) -> tuple[t
     return location, value
 
 
-def _field(root: type[TomlTable], location: tuple[int | str, ...]) -> FieldInfo | None:
+def field_of(root: type[TomlTable], location: Sequence[int | str]) -> FieldInfo | None:
     """The field of a model at a location, None if there is none."""
     model: type[BaseModel] | None = root
     field: FieldInfo | None = None
@@ -147,14 +147,14 @@ def _field(root: type[TomlTable], location: tuple[int | str, ...]) -> FieldInfo 
 
 def _unit_remark(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
     # The keys x, y, z of a PerAxis have the unit of the key above them.
-    unit = facts(_field(root, location)).get("unit") or facts(_field(root, location[:-1])).get("unit")
+    unit = facts(field_of(root, location)).get("unit") or facts(field_of(root, location[:-1])).get("unit")
     return f" (unit: {unit})" if unit and unit != "1" else ""
 
 
 def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
     """The known key that an unknown one most likely stands for."""
     parent = tuple(part for part in location[:-1] if not isinstance(part, int))
-    field = _field(root, parent)
+    field = field_of(root, parent)
     model = root if not parent else table_type(field) if field is not None else None
     if model is None:
         return ""

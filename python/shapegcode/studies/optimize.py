@@ -95,26 +95,23 @@ def optimize(
     if n > (largest := MAX_DRAWS // _FRESH):
         raise ArgumentError(f"n = {n}: must be at most {largest}: {_FRESH} times as many confirm a choice")
     samples.append(sampled_columns(varied, _FRESH * n, "sobol", seed + 1, indices=False))
+    keys, rows = [each.key for each in varied], []
     for columns in samples:
         check_ends(machine, varied, columns)
-    keys = [each.key for each in varied]
-    rows = [tuple(dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)) for columns in samples]
+        rows.append(tuple(dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)))
     _check_values(machine, choices)
     if isinstance(program, Program):
         program.require_machine(machine)
     source = str(program) if isinstance(program, Path) else program
     run = _Choosing(source, machine, choices, rows, probability, shape_all)
-    total = min(most, math.prod(len(values) for values in choices.values()))
+    combinations = math.prod(len(values) for values in choices.values())
     for ranks in search(choices, most, seed, run.cost):
         run.converted(ranks)
-        on_progress(min(1.0, len(run.candidates) / total))
+        on_progress(min(1.0, len(run.candidates) / min(most, combinations)))
     best = run.best()
     name = program.source if isinstance(program, Program) else str(program)
     listed = sorted(run.candidates.values(), key=lambda each: math.inf if each.time_s is None else each.time_s)
-    return Optimum(
-        name, machine.name, probability, n, best, run.as_it_is(), tuple(listed),
-        math.prod(len(values) for values in choices.values()),
-    )  # fmt: skip
+    return Optimum(name, machine.name, probability, n, best, run.as_it_is(), tuple(listed), combinations)
 
 
 def _check_values(machine: Machine, choices: Choices) -> None:
@@ -160,10 +157,8 @@ class _Choosing:
     def _share(self, replay: Replay, which: int) -> float:
         rows = self._rows[which]
         numbers = tuple(range(1, len(rows) + 1))
-        shares = np.array(
-            simulate_all(replay, SamplesJob(self._machine.name, rows, numbers, (SHARE,), times=False), None)
-        )
-        return float(within(shares).mean())
+        job = SamplesJob(self._machine.name, rows, numbers, (SHARE,), times=False)
+        return float(within(np.array(simulate_all(replay, job, None))).mean())
 
     def simulated(self, ranks: Ranks) -> Candidate:
         """A candidate with its probability; it is confirmed where that is enough."""
@@ -184,11 +179,8 @@ class _Choosing:
 
     def best(self) -> Candidate | None:
         """The shortest candidate with enough probability; longer ones are not simulated."""
-        order = sorted(
-            (ranks for ranks, each in self.candidates.items() if each.time_s is not None),
-            key=lambda ranks: (self.candidates[ranks].time_s, ranks),
-        )
-        candidates = map(self.simulated, order)
+        order = sorted((each.time_s, ranks) for ranks, each in self.candidates.items() if each.time_s is not None)
+        candidates = (self.simulated(ranks) for _, ranks in order)
         return next((each for each in candidates if (each.checked or 0.0) >= self._probability), None)
 
     def as_it_is(self) -> Candidate | None:

@@ -5,6 +5,7 @@ That of ``shapegcode optimize``: time and probability of the choices.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,18 +47,15 @@ def plot_tornado(study: MachineStudy, ax: Axes | None = None) -> Axes:
     whole = study.quantity(SHARE)
     for place, row in enumerate(rows):
         panel.barh(place, row.high - row.low, left=row.low, height=0.6, color=plot.COLOURS[1])
-        for at, name, side, shift in ((row.low, row.low_at, "right", -4), (row.high, row.high_at, "left", 4)):
-            panel.annotate(
-                name, (at, place), xytext=(shift, 0), textcoords="offset points", ha=side, va="center", fontsize=8
-            )
+        plot.note(panel, row.low_at, row.low, place, shift=-4)
+        plot.note(panel, row.high_at, row.high, place)
     panel.axvline(whole.p50, color=plot.GREY, linewidth=1.0)
     panel.axvline(1.0, color=plot.COLOURS[0], linewidth=1.0, linestyle="--")
     panel.annotate(
         "limit", (1.0, 1.0), xycoords=("data", "axes fraction"), xytext=(-3, -3), textcoords="offset points",
         fontsize=8, color=plot.COLOURS[0], va="top", ha="right",
     )  # fmt: skip
-    panel.set_yticks(range(len(rows)), [row.key for row in rows], fontsize=8)
-    panel.set_ylim(len(rows) - 0.4, -0.6)
+    _name_rows(panel, [row.key for row in rows])
     low, high = min(row.low for row in rows), max(1.0, *(row.high for row in rows))
     panel.set_xlim(low - 0.15 * (high - low), high + 0.15 * (high - low))
     panel.set_xlabel("share of the limit, median (grey: of all draws)")
@@ -84,12 +82,8 @@ def plot_choices(found: Optimum, ax: Axes | None = None) -> Axes:
         longer_ms = 1e3 * (time_s - times_s[0])
         panel.barh(place, longer_ms, height=0.6, color=plot.COLOURS[1] if row == found.best else plot.COLOURS[5])
         label = f"{time_s:.3f} s, " + ("not simulated" if share is None else f"within tolerance on {share * 100:.1f} %")
-        panel.annotate(
-            label, (longer_ms, place), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8,
-            fontweight="bold" if row == found.best else "normal",
-        )  # fmt: skip
-    panel.set_yticks(range(len(rows)), [", ".join(each.value for each in row.values) for row in rows], fontsize=8)
-    panel.set_ylim(len(rows) - 0.4, -0.6)
+        plot.note(panel, label, longer_ms, place, fontweight="bold" if row == found.best else "normal")
+    _name_rows(panel, [", ".join(each.value for each in row.values) for row in rows])
     panel.set_xlim(0.0, 1.5 * max(1.0, 1e3 * (times_s[-1] - times_s[0])))
     panel.set_ylabel(", ".join(each.key.rpartition(".")[2] for each in rows[0].values), fontsize=8)
     panel.set_xlabel("time above that of the shortest in ms (bold: the one to take)")
@@ -115,15 +109,19 @@ def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
     )  # fmt: skip
     for panel, bins in zip(panels, curves, strict=True):
         _band(panel, bins)
-        if (limit := study.limits_um.get(bins.measure)) is not None and limit < 3.0 * max(
-            each.high for each in bins.bins
-        ):
+        limit = study.limits_um.get(bins.measure)
+        if limit is not None and limit < 3.0 * max(each.high for each in bins.bins):
             panel.axhline(limit, color=plot.COLOURS[0], linewidth=1.0, linestyle="--")
         unit = study.quantity(bins.measure).unit
         panel.set_title(f"{MEASURES[bins.measure]}, {unit}".rstrip(", "), loc="left", fontsize=10)
     unit = next(each.unit for each in study.varied if each.key == key)
     panels[-1].set_xlabel(f"{key}{f' in {unit}' if unit not in ('', '1') else ''}")
     return plot.aligned(panels)
+
+
+def _name_rows(panel: Axes, names: Sequence[str]) -> None:
+    panel.set_yticks(range(len(names)), names, fontsize=8)
+    panel.set_ylim(len(names) - 0.4, -0.6)
 
 
 def _band(panel: Axes, bins: Bins) -> None:

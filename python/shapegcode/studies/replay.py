@@ -70,14 +70,11 @@ class Replay:
     """A text that was converted for a machine, ready to be simulated on others."""
 
     def __init__(
-        self,
-        machine: Machine,  # for which it was converted
-        original: Program,
-        emitted: Program,  # the text, read back
-        parts: Sequence[tuple[int, int, int]],  # rank in the original, first and last line in the text: of each region
-        limits: Sequence[RegionLimits],  # of each
-        time_s: float,  # cycle time of the text on that machine
-    ) -> None:
+        self, machine: Machine, original: Program, emitted: Program, parts: Sequence[tuple[int, int, int]],
+        limits: Sequence[RegionLimits], time_s: float,
+    ) -> None:  # fmt: skip
+        """Read back: `parts` has the rank of each region in the original, its first and last line in the text; `time_s`
+        is the cycle time of the text on the machine for which it was converted."""
         self.machine, self._original, self._emitted, self._extents = machine, original, emitted, tuple(parts)
         self.time_s = time_s
         regions = [original.regions[index] for index, _, _ in parts]
@@ -90,30 +87,24 @@ class Replay:
 
     @classmethod
     def of(
-        cls,
-        program: Program | str,
-        machine: Machine,
-        judged_by: Machine | None = None,
-        *,
-        shape_all: bool = False,
+        cls, program: Program | str, machine: Machine, judged_by: Machine | None = None, *, shape_all: bool = False,
         is_whole: bool = False,
-    ) -> Replay:
+    ) -> Replay:  # fmt: skip
         """Convert a program."""
         original = program_for_conversion(program, machine)
         found = convert(original, machine, shape_all=shape_all, tolerance_curve=False)
         if is_whole and (missed := next(found.misses(), "")):
             raise ArgumentError(missed)
         if not found.placed:
-            raise ArgumentError(
-                f"{found.program} on {machine.name}: nothing was shaped that could be simulated: {found.answer}"
-            )
+            nothing = f"nothing was shaped that could be simulated: {found.answer}"
+            raise ArgumentError(f"{found.program} on {machine.name}: {nothing}")
         judging = MachineModel(judged_by or machine)
         judge, ranks = Judge(judging), {id(region): index for index, region in enumerate(original.regions)}
-        limits = []
+        limits, extents = [], []
         for place in found.placed:
             simulated = judging.simulate_original(place.region.path, offset=judging.offset(place.region))
             limits.append(judge.limits(RegionFigures(simulated, (), (), 0), place))
-        extents = [(ranks[id(place.region)], place.first_line, place.last_line) for place in found.placed]
+            extents.append((ranks[id(place.region)], place.first_line, place.last_line))
         return cls(machine, original, found.emitted, extents, limits, found.cycle_time_s.emitted)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -240,14 +231,9 @@ def simulate_all(
 
 @functools.lru_cache(maxsize=_KEPT_TEXTS)
 def _replay(
-    toml: str,
-    source: str,
-    original: bytes,
-    emitted: bytes,
-    extents: tuple[tuple[int, int, int], ...],
-    limits: tuple[tuple[tuple[float, ...], float, Any], ...],
-    time_s: float,
-) -> Replay:
+    toml: str, source: str, original: bytes, emitted: bytes, extents: tuple[tuple[int, int, int], ...],
+    limits: tuple[tuple[tuple[float, ...], float, Any], ...], time_s: float,
+) -> Replay:  # fmt: skip
     """A replay that was pickled: a worker reads an emitted program once for all its samples."""
     machine = Machine.from_toml(toml)
     read = Program.from_text(original, machine, source=source)

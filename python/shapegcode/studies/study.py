@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -45,6 +44,7 @@ from shapegcode.studies.varied import (
     Varied,
     Vary,
     index_problem,
+    salib,
     sampled_columns,
     sampled_machine,
     varied_values,
@@ -170,11 +170,8 @@ class _StudyRun:
         return texts
 
     def _row(self, index: int, *, known: bool) -> dict[str, object]:
-        return {
-            each.key: column[index]
-            for each, column in zip(self.varied, self.columns, strict=True)
-            if each.known == known
-        }
+        pairs = zip(self.varied, self.columns, strict=True)
+        return {each.key: column[index] for each, column in pairs if each.known == known}
 
     def _text(self, draws: tuple[int, ...], values: Mapping[str, object]) -> _Text:
         machine = sampled_machine(self.machine, values, f"{self.machine.name}, draw {draws[0] + 1}")
@@ -298,10 +295,11 @@ def interval_of(good: int, count: int) -> tuple[float, float]:
 def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple[BinQuantiles, ...]:
     """Quantiles of a measure over a varied value: in ten bins with equal numbers of samples, or by choice."""
     if isinstance(each.distribution, Listed):
-        places = [(str(choice), [index for index, value in enumerate(column) if value == choice])
-                  for choice in each.distribution.values]  # fmt: skip
-        groups = [(rank, name, np.array(chosen, dtype=int)) for rank, (name, chosen) in enumerate(places) if chosen]
-        return tuple(_bin(float(rank), name, values[chosen]) for rank, name, chosen in groups)
+        groups = [
+            (rank, str(choice), [index for index, value in enumerate(column) if value == choice])
+            for rank, choice in enumerate(each.distribution.values)
+        ]
+        return tuple(_bin(float(rank), name, values[chosen]) for rank, name, chosen in groups if chosen)
     numbers = np.asarray(column, dtype=float)
     order = np.argsort(numbers, kind="stable")
     count = max(1, min(_BINS, len(order) // _MIN_IN_BIN))
@@ -324,24 +322,20 @@ def parameter_sensitivity(
     for each, column in zip(varied, columns, strict=True):
         bins = bins_of(each, column, shares)
         low, high = min(bins, key=lambda one: one.median), max(bins, key=lambda one: one.median)
-        rows.append(
-            ParameterInfluence(each.key, low.median, high.median, low.name, high.name, *found.get(each.key, ()))
-        )
+        index = found.get(each.key, ())
+        rows.append(ParameterInfluence(each.key, low.median, high.median, low.name, high.name, *index))
     rank = (lambda row: row.total or 0.0) if found else (lambda row: row.high - row.low)
     return tuple(sorted(rows, key=rank, reverse=True))
 
 
 def _indices(varied: Sequence[Varied], shares: FloatArray, seed: int) -> dict[str, tuple[float, ...]]:
     """First-order and total index of each value by SALib, and their errors; none where nothing changes the share."""
-    try:
-        from SALib.analyze import sobol
-    except ModuleNotFoundError as error:
-        raise ArgumentError(f"indices: need {error.name}: pip install 'shapegcode[study]'") from None
+    sobol = salib("analyze")
     if float(np.ptp(shares)) == 0.0:
         return {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found: Any = sobol.analyze(index_problem(varied), shares, calc_second_order=False, seed=seed)
+        found = sobol.analyze(index_problem(varied), shares, calc_second_order=False, seed=seed)
     return {
         each.key: tuple(float(found[name][rank]) for name in ("S1", "ST", "S1_conf", "ST_conf"))
         for rank, each in enumerate(varied)

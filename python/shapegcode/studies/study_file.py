@@ -17,7 +17,6 @@ shaping.family = ["zv", "zvd", "ei"]
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_origin
@@ -115,18 +114,15 @@ def _is_value(parts: Sequence[str]) -> bool:
     table: type[TomlTable] | None = Machine
     field = None
     for part in parts:
-        if table is None:
-            return False
         if field is not None and item_type(field) is not None and part.isdigit():
             field = None
             continue
-        field = table.model_fields.get(part)
+        field = None if table is None else table.model_fields.get(part)
         if field is None:
             return False
-        below = table_type(field)
-        if below is None and get_origin(field.annotation) is dict:
+        table = table_type(field)
+        if table is None and get_origin(field.annotation) is dict:
             return False
-        table = below
     return table is None
 
 
@@ -214,11 +210,13 @@ def load_study(path: str | Path) -> StudyFile:
     data = parsed(text, str(path), StudyFileError)
     for table in ("vary", "choose"):
         if isinstance(data.get(table), dict):
-            pairs = list(_flat(data[table]))
-            data[table] = dict(pairs)
-            for name in (name for name, count in Counter(name for name, _ in pairs).items() if count > 1):
-                twice = Problem(f"{table}.{name}", "", "given twice, in quotes and without")
-                raise StudyFileError(str(path), (twice,))
+            flat: dict[str, object] = {}
+            for name, entry in _flat(data[table]):
+                if name in flat:
+                    twice = Problem(f"{table}.{name}", "", "given twice, in quotes and without")
+                    raise StudyFileError(str(path), (twice,))
+                flat[name] = entry
+            data[table] = flat
     # In quotes, as they are said in messages, so that these find their lines.
     quoted = _DOTTED.sub(r'\1"\2"\3', text)
     found = validated(StudyFile, data, str(path), quoted, StudyFileError)

@@ -5,6 +5,7 @@ What only the converter reads needs another program; all else is of the machine 
 
 from __future__ import annotations
 
+import importlib
 import itertools
 import math
 import re
@@ -286,13 +287,9 @@ def _grid(varied: Sequence[Varied], n: int) -> Columns:
     while free and listed * (level + 1) ** free <= n:
         level += 1
     middles = (np.arange(level) + 0.5) / level
-    rows = itertools.product(
-        *(
-            each.values if isinstance(each, Listed) else each.at(middles)
-            for each in (one.distribution for one in varied)
-        )
-    )
-    return [list(column) for column in zip(*rows, strict=True)]
+    drawn = [each.distribution for each in varied]
+    values = (each.values if isinstance(each, Listed) else each.at(middles) for each in drawn)
+    return [list(column) for column in zip(*itertools.product(*values), strict=True)]
 
 
 def index_problem(varied: Sequence[Varied]) -> dict[str, Any]:
@@ -301,11 +298,16 @@ def index_problem(varied: Sequence[Varied]) -> dict[str, Any]:
     return {"num_vars": count, "names": [each.key for each in varied], "bounds": [[0.0, 1.0]] * count}
 
 
-def _saltelli(varied: Sequence[Varied], n: int, seed: int) -> FloatArray:
+def salib(part: str) -> Any:
+    """Its module `sobol` of a part."""
     try:
-        from SALib.sample import sobol
+        return importlib.import_module(f"SALib.{part}.sobol")
     except ModuleNotFoundError as error:
         raise ArgumentError(f"indices: need {error.name}: pip install 'shapegcode[study]'") from None
+
+
+def _saltelli(varied: Sequence[Varied], n: int, seed: int) -> FloatArray:
+    sobol = salib("sample")
     per_point = len(varied) + 2
     if n < 2 * per_point:
         raise ArgumentError(f"n = {n}: indices of {len(varied)} keys need n = {2 * per_point} or more")

@@ -68,9 +68,7 @@ def _bars(panel: Axes, names: Sequence[str], rows: Sequence[Mapping[str, float]]
         panel.barh(positions, widths, left=ends, color=_COLOUR[part], label=LABELS[part], height=0.7)
         ends = [end + width for end, width in zip(ends, widths, strict=True)]
     for position, end in zip(positions, ends, strict=True):
-        panel.annotate(
-            f"{end:.1f}", (end, position), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8
-        )
+        plot.note(panel, f"{end:.1f}", end, position)
     panel.set_yticks(list(positions), names, fontsize=8)
     panel.invert_yaxis()
     panel.grid(False, axis="y")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterator, Mapping
 from dataclasses import astuple, dataclass, field, fields, replace
+from operator import attrgetter
 from typing import Any, ClassVar
-
-import numpy as np
 
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.results.json import hidden
@@ -217,7 +217,7 @@ class CycleTime(TimeParts, Result):
         Returns:
             The regions, longest first.
         """
-        return sorted(self.regions, key=lambda region: -region.duration_s)[:count]
+        return heapq.nlargest(count, self.regions, key=attrgetter("duration_s"))
 
     def slowest_blocks(self, count: int = _SLOWEST) -> list[BlockTime]:
         """The blocks that take longest, longest first.
@@ -228,8 +228,7 @@ class CycleTime(TimeParts, Result):
         Returns:
             The blocks, longest first; none where the blocks were not asked for.
         """
-        order = np.argsort([-block.duration_s for block in self.blocks], kind="stable")[:count]
-        return [self.blocks[index] for index in order]
+        return heapq.nlargest(count, self.blocks, key=attrgetter("duration_s"))
 
     def without_blocks(self) -> CycleTime:
         """The same without the single blocks, of which there may be millions."""
@@ -285,15 +284,19 @@ class CycleTime(TimeParts, Result):
 
     def _slowest_table(self) -> Table:
         regions, blocks = self.slowest_regions(), self.slowest_blocks()
+        rows: list[tuple[str, str, RegionTime | BlockTime]] = [
+            *(("{} to {}".format(*region.lines), f"region, {tool_name(region.tool)}", region) for region in regions),
+            *((str(block.line), f"block, {block.kind.replace('_', ' ')}", block) for block in blocks),
+        ]
         columns = (
-            Column("lines", value=_lines, text=True),
-            Column("what", value=_what, text=True),
-            Column("s", value="duration_s", digits=3),
-            Column("share", value=lambda row: share_percent(row.duration_s, self.cycle_time_s)),
-            Column("mm", value=lambda row: row.length_mm or None, digits=1),
-            Column("mean mm/min", value=_mean_feed, digits=0),
+            Column("lines", value=lambda row: row[0], text=True),
+            Column("what", value=lambda row: row[1], text=True),
+            Column("s", value=lambda row: row[2].duration_s, digits=3),
+            Column("share", value=lambda row: share_percent(row[2].duration_s, self.cycle_time_s)),
+            Column("mm", value=lambda row: row[2].length_mm or None, digits=1),
+            Column("mean mm/min", value=lambda row: _mean_feed(row[2]), digits=0),
         )
-        return Table("slowest", columns, [*regions, *blocks], sections=(len(regions),))
+        return Table("slowest", columns, rows, sections=(len(regions),))
 
     def plots(self) -> Mapping[str, Plot]:
         """`time`: where the time goes, by tool and by region; none for a program that takes no time."""
@@ -318,16 +321,6 @@ _LOG_NEXT = (Column("program", value="program", text=True), Column("± s", value
 def tool_name(tool: int | None) -> str:
     """A tool in words."""
     return "no tool yet" if tool is None else f"T{tool}"
-
-
-def _lines(row: RegionTime | BlockTime) -> str:
-    return "{} to {}".format(*row.lines) if isinstance(row, RegionTime) else str(row.line)
-
-
-def _what(row: RegionTime | BlockTime) -> str:
-    if isinstance(row, RegionTime):
-        return f"region, {tool_name(row.tool)}"
-    return f"block, {row.kind.replace('_', ' ')}"
 
 
 def _mean_feed(row: RegionTime | BlockTime) -> float | None:

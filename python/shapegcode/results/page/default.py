@@ -7,24 +7,13 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from html import escape
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from shapegcode.results.json import Provenance, plain, this_version
 from shapegcode.results.outcome import NotKeptError, Outcome
-from shapegcode.results.page.model import (
-    Figure,
-    Figures,
-    Light,
-    NextStep,
-    NextSteps,
-    Notes,
-    Page,
-    Part,
-    Picture,
-    Section,
-    Text,
-)
+from shapegcode.results.page import model
 from shapegcode.results.page.scene import Scene
 from shapegcode.results.table import Column, Table
 
@@ -46,83 +35,72 @@ def title_of(result: Outcome) -> str:
     return words[:1].upper() + words[1:] + of + on
 
 
-def sections_of(result: Outcome, figures: Sequence[Figure] = ()) -> tuple[Section, ...]:
+def sections_of(result: Outcome, figures: Sequence[model.Figure] = ()) -> tuple[model.Section, ...]:
     """Key figures, warnings, next step, tables and pictures of any result."""
+    glance = [model.Section("gain", "At a glance", (model.Figures(tuple(figures)),))] if figures else []
+    first = (*glance, *warnings_of(result), next_steps(result))
     try:
         tables = result.tables()
     except NotKeptError:
-        return (*_first(figures), *warnings_of(result), next_steps(result), _json(result.to_dict()))
-    first = (*_first(figures), *warnings_of(result), next_steps(result))
+        return (*first, _json(result.to_dict()))
     return (*first, *_tables(tables), *pictures_of(result))
 
 
-def _first(figures: Sequence[Figure]) -> Iterator[Section]:
-    if figures:
-        yield Section("gain", "At a glance", (Figures(tuple(figures)),))
-
-
-def warnings_of(result: Outcome) -> Iterator[Section]:
+def warnings_of(result: Outcome) -> Iterator[model.Section]:
     """The warnings, if there are any."""
     if result.warnings:
-        yield Section("warnings", "Warnings", (Text(tuple(result.warnings), warning=True),))
+        yield model.Section("warnings", "Warnings", (model.Text(tuple(result.warnings), warning=True),))
 
 
-def next_steps(result: Outcome, *further: NextStep) -> Section:
+def next_steps(result: Outcome, *further: model.NextStep) -> model.Section:
     """What to do next."""
     text = result.next_step
     is_command = text.startswith("shapegcode ")
     sentence = text if is_command else text[:1].upper() + text[1:]
     command = text if _is_typed(text) else next(iter(re.findall(r"`(shapegcode [^`]+)`", text)), "")
     sentence = "Then:" if command == text else sentence
-    return Section("next", "What to do next", (NextSteps((NextStep(sentence, command), *further)),))
+    return model.Section("next", "What to do next", (model.NextSteps((model.NextStep(sentence, command), *further)),))
 
 
 def _is_typed(text: str) -> bool:
     """Whether all of it can be typed: behind the command stand options with their values, and files."""
-    program, _, *words = text.split(" ") if " " in text else (text, "")
-    values = (word.startswith("-") for word in ("", *words))
-    return (
-        program == "shapegcode"
-        and bool(words)
-        and all(value or _NO_WORD.search(word) for word, value in zip(words, values, strict=False))
-    )
+    program, _, *words = (*text.split(" "), "") if " " not in text else text.split(" ")
+    is_typed = all(before.startswith("-") or _NO_WORD.search(word) for before, word in pairwise(("", *words)))
+    return program == "shapegcode" and bool(words) and is_typed
 
 
-def _tables(tables: Sequence[Table]) -> Iterator[Section]:
+def _tables(tables: Sequence[Table]) -> Iterator[model.Section]:
     """Short tables together, each long one by itself and folded."""
-    short: tuple[Part, ...] = tuple(table for table in tables if len(table.rows) <= _UNFOLDED_ROWS)
+    short: tuple[model.Part, ...] = tuple(table for table in tables if len(table.rows) <= _UNFOLDED_ROWS)
     if short:
-        yield Section("figures", "Figures", short)
+        yield model.Section("figures", "Figures", short)
     for rank, table in enumerate(table for table in tables if len(table.rows) > _UNFOLDED_ROWS):
         title = table.title or f"{len(table.rows)} rows"
         key = "table" if rank == 0 else f"table-{rank + 1}"
-        yield Section(key, title[:1].upper() + title[1:], (table,), printed=False, folded=True)
+        yield model.Section(key, title[:1].upper() + title[1:], (table,), printed=False, folded=True)
 
 
-def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Section]:
+def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[model.Section]:
     """The pictures, each with a line that says how to read it."""
-    pictures = [Picture(name, plot, HOW.get(name, UNKNOWN)) for name, plot in result.plots().items()]
+    pictures = [model.Picture(name, plot, HOW.get(name, UNKNOWN)) for name, plot in result.plots().items()]
     chosen = [each for each in pictures if each.name in printed] or pictures[:_PRINTED_PICTURES]
     if chosen:
-        yield Section("pictures", "Pictures", tuple(chosen))
+        yield model.Section("pictures", "Pictures", tuple(chosen))
     if others := tuple(each for each in pictures if each not in chosen):
-        yield Section("more-pictures", "More pictures", others, printed=False)
+        yield model.Section("more-pictures", "More pictures", others, printed=False)
     if result.from_json:
         left_out = "Pictures that need the samples of the run are not here: the JSON does not hold them."
-        yield Section("no-pictures", "Pictures that are not here", (Text((left_out,)),), printed=False)
+        yield model.Section("no-pictures", "Pictures that are not here", (model.Text((left_out,)),), printed=False)
 
 
-def provenance_section(provenance: Provenance) -> Section:
+def provenance_section(provenance: Provenance) -> model.Section:
     """Command, version and files with their hashes."""
-    rows = [("by", provenance.by)]
-    rows += [("command", provenance.command)] if provenance.command else []
-    rows += [
-        (each.role, f"{each.name}, {each.size_bytes} bytes, SHA-256 {each.sha256 or 'not known'}")
-        for each in provenance.files
-    ]
+    rows = [("by", provenance.by), *([("command", provenance.command)] if provenance.command else [])]
+    for file in provenance.files:
+        rows.append((file.role, f"{file.name}, {file.size_bytes} bytes, SHA-256 {file.sha256 or 'not known'}"))
     how = "The hash of a file changes with every byte of it: compare it before you rely on this page."
-    return Section(
-        "provenance", "Command, version and files", (Notes(tuple(rows)),), how=how, folded=True, printed=False
+    return model.Section(
+        "provenance", "Command, version and files", (model.Notes(tuple(rows)),), how=how, folded=True, printed=False
     )
 
 
@@ -130,12 +108,12 @@ def page_of(
     result: Outcome,
     *,
     title: str,
-    light: tuple[Light, str],
-    sections: Sequence[Section],
+    light: tuple[model.Light, str],
+    sections: Sequence[model.Section],
     scene: Scene | None = None,
     provenance: Provenance | None = None,
     problems: Sequence[str] = (),
-) -> Page:
+) -> model.Page:
     """The page of a result."""
     report: dict[str, Any] = result.to_json()
     if provenance is not None:
@@ -143,17 +121,10 @@ def page_of(
         sections = (*sections, provenance_section(provenance))
         scene = _named(scene, provenance)
     above = next((rank + 1 for rank, section in enumerate(sections) if section.key == "next"), 0)
-    return Page(
-        title=title,
-        light=light[0],
-        verdict=result.answer,
-        reason=light[1],
-        sections=tuple(sections),
-        report=report,
-        scene=scene,
-        before_scene=above,
+    return model.Page(
+        title, light[0], result.answer, light[1], tuple(sections), report, scene, before_scene=above,
         problems=tuple(problems),
-    )
+    )  # fmt: skip
 
 
 def _named(scene: Scene | None, provenance: Provenance) -> Scene | None:
@@ -165,11 +136,11 @@ def _named(scene: Scene | None, provenance: Provenance) -> Scene | None:
     return replace(scene, variants=(*others, replace(last, file=output.name)))
 
 
-def raw_page(report: Mapping[str, Any], why: str) -> Page:
+def raw_page(report: Mapping[str, Any], why: str) -> model.Page:
     """The page of a result that cannot be read back: its JSON as it stands."""
     provenance = report.get("provenance", report.get("made"))
     by = provenance.get("by", "another version") if isinstance(provenance, dict) else "another version"
-    return Page(
+    return model.Page(
         title="A result as its JSON has it",
         light="amber",
         verdict=f"This result was written by {by}, and {this_version()} cannot read it back from its JSON.",
@@ -180,11 +151,11 @@ def raw_page(report: Mapping[str, Any], why: str) -> Page:
     )
 
 
-def _json(report: Mapping[str, Any]) -> Section:
+def _json(report: Mapping[str, Any]) -> model.Section:
     """The JSON itself, if no page can be made of it."""
     rows = [(key, _short(value)) for key, value in report.items()]
     columns = (Column("key", value=lambda row: row[0], left=True), Column("value", value=lambda row: row[1], text=True))
-    return Section("json", "The JSON", (Table("", columns, rows),), how="Key by key; long values are cut.")
+    return model.Section("json", "The JSON", (Table("", columns, rows),), how="Key by key; long values are cut.")
 
 
 def _short(value: object) -> str:
@@ -243,20 +214,5 @@ HOW: Mapping[str, str] = {
     "study-bands": "Where the band reaches the dashed line, one machine in twenty or more is out of tolerance.",
     "servo": "Position minus command over time, measured and of the fitted loop.",
     "clock": "Each point is a run: on the diagonal the predicted time is the measured one.",
-    "evidence-nist": "Each point is a program: on the diagonal the predicted time is the measured one.",
-    "paper001-figure6a-radial-depth": "Radial depth of cut along the corner: it rises where the tool meets both walls.",
-    "paper001-figures6bc-forces": "Cutting forces along the corner, by axis.",
-    "paper001-figure9-resultant": "Size of the force along the corner, at constant and at scheduled feed.",
-    "paper001-figures11-12-surface": "Error of the wall over its height and length: zero is the drawing.",
-    "paper001-scheduled": "Feed and force along the corner once the feed is scheduled.",
-    "paper002-figure2-durations": "Duration of the shaper over the ratio of two modes; each branch is a solution.",
-    "paper002-figure3-amplitudes": "Amplitudes of the taps over the ratio of the modes.",
-    "paper002-figure4-impulses": "The taps of the shaper with the fewest.",
-    "paper002-figure5-sensitivity": "Vibration that is left over the error of the frequency: low and wide is good.",
-    "paper002-figure6-responses": "Response of two modes to a shaped step: flat behind the last tap is good.",
-    "paper002-figure8-stage-short": "The stage of the paper, a short move: oscillation after it is residual vibration.",
-    "paper002-figure9-stage-long": "The stage of the paper, a long move: oscillation after it is residual vibration.",
-    "paper003-figures2-3-acceleration": "Acceleration after a tap, measured and of the fitted modes.",
-    "paper003-deflection": "Displacement, computed from the acceleration: the motion of the tool tip.",
 }
 """By the names that `plots()` has."""

@@ -13,6 +13,7 @@ from functools import cache
 from html import escape
 from importlib import metadata, resources
 from pathlib import Path
+from string import Template
 
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import write_bytes, write_text
@@ -62,42 +63,11 @@ def to_html(page: Page, script: Script = "inline") -> str:
     named += [("scene", "Motion")] if page.scene is not None else []
     named += [(section.key, section.title) for section in after]
     links = "".join(f'<li><a href="#{escape(key)}">{escape(title)}</a></li>' for key, title in named)
-    body = "\n".join(parts)
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="{policy}">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<meta name="generator" content="{this_version()}">
-<meta name="referrer" content="no-referrer">
-<title>{escape(page.title)}</title>
-<style>{_assets(STYLES)}</style>
-<script>{start}</script>
-<noscript><style>.loading {{ display: none; }}</style></noscript>
-</head>
-<body>
-<header id="top">
-<p class="tools needs-script"><button type="button" id="theme">Dark</button>
-<button type="button" id="print">Print</button></p>
-<h1>{escape(page.title)}</h1>
-{light_sign(page.light)}
-<p class="verdict">{prose(page.verdict)}</p>
-<p class="reason"><b>Why:</b> {prose(page.reason)}</p>
-{_problems(page)}
-</header>
-<nav aria-label="Parts of the page"><ul>{links}</ul></nav>
-<main>
-{body}
-</main>
-<footer><p>Made by {this_version()}. The numbers are those of the JSON that this file holds:
-<button type="button" id="save-json" class="needs-script">Save the JSON</button></p></footer>
-{chr(10).join(scripts)}
-<script>{own}</script>
-</body>
-</html>
-"""
+    return Template(_asset("page.html")).substitute(
+        policy=policy, version=this_version(), title=escape(page.title), styles=_assets(STYLES), start=start,
+        light=light_sign(page.light), verdict=prose(page.verdict), reason=prose(page.reason),
+        problems=_problems(page), links=links, body="\n".join(parts), scripts="\n".join(scripts), own=own,
+    )  # fmt: skip
 
 
 def _problems(page: Page) -> str:

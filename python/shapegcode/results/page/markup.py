@@ -13,31 +13,16 @@ from typing import Any
 from urllib.parse import quote
 
 from shapegcode.results.json import Streamed, plain
-from shapegcode.results.page.model import (
-    Bars,
-    CutPicker,
-    CutRow,
-    Figure,
-    Figures,
-    HeatMap,
-    HeatRow,
-    Light,
-    NextSteps,
-    Notes,
-    Part,
-    Picture,
-    Section,
-    Text,
-)
+from shapegcode.results.page import model
 from shapegcode.results.plot import svg_text
 from shapegcode.results.table import NO_BREAK, Column, Table
 
-LIGHT_WORDS: dict[Light, str] = {
+LIGHT_WORDS: dict[model.Light, str] = {
     "green": "Go ahead", "calm": "Nothing to do", "amber": "Check first", "red": "Do not use"
 }  # fmt: skip
 """What a traffic light says, for those who cannot see its colour."""
 
-_SIGNS: dict[Light, str] = {
+_SIGNS: dict[model.Light, str] = {
     # Each colour has a shape of its own: disc, square, triangle, octagon.
     "green": '<circle cx="16" cy="16" r="14"/><path class="mark" d="M9 16.5l5 5 9-11"/>',
     "calm": '<rect x="3" y="3" width="26" height="26" rx="5"/><path class="mark" d="M10 12.5h12m-12 7h12"/>',
@@ -49,7 +34,7 @@ _STEPS = 5
 _CODE = re.compile(r"`([^`\n]+)`")
 
 
-def light_sign(light: Light) -> str:
+def light_sign(light: model.Light) -> str:
     """A traffic light: its colour, its shape and its word."""
     sign = f'<svg viewBox="0 0 32 32" aria-hidden="true" class="sign">{_SIGNS[light]}</svg>'
     return f'<p class="light {light}">{sign}<strong>{LIGHT_WORDS[light]}</strong></p>'
@@ -68,7 +53,7 @@ def number(value: float, digits: int, *, key: str = "", factor: float = 1.0) -> 
     return f'<span class="number" data-value="{value!r}"{place}>{value:z.{digits}f}</span>'
 
 
-def section_of(section: Section) -> str:
+def section_of(section: model.Section) -> str:
     """A section with its heading."""
     kinds = ["part", *(["sheet"] if section.sheet else []), *([] if section.printed else ["unprinted"])]
     how = f'<p class="how"><b>How to read this:</b> {prose(section.how)}</p>' if section.how else ""
@@ -78,31 +63,31 @@ def section_of(section: Section) -> str:
     return f'<section id="{key}" class="{" ".join(kinds)}" aria-labelledby="{key}-title">\n{body}\n</section>'
 
 
-def _part(part: Part, key: str) -> str:
+def _part(part: model.Part, key: str) -> str:
     match part:
-        case Figures():
+        case model.Figures():
             return '<div class="cards">' + "\n".join(map(_card, part.rows)) + "</div>"
-        case HeatMap():
+        case model.HeatMap():
             return _heat_map(part)
-        case Bars():
+        case model.Bars():
             return _bars(part)
-        case Notes():
+        case model.Notes():
             return _notes(part)
-        case NextSteps(rows):
+        case model.NextSteps(rows):
             steps = (f"<li>{prose(step.text)}{_command(step.command) if step.command else ''}</li>" for step in rows)
             return '<ol class="steps">' + "".join(steps) + "</ol>"
-        case Picture():
+        case model.Picture():
             return _picture(part, key)
-        case Text():
+        case model.Text():
             kind = ' class="warning"' if part.warning else ""
             return f"<div{kind}>" + "".join(f"<p>{prose(text)}</p>" for text in part.paragraphs) + "</div>"
         case Table():
             return _table(part)
-        case CutPicker():
+        case model.CutPicker():
             return _cut_picker(part, key)
 
 
-def _card(figure: Figure) -> str:
+def _card(figure: model.Figure) -> str:
     after = number(figure.after, figure.digits, key=figure.key_after, factor=figure.factor)
     unit = f'<span class="unit">{escape(figure.unit)}</span>'
     lines = [f'<h3 class="name">{escape(figure.name)}</h3>']
@@ -125,7 +110,7 @@ def _card(figure: Figure) -> str:
     return f'<div class="card {kind}">' + "".join(lines) + "</div>"
 
 
-def _heat_map(heat: HeatMap) -> str:
+def _heat_map(heat: model.HeatMap) -> str:
     has_remarks = any(row.remark for row in heat.rows)
     columns = ["", *heat.columns, *([""] if has_remarks else [])]
     head = "".join(f'<th scope="col">{escape(name)}</th>' if name else "<td></td>" for name in columns)
@@ -138,7 +123,7 @@ def _heat_map(heat: HeatMap) -> str:
     )
 
 
-def _heat_row(row: HeatRow, heat: HeatMap, has_remarks: bool) -> str:
+def _heat_row(row: model.HeatRow, heat: model.HeatMap, has_remarks: bool) -> str:
     cells = []
     keys = row.keys or ("",) * len(row.values)
     factors = heat.factors or (1.0,) * len(row.values)
@@ -173,7 +158,7 @@ _LEGEND = (
 )
 
 
-def _bars(bars: Bars) -> str:
+def _bars(bars: model.Bars) -> str:
     longest = max((value for _, values in bars.rows for value in values), default=0.0) or 1.0
     rows = []
     all_keys = bars.keys or (("",) * len(bars.labels),) * len(bars.rows)
@@ -190,7 +175,7 @@ def _bars(bars: Bars) -> str:
     return '<div class="bars">' + "\n".join(rows) + "</div>"
 
 
-def _notes(notes: Notes) -> str:
+def _notes(notes: model.Notes) -> str:
     rows = "".join(
         f"<div{' class=strong' if topic in notes.strong else ''}><dt>{escape(topic)}</dt><dd>{prose(text)}</dd></div>"
         for topic, text in notes.rows
@@ -203,7 +188,7 @@ def _command(text: str) -> str:
     return f'<div class="command"><code tabindex="0">{escape(text)}</code>{copy}</div>'
 
 
-def _picture(picture: Picture, key: str) -> str:
+def _picture(picture: model.Picture, key: str) -> str:
     name = escape(picture.name.replace("-", " "))
     svg = svg_text(picture.plot(), key, label=picture.name.replace("-", " "))
     how = f"<b>How to read this:</b> {prose(picture.how)}" if picture.how else name
@@ -243,7 +228,7 @@ def _scrolled(table: str) -> str:
     return f'<div class="scrolled" tabindex="0" role="group" aria-label="Table">{table}</div>'
 
 
-def _number_of(row: CutRow, name: str) -> float | None:
+def _number_of(row: model.CutRow, name: str) -> float | None:
     """What a column of numbers is sorted by, and summed."""
     if name == "first":
         return row.lines[0]
@@ -278,7 +263,7 @@ _CUT_SUMS = (
 )
 
 
-def _cut_picker(picker: CutPicker, key: str) -> str:
+def _cut_picker(picker: model.CutPicker, key: str) -> str:
     """The table, which is read without a script; sums, boxes to tick and the command, which a script fills."""
     columns = tuple(_CUT_COLUMNS.values())
     table = Table("", columns, picker.rows, row_style=lambda row: "shaped" if row.is_shaped else "")

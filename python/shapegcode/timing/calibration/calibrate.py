@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -121,9 +121,8 @@ def calibrate_cycle_time(
     fits, scores = _tried(tried, fitted, folds, machine, rate, meter)
     order = [score.cross_validated_s if score.cross_validated_s is not None else score.fitted_s for score in scores]
     best = 0
-    for index in range(1, len(order)):
-        if order[index] < _BETTER * order[best]:
-            best = index
+    for index, error in enumerate(order):
+        best = index if error < _BETTER * order[best] else best
     motion = fits[best]
     learned = _Calibration.of(fitted, motion, machine)
     weighted = zip(fits, open_times.kind_weights(order, best), strict=True)
@@ -133,7 +132,7 @@ def calibrate_cycle_time(
         if fit is not motion and weight >= open_times.MIN_WEIGHT
     ]
     others = _left_out(fitted, folds, motion, machine, rate) if len(folds) > 1 else {}
-    rows, warnings = _rows(observed, learned, others)
+    rows = [_row(run, learned, others.get(id(run))) for run in observed]
     with_it, remarks, numbers, undetermined = learned_machine(
         learned, fitted, rivals, _scatters(rows, observed, learned)
     )
@@ -147,7 +146,7 @@ def calibrate_cycle_time(
         fitted=with_it,
         remarks=remarks,
         undetermined=tuple(undetermined),
-        warnings=tuple(dict.fromkeys(warnings)),
+        warnings=tuple(dict.fromkeys(warning for row in rows for warning in _warnings(row))),
     )
 
 
@@ -171,9 +170,9 @@ def _families(names: Sequence[str] | None) -> list[LookAhead]:
     if names is None:
         return list(FAMILIES)
     known = {family.name: family for family in FAMILIES}
-    unknown = [name for name in names if name not in known]
-    if unknown or not names:
-        raise ArgumentError(f"kind of look-ahead {unknown[0] if unknown else ''!r}: must be one of {', '.join(known)}")
+    for name in names or [""]:
+        if name not in known:
+            raise ArgumentError(f"kind of look-ahead {name!r}: must be one of {', '.join(known)}")
     return [known[name] for name in names]
 
 
@@ -202,13 +201,9 @@ def _folds(runs: Sequence[ObservedRun]) -> list[list[ObservedRun]]:
 
 
 def _tried(
-    tried: Sequence[LookAhead],
-    runs: Sequence[ObservedRun],
-    folds: Sequence[Sequence[ObservedRun]],
-    machine: Machine,
-    rate: float,
-    meter: _Meter,
-) -> tuple[list[MotionFit], list[FamilyScore]]:
+    tried: Sequence[LookAhead], runs: Sequence[ObservedRun], folds: Sequence[Sequence[ObservedRun]], machine: Machine,
+    rate: float, meter: _Meter,
+) -> tuple[list[MotionFit], list[FamilyScore]]:  # fmt: skip
     sections = sections_of(runs)
     if not sections:
         raise ArgumentError(
@@ -238,31 +233,25 @@ def _left_out(
     rate: float,
 ) -> dict[int, _Calibration]:
     """For each run what the others teach."""
-    found = {}
+    found: dict[int, _Calibration] = {}
     for fold in folds:
         rest = [run for run in runs if run not in fold]
         other = _Calibration.of(rest, fit_motion(rest, motion.family, machine, rate), machine)
-        found.update({id(run): other for run in fold})
+        found |= {id(run): other for run in fold}
     return found
 
 
-def _rows(
-    observed: Sequence[ObservedRun], learned: _Calibration, others: dict[int, _Calibration]
-) -> tuple[list[CalibrationRun], list[str]]:
-    rows = [_row(run, learned, others.get(id(run))) for run in observed]
-    warnings = []
-    for row in rows:
-        judged = row.judged_percent
-        if judged is not None and abs(judged) > TOLERANCE_PERCENT:
-            warnings.append(f"{row.name}: {judged:+.1f} % from what it took, more than {TOLERANCE_PERCENT:g} %")
-        if len(row.holds) > _MAX_HOLDS:
-            warnings.append(
-                f"{row.name}: stood {len(row.holds)} times where the program does not ask for it, first at "
-                f"{row.holds[0]}: the program may have been changed after the run"
-            )
-        else:
-            warnings += [f"{row.name}: held at {hold}" for hold in row.holds]
-    return rows, warnings
+def _warnings(row: CalibrationRun) -> Iterator[str]:
+    judged = row.judged_percent
+    if judged is not None and abs(judged) > TOLERANCE_PERCENT:
+        yield f"{row.name}: {judged:+.1f} % from what it took, more than {TOLERANCE_PERCENT:g} %"
+    if len(row.holds) > _MAX_HOLDS:
+        yield (
+            f"{row.name}: stood {len(row.holds)} times where the program does not ask for it, first at "
+            f"{row.holds[0]}: the program may have been changed after the run"
+        )
+    else:
+        yield from (f"{row.name}: held at {hold}" for hold in row.holds)
 
 
 def _row(run: ObservedRun, learned: _Calibration, other: _Calibration | None) -> CalibrationRun:
@@ -392,7 +381,8 @@ def _shares(
         return (), ()
     tools = run.timed.tools[1:-1]
     changes = [int(each) + 2 for each in np.flatnonzero(np.diff(tools) != 0) if tools[each] >= 0]
-    seen = [0.0, *(_began(run, line) for line in changes), end_s]
+    began = np.minimum(np.searchsorted(run.line, changes), len(run.line) - 1)
+    seen = [0.0, *run.time_s[began].tolist(), end_s]
     expected = [0.0, *(float(starts[line]) for line in changes), float(starts[-1])]
     shares: dict[str, tuple[float, float]] = {}
     for index, until in enumerate([*(line - 1 for line in changes), len(tools)]):
@@ -412,11 +402,6 @@ def _shares(
     between = end_s - _held(holds, 0.0, end_s) - cut_measured, float(starts[-1]) - cut_predicted
     kinds = CycleTimePart("cuts", cut_measured, cut_predicted), CycleTimePart("between cuts", *between)
     return tuple(CycleTimePart(name, *both) for name, both in shares.items()), kinds
-
-
-def _began(run: ObservedRun, line: int) -> float:
-    """When a line was first seen."""
-    return float(run.time_s[min(int(np.searchsorted(run.line, line)), len(run.line) - 1)])
 
 
 def _held(holds: list[_Hold], begin_s: float, end_s: float) -> float:
@@ -447,17 +432,21 @@ def learned_machine(
     values = motion.file_values() | _function_values(functions, runs)
     covariance, variances = parameter_covariance(motion, runs, machine)
     numbers, remarks = _motion_numbers(machine, motion, variances, source)
-    if math.isfinite(motion.rapid_mm_per_s):
-        rate, had = motion.rapid_mm_per_s * 60.0, machine.axes.x.rapid_mm_per_min
+    rate = motion.rapid_mm_per_s * 60.0
+    if math.isfinite(rate):
         key, meaning = "axes.x|y|z.rapid_mm_per_min", "rate of rapids, of the fastest axis"
-        numbers.append(_number(key, meaning, (rate, 0.99 * rate, 1.01 * rate), "mm/min", True, had))
-    numbers += _function_numbers(functions)
+        limits = rate, 0.99 * rate, 1.01 * rate
+        numbers.append(_number(key, meaning, limits, "mm/min", True, machine.axes.x.rapid_mm_per_min))
+    for name, value in functions.values.items():
+        key, meaning, unit = _meaning(name)
+        low, high = functions.low[name], functions.high[name]
+        numbers.append(_number(key, meaning, (value, low, high), unit, high - low < max(2.0, 2.0 * value)))
     undetermined = [
         f"{number.meaning} ({number.key}): the runs allow {number.low:.3g} to {number.high:.3g} {number.unit}"
         for number in numbers
         if not number.is_determined
     ]
-    if not math.isfinite(motion.rapid_mm_per_s):
+    if not math.isfinite(rate):
         undetermined.append("rapid rate: no log shows a rapid at constant speed; the value of the file is kept")
     values["times.scatter"] = {
         "cuts_percent": round(100.0 * open_times.cut_scatter(runs, motion, machine), 3),
@@ -523,18 +512,9 @@ def _meaning(name: str) -> tuple[str, str, str]:
     return _FUNCTIONS.get(name) or ("times.m_codes", f"M{int(name[1:]):02d}", "s")
 
 
-def _function_numbers(functions: FunctionFit) -> list[CalibratedParameter]:
-    numbers = []
-    for name, value in functions.values.items():
-        key, meaning, unit = _meaning(name)
-        low, high = functions.low[name], functions.high[name]
-        numbers.append(_number(key, meaning, (value, low, high), unit, high - low < max(2.0, 2.0 * value)))
-    return numbers
-
-
-def _usual(overrides: Iterable[tuple[float, float]]) -> float:
+def _usual(overrides: Iterable[float], runs: Sequence[ObservedRun]) -> float:
     """The override at which most of the time was run; 1 where the operator had it now so, now otherwise."""
-    value, ratio = longest(overrides)
+    value, ratio = longest(zip(overrides, (run.duration_s or 0.0 for run in runs), strict=True))
     return value if ratio >= _USUAL else 1.0
 
 
@@ -551,8 +531,8 @@ def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dic
     values = functions.values
     codes = {code: round(value, 3) for code, value in m_codes(values).items() if round(value, 3) >= 0.005}
     way_xy, way_z = (min(round(values.get(name, 0.0), 3), _MAX_WAY_S) for name in ("move xy", "move z"))
-    feed = _usual((_feed_override(run), run.duration_s or 0.0) for run in runs)
-    rapid = _usual((run.rapid_override, run.duration_s or 0.0) for run in runs)
+    feed = _usual(map(_feed_override, runs), runs)
+    rapid = _usual((run.rapid_override for run in runs), runs)
     found: dict[str, object] = {
         "times.program_start_s": round(values.get("start", 0.0), 3),
         "times.tool_change_s": round(values.get("tool change", 0.0), 3),

@@ -120,7 +120,7 @@ class MotionFit:
 
     def model(self, machine: Machine) -> _core.FanucModel:
         """The controller that the family and its numbers describe."""
-        family, values, rapid_mm_per_s = self.family, self.values, self.rapid_mm_per_s
+        family, values = self.family, self.values
         model = fanuc_model(machine)
         limits = _core.MotionLimits()
         limits.law = getattr(_core.AccelerationLaw, family.law)
@@ -142,8 +142,8 @@ class MotionFit:
         model.time_constant_s = values.get("time_constant", 0.0)
         model.bell_time_s = 0.0
         model.look_ahead_filter_time_constant_s = 0.0
-        if math.isfinite(rapid_mm_per_s):
-            model.rapid_rate_mm_per_s = [rapid_mm_per_s] * 3
+        if math.isfinite(self.rapid_mm_per_s):
+            model.rapid_rate_mm_per_s = [self.rapid_mm_per_s] * 3
         model.rapid_time_constant_s = [values["rapid_time"]] * 3
         model.rapid_bell_time_s = 0.0
         model.in_position = _core.InPosition.measured
@@ -152,7 +152,7 @@ class MotionFit:
 
     def file_values(self) -> dict[str, object]:
         """The same as values of the machine file, by dotted key."""
-        family, values, rapid_mm_per_s = self.family, self.values, self.rapid_mm_per_s
+        family = self.family
         corner = dict.fromkeys("xyz", 0.0)
         found: dict[str, object] = {
             "controller.motion": family.motion,
@@ -170,17 +170,17 @@ class MotionFit:
         }
         for axis in "xyz":
             found[f"axes.{axis}.max_jerk_mm_s3"] = None
-            if math.isfinite(rapid_mm_per_s):
-                found[f"axes.{axis}.rapid_mm_per_min"] = float(f"{rapid_mm_per_s * 60.0:.5g}")
+            if math.isfinite(self.rapid_mm_per_s):
+                found[f"axes.{axis}.rapid_mm_per_min"] = float(f"{self.rapid_mm_per_s * 60.0:.5g}")
         for parameter in family.parameters:
-            value = float(f"{values[parameter.name] * parameter.scale:.5g}")
+            value = float(f"{self.values[parameter.name] * parameter.scale:.5g}")
             if parameter.key.startswith("controller.corner_speed"):
                 corner.update(dict.fromkeys(parameter.axes, value))
             elif "{axis}" in parameter.key:
                 found.update({parameter.key.format(axis=axis): value for axis in parameter.axes})
             else:
                 found[parameter.key] = value
-        if any(parameter.name == "corner_xy" for parameter in family.parameters):
+        if _CORNER in family.parameters:
             found["controller.corner_speed_difference_mm_per_min"] = corner
         if family.motion == "after_interpolation":
             found["controller.after_interpolation_shape"] = "linear"
@@ -256,10 +256,10 @@ def section_residuals(sections: Sequence[SeenSection], model: _core.FanucModel) 
 def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
     """Error of a model in the times of sections: every program has the same weight, outliers (holds) a limited
     influence."""
-    square: dict[int, FloatArray] = defaultdict(lambda: np.zeros(len(_SCALES) + 1))
-    count: dict[int, FloatArray] = defaultdict(lambda: np.zeros(len(_SCALES) + 1))
+    # Squares and how many, by program
+    found: dict[int, FloatArray] = defaultdict(lambda: np.zeros((2, len(_SCALES) + 1)))
     for section, residual in zip(sections, section_residuals(sections, model), strict=True):
-        sums, counts = square[id(section.run.timed)], count[id(section.run.timed)]
+        sums, counts = found[id(section.run.timed)]
         for scale, (_, limit_s, _) in enumerate(_SCALES):
             begins, ends = section.windows[scale]
             apart = residual[ends] - residual[begins]
@@ -270,7 +270,7 @@ def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
         sums[-1] += min(whole**2, _SECTION[0] ** 2)
         counts[-1] += 1
     weight = np.array([*(scale[2] for scale in _SCALES), _SECTION[1]])
-    means = [(np.sqrt(square[key] / np.maximum(count[key], 1.0)) * weight).sum() for key in square]
+    means = [(np.sqrt(sums / np.maximum(counts, 1.0)) * weight).sum() for sums, counts in found.values()]
     return float(np.mean(means)) if means else 0.0
 
 
@@ -410,9 +410,7 @@ def _windows(section: SeenSection) -> IntArray:
     for index, time_s in enumerate(section.time_s):
         if time_s - section.time_s[points[-1]] >= _WINDOW_S:
             points.append(index)
-    if len(points) == 1 and len(section.time_s) > 1:
-        points.append(len(section.time_s) - 1)
-    return np.array(points)
+    return np.array(points if len(points) > 1 or len(section.time_s) < 2 else [0, len(section.time_s) - 1])
 
 
 # --- what takes time beside the motion --------------------------------------------------------------------------------
@@ -508,11 +506,8 @@ def _names(runs: Sequence[ObservedRun]) -> list[str]:
     names = ["start", "move xy", "move z"]
     names += ["tool change"] if _TOOL_CHANGE in codes else []
     names += [f"M{code}" for code in sorted(codes - {_TOOL_CHANGE})]
-    if spins and codes & {3, 4}:
-        names += ["spindle start", "spindle start from"]
-    if spins and 5 in codes:
-        names += ["spindle stop", "spindle stop from"]
-    return names
+    names += ["spindle start", "spindle start from"] if spins and codes & {3, 4} else []
+    return names + (["spindle stop", "spindle stop from"] if spins and 5 in codes else [])
 
 
 def _spans(run: ObservedRun) -> list[_Span]:

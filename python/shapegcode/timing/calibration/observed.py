@@ -418,21 +418,21 @@ _MIN_ARC_READINGS = 12
 _DIALS = (1.0, 0.75, 0.5, 0.25, 0.1, 0.05)  # usual settings of the rapid override
 
 
+def _shown_feeds(run: ObservedRun) -> tuple[IntArray, FloatArray]:
+    """Lines at which the log has a feed, and the feed, mm/s; none where its unit is not known."""
+    if run.log.feed is None or not math.isfinite(run.feed_unit_mm_per_s):
+        return np.empty(0, dtype=np.int64), np.empty(0)
+    return lines_at(run.log.feed, run.log, run.timed), run.log.feed.value * run.feed_unit_mm_per_s
+
+
 def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
     """What the feeds shown in arcs say of the largest acceleration across the path: v²/r where v is below the feed."""
     found: list[FloatArray] = []
     for run in runs:
-        log, timed = run.log, run.timed
-        if log.feed is None or not math.isfinite(run.feed_unit_mm_per_s):
-            continue
-        line = lines_at(log.feed, log, timed)
-        speed = log.feed.value * run.feed_unit_mm_per_s
-        radius = timed.arc_radius_mm[line]
-        feed = timed.feed_mm_per_s[line]
+        line, speed = _shown_feeds(run)
+        radius, feed = run.timed.arc_radius_mm[line], run.timed.feed_mm_per_s[line]
         inside = np.isfinite(radius) & np.isfinite(feed) & (speed > 0.0)
-        for each, programmed in {
-            (round(float(r), 1), float(f)) for r, f in zip(radius[inside], feed[inside], strict=True)
-        }:
+        for each, programmed in set(zip(np.round(radius[inside], 1), feed[inside], strict=True)):
             group = inside & (np.round(radius, 1) == each) & (feed == programmed)
             # A reading may fall upon a corner or a ramp: the steady speed is the one that is hardly passed.
             top = float(np.percentile(speed[group], 90))
@@ -471,15 +471,12 @@ def with_override(run: ObservedRun, rate_mm_per_s: float) -> ObservedRun:
 
 def _shown_rate(run: ObservedRun) -> tuple[float, float]:
     """Feed at which rapids run steadily, and the highest one along Z alone; NaN and 0 where none is seen."""
-    log, timed = run.log, run.timed
-    if log.feed is None or not math.isfinite(run.feed_unit_mm_per_s):
-        return math.nan, 0.0
-    line = lines_at(log.feed, log, timed)
-    moving = np.isnan(timed.feed_mm_per_s[line]) & (line > 0)
-    value = log.feed.value[moving] * run.feed_unit_mm_per_s
+    line, speed = _shown_feeds(run)
+    moving = np.isnan(run.timed.feed_mm_per_s[line]) & (line > 0)
+    value = speed[moving]
     if not len(value):
         return math.nan, 0.0
-    alone = value[_along_z(timed)[line[moving]]]
+    alone = value[_along_z(run.timed)[line[moving]]]
     ordered = np.sort(value[value > 0.3 * value.max()])
     count = np.searchsorted(ordered, ordered * 1.003, side="right") - np.arange(len(ordered))
     steady = np.flatnonzero(count >= _MIN_READINGS)
