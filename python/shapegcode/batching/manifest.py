@@ -19,8 +19,7 @@ from typing import Any, BinaryIO
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import named_errors, write_lines
 
-MANIFEST = "batch.jsonl"
-"""Name of the file, in the output folder."""
+MANIFEST = "batch.jsonl"  # name of the file, in the output folder
 
 _HEAD = {"shapegcode": "batch", "format": 2}
 _FOLDER = "folder"

@@ -228,8 +228,7 @@ _PROGRESS_WEIGHT = 0.03
 _SEGMENTS_ASKED = 3  # on either side of the nearest vertex
 _SAGITTA_MM = 1e-5
 
-COARSE_STEP_RAD = 0.05
-"""Of an arc between two points of a polyline that is looked at from afar."""
+COARSE_STEP_RAD = 0.05  # of an arc between two points of a polyline that is looked at from afar
 
 
 def follow(
@@ -302,8 +301,7 @@ def polyline_of(path: _core.Path) -> FloatArray:
     return np.concatenate(parts)
 
 
-RECORD_SAMPLES = 1_000_000
-"""That a simulation keeps for pictures, at most."""
+RECORD_SAMPLES = 1_000_000  # that a simulation keeps for pictures, at most
 
 # A longer region shows its worst place and its stop.
 _WHOLE_S = 10.0

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
     from rich.table import Table as RichTable
 
-NO_BREAK = "\N{NO-BREAK SPACE}"
-"""Holds the words of a cell on one line."""
+NO_BREAK = "\N{NO-BREAK SPACE}"  # holds the words of a cell on one line
 _NARROWEST = 12
 
 

@@ -171,8 +171,7 @@ def _spread(sd: float | None, percent: float | None, whole: float) -> float:
     return _number(name, given) * (1.0 if percent is None else whole / 100.0)
 
 
-Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]
-"""What each key is sampled from."""
+Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]  # what each key is sampled from
 
 # A machine may differ from its file in these, and they are read when blocks are simulated.
 _SIMULATED = re.compile(

@@ -115,12 +115,12 @@ def _heat_map(heat: model.HeatMap) -> str:
     columns = ["", *heat.columns, *([""] if has_remarks else [])]
     head = "".join(f'<th scope="col">{escape(name)}</th>' if name else "<td></td>" for name in columns)
     rows = "\n".join(_heat_row(row, heat, has_remarks) for row in heat.rows)
-    caption = f'<p class="caption">{prose(heat.caption)}</p>' if heat.caption else ""
-    return (
-        _scrolled(f'<table class="heat"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>')
-        + _LEGEND
-        + caption
-    )
+    table = f'<table class="heat"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
+    return _scrolled(table) + _LEGEND + _caption(heat.caption)
+
+
+def _caption(text: str) -> str:
+    return f'<p class="caption">{prose(text)}</p>' if text else ""
 
 
 def _heat_row(row: model.HeatRow, heat: model.HeatMap, has_remarks: bool) -> str:
@@ -148,14 +148,12 @@ def _heat(share: float | None) -> tuple[str, str]:
     return f"heat-{min(int(max(share, 0.0) * _STEPS), _STEPS - 1)}", title
 
 
-_LEGEND = (
-    '<p class="legend">Share of the limit: '
-    + " ".join(
-        f'<span class="swatch heat-{step}">{step * 100 // _STEPS}–{(step + 1) * 100 // _STEPS} %</span>'
-        for step in range(_STEPS)
-    )
-    + ' <span class="swatch heat-over"><span class="mark">▲</span>over</span></p>'
+_SWATCHES = (
+    f'<span class="swatch heat-{step}">{step * 100 // _STEPS}–{(step + 1) * 100 // _STEPS} %</span> '
+    for step in range(_STEPS)
 )
+_OVER = '<span class="swatch heat-over"><span class="mark">▲</span>over</span>'
+_LEGEND = f'<p class="legend">Share of the limit: {"".join(_SWATCHES)}{_OVER}</p>'
 
 
 def _bars(bars: model.Bars) -> str:
@@ -212,8 +210,8 @@ def _table(table: Table) -> str:
         )
         lines.append(f'<tr class="{" ".join(marks)}">{body}</tr>' if marks else f"<tr>{body}</tr>")
     title = f"<caption>{escape(table.title)}</caption>" if table.title else ""
-    caption = f'<p class="caption">{prose(table.caption)}</p>' if table.caption else ""
-    return _scrolled(f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>") + caption
+    whole = f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+    return _scrolled(whole) + _caption(table.caption)
 
 
 def _linked(text: str, column: Column, row: object) -> str:
