@@ -243,8 +243,6 @@ MACHINE = Interface(
     },
 )
 
-# --- shapegcode setup -------------------------------------------------------------------------------------------------
-
 
 def _set_up(args: argparse.Namespace) -> int:
     from shapegcode.setup.answers import read_answers

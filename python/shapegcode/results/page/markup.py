@@ -142,10 +142,8 @@ def _heat_row(row: model.HeatRow, heat: model.HeatMap, has_remarks: bool) -> str
 def _heat(share: float | None) -> tuple[str, str]:
     if share is None:
         return "heat-none", ""
-    title = f' title="{share * 100.0:.0f} % of the limit"'
-    if share > 1.0:
-        return "heat-over", title
-    return f"heat-{min(int(max(share, 0.0) * _STEPS), _STEPS - 1)}", title
+    step = "over" if share > 1.0 else min(int(max(share, 0.0) * _STEPS), _STEPS - 1)
+    return f"heat-{step}", f' title="{share * 100.0:.0f} % of the limit"'
 
 
 _SWATCHES = (
@@ -174,11 +172,11 @@ def _bars(bars: model.Bars) -> str:
 
 
 def _notes(notes: model.Notes) -> str:
-    rows = "".join(
-        f"<div{' class=strong' if topic in notes.strong else ''}><dt>{escape(topic)}</dt><dd>{prose(text)}</dd></div>"
-        for topic, text in notes.rows
-    )
-    return f'<dl class="notes">{rows}</dl>'
+    rows = []
+    for topic, text in notes.rows:
+        kind = " class=strong" if topic in notes.strong else ""
+        rows.append(f"<div{kind}><dt>{escape(topic)}</dt><dd>{prose(text)}</dd></div>")
+    return f'<dl class="notes">{"".join(rows)}</dl>'
 
 
 def _command(text: str) -> str:
