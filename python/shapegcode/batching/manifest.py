@@ -19,8 +19,7 @@ from typing import Any, BinaryIO
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import named_errors, write_lines
 
-MANIFEST = "batch.jsonl"
-"""Name of the file, in the output folder."""
+MANIFEST = "batch.jsonl"  # name of the file, in the output folder
 
 _HEAD = {"shapegcode": "batch", "format": 2}
 _FOLDER = "folder"
@@ -141,13 +140,11 @@ def _locked(folder: Path) -> int:
 
 def _base_of(stream: BinaryIO, output: str | Path) -> str:
     """What the first line says; empty: there is none."""
-    line = stream.readline()
-    head: object = None
+    line, head = stream.readline(), None
     with contextlib.suppress(ValueError):
         head = json.loads(line)
     folder = head.pop(_FOLDER, None) if isinstance(head, dict) else None
     if line and (head != _HEAD or not isinstance(folder, str)):
-        raise ArgumentError(
-            f"{Path(output) / MANIFEST}: not a manifest of this version; name another folder or remove it"
-        )
+        file = Path(output) / MANIFEST
+        raise ArgumentError(f"{file}: not a manifest of this version; name another folder or remove it")
     return os.path.normpath(Path(output).absolute() / folder) if isinstance(folder, str) else ""

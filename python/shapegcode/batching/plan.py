@@ -156,8 +156,7 @@ def _mentioned(text: bytes, folders: Sequence[Path]) -> list[int]:
 COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
 """Commands of one program that can be run over many."""
 
-WRITES = ("convert", "feed")
-"""Those that write a program."""
+WRITES = ("convert", "feed")  # those that write a program
 _AMOUNT = frozenset({"-q", "--quiet", "-v", "--verbose"})
 _OF_ONE_RUN = (
     "-o", "--output", "-m", "--machine", "--json", "--html", "--html-script", "--csv", "--npz", "--plots",

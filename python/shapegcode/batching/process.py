@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 Ending = Literal["ended", "crashed", "killed", "out of time", "out of memory", "other version"]
 """How a run ended: by itself with an exit code, or not."""
 
-FAILED_CODES = {97: "crashed", 98: "out of memory"}
-"""Exit codes of a run that are no command's."""
+FAILED_CODES = {97: "crashed", 98: "out of memory"}  # exit codes of a run that are no command's
 
 
 @dataclass(frozen=True)
@@ -261,8 +260,7 @@ def _written(root: Path, cwd: Path, read: list[str]) -> Iterator[tuple[str, byte
             yield os.path.relpath(file, cwd), file.read_bytes()
 
 
-LOCAL = "local"
-"""Word for a cluster of this machine."""
+LOCAL = "local"  # word for a cluster of this machine
 
 _RETRIES = 3
 _WAIT_S = 30

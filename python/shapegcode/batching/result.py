@@ -216,19 +216,15 @@ class Batch(Result):
 
     def key_figures(self) -> tuple[Figure, ...]:
         """How many runs ended how."""
-        return tuple(
-            Figure(name, "runs", None, float(count), 0, None, "", f"counts.{name}")
-            for name, count in self.counts.items()
-            if count or name == "ok"
-        )
+        shown = {name: float(count) for name, count in self.counts.items() if count or name == "ok"}
+        return tuple(Figure(name, "runs", None, count, 0, None, "", f"counts.{name}") for name, count in shown.items())
 
     def tables(self) -> list[Table]:
         """What needs somebody, and what was gained; the first twenty of each, on an index of pages two thousand."""
         worst, counts, shown = list(_RED), self.counts, _LISTED if self.html else _SHOWN
-        bad = heapq.nsmallest(
-            shown, (row for row in self.rows if row.ended != "ok"), key=lambda row: worst.index(row.ended)
-        )
-        good = heapq.nsmallest(shown, (row for row in self.rows if row.ended == "ok"), key=lambda row: -row.gain_um)
+        others, fine = (row for row in self.rows if row.ended != "ok"), (row for row in self.rows if row.ended == "ok")
+        bad = heapq.nsmallest(shown, others, key=lambda row: worst.index(row.ended))
+        good = heapq.nsmallest(shown, fine, key=lambda row: -row.gain_um)
         names = (
             Column("program", value="program", left=True, link=self._link, priority=0),
             Column("machine", value="machine", left=True, priority=4),

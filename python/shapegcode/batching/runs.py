@@ -118,8 +118,7 @@ def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
 OnBatch = Callable[[float, str], None]
 """Called with the ratio that is done, and the numbers of runs that are done, running and failed."""
 
-_AHEAD = 2
-"""Runs that are ready for each process, so that none waits for files."""
+_AHEAD = 2  # runs that are ready for each process, so that none waits for files
 _TOLD_EVERY_S = 1.0
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 

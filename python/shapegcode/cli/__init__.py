@@ -20,23 +20,17 @@ from shapegcode.cli.arguments import CommandParser, Interface
 _DEBUG = "--debug"
 _MAX_STOP_S = 15.0  # after Ctrl-C
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_WITH_REST = "batch"
-"""Behind -- it takes words for the command that it runs."""
+_WITH_REST = "batch"  # behind -- it takes words for the command that it runs
 
 
 class ExitCode:
     """Exit codes of the command, the same for every sub-command."""
 
-    OK = 0
-    """Done, and within tolerance."""
-    OUT_OF_TOLERANCE = 1
-    """Done, but the result misses its tolerance."""
-    BAD_INPUT = 2
-    """Not done: wrong arguments, a bad program or machine file, a file that cannot be read or written."""
-    INTERRUPTED = 130
-    """Stopped by the user (Ctrl-C)."""
-    BROKEN_PIPE = 141
-    """The reader of standard output went away."""
+    OK = 0  # done, and within tolerance
+    OUT_OF_TOLERANCE = 1  # done, but the result misses its tolerance
+    BAD_INPUT = 2  # not done: wrong arguments, a bad program or machine file, a file that cannot be read or written
+    INTERRUPTED = 130  # stopped by the user (Ctrl-C)
+    BROKEN_PIPE = 141  # the reader of standard output went away
 
 
 _HOMES = {
@@ -141,21 +135,21 @@ def _expected(error: Exception) -> bool:
 
 def _message(error: Exception) -> str:
     """The error in words; for a file the path, the reason, and which folder is missing."""
+    kind = type(error).__name__
     if isinstance(error, ModuleNotFoundError):
         return f"pictures need {error.name}, which is not installed"
     if not isinstance(error, OSError):
         # One line per problem, each with the command's name, so that each can be read alone.
-        return str(error).replace("\n", "\nshapegcode: ") or type(error).__name__
+        return str(error).replace("\n", "\nshapegcode: ") or kind
     if error.filename is None:
-        if error.errno in _FULL:  # every file is written under its name
-            return f"standard output: {error.strerror}"
-        return error.strerror or str(error) or type(error).__name__
+        # Every file is written under its name.
+        where = "standard output: " if error.errno in _FULL else ""
+        return where + (error.strerror or str(error) or kind)
     path = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else str(error.filename)
-    reason = error.strerror or type(error).__name__
-    if error.errno == errno.ENOENT:
-        folder = Path(path).parent
-        reason = "no such file" if folder.is_dir() else f"the folder {folder} does not exist"
-    return f"{path}: {reason}"
+    if error.errno != errno.ENOENT:
+        return f"{path}: {error.strerror or kind}"
+    folder = Path(path).parent
+    return f"{path}: {'no such file' if folder.is_dir() else f'the folder {folder} does not exist'}"
 
 
 def _run(argv: list[str]) -> int:
@@ -168,10 +162,10 @@ def _run(argv: list[str]) -> int:
     args.rest = tuple(rest)
     args.typed = tuple([*argv, "--", *rest] if rest else argv)
     try:
+        run = args.run
         if getattr(args, "program", None) == "all":
-            several = importlib.import_module(f"{__name__}.several")
-            return int(several.run_all(args))
-        return int(args.run(args))
+            run = importlib.import_module(f"{__name__}.several").run_all
+        return int(run(args))
     finally:
         # A full disk behind a redirected output shows only here.
         sys.stdout.flush()

@@ -267,8 +267,7 @@ class CommandParser(argparse.ArgumentParser):
         return "\n".join(["examples:", *lines]) + codes + (self.epilog or "")
 
 
-NEEDED = object()
-"""In place of a default: the option must be given."""
+NEEDED = object()  # in place of a default: the option must be given
 
 Row = tuple[Any, ...]
 """An option: names, metavar, type, help and, where it is not None, the default or `NEEDED`.

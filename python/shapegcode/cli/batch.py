@@ -90,8 +90,6 @@ BATCH = Interface(
     _batch,
 )  # fmt: skip
 
-# --- shapegcode study and optimize ------------------------------------------------------------------------------------
-
 
 def _study_options(what: str, draws: str) -> tuple[Row, ...]:
     """Study file, machine and number of samples; `what` describes the file, `draws` the number."""

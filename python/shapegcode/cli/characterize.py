@@ -127,8 +127,6 @@ CHARACTERIZE = Interface(
     _characterize,
 )  # fmt: skip
 
-# --- shapegcode testcut -----------------------------------------------------------------------------------------------
-
 
 def _write_cut(args: argparse.Namespace) -> int:
     from shapegcode.cutting.tool import Tool

@@ -65,11 +65,8 @@ def _convert(args: argparse.Namespace) -> int:
         notes.append(f"{'nothing else changed' if not result.proof.refused else 'CHANGED'}: {result.proof.answer}")
     if target == failed and output.exists():
         notes.append(f"{output} is of an earlier run and was left alone")
-    if result.unverified_parameters_tested and not result.parameter_sensitivity:
-        notes.append(
-            f"{result.unverified_parameters_tested} unverified parameters were changed one at a time: "
-            "none matters for the verdict"
-        )
+    if (tested := result.unverified_parameters_tested) and not result.parameter_sensitivity:
+        notes.append(f"{tested} unverified parameters were changed one at a time: none matters for the verdict")
     needed = () if hasattr(args, "several") else program.kept_calls
     if needed:
         names = ", ".join(place.address for place in needed)

@@ -104,13 +104,9 @@ def _fit(args: argparse.Namespace) -> int:
 def _said_again(args: argparse.Namespace) -> tuple[str, ...]:
     """The options on which it depends which modes are found."""
     said = ["--decay"] * args.ignore_force + ["--stops"] * args.stops
-    if args.frequencies is not None:
-        said.append("--frequencies {:g}:{:g}".format(*args.frequencies))
-    if args.modes is not None:
-        said.append(f"--modes {args.modes}")
-    if args.across is not None:
-        said += ["--across", *args.across]
-    return tuple(said)
+    said += ["--frequencies {:g}:{:g}".format(*args.frequencies)] if args.frequencies is not None else []
+    said += [f"--modes {args.modes}"] if args.modes is not None else []
+    return (*said, *(["--across", *args.across] if args.across is not None else []))
 
 
 def _decide(args: argparse.Namespace, machine: Machine, axis: str | None) -> None:

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from shapegcode.machine.description_result import MachineDescription
     from shapegcode.settings.keys import TomlTable
 
-FILES = ("machine", "tool", "stock", "study")
-"""Kinds of TOML files that have a schema."""
+FILES = ("machine", "tool", "stock", "study")  # kinds of TOML files that have a schema
 
 _DEFAULT_FILE = "machine.toml"
 
@@ -59,10 +58,11 @@ def _import(args: argparse.Namespace) -> int:
 
 def _modes_of(machine: Machine | None) -> dict[str, str]:
     """Per axis the modes that a machine has, in words."""
-    axes = zip("xyz", machine.axes.as_tuple(), strict=True) if machine else ()
+    if machine is None:
+        return {}
+    axes = zip("xyz", machine.axes.as_tuple(), strict=True)
     frequencies = {name: [f"{mode.frequency_hz:g} Hz" for mode in axis.modes] for name, axis in axes}
-    whose = machine.name if machine else ""
-    return {name: f"{', '.join(found)} (of {whose})" for name, found in frequencies.items() if found}
+    return {name: f"{', '.join(found)} (of {machine.name})" for name, found in frequencies.items() if found}
 
 
 def _sorted(files: list[str]) -> tuple[str, list[str]]:
@@ -130,15 +130,12 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
                 if rows
                 else "every axis is said to be rigid, so there is nothing to shape for"
             )
-    matters = tuple(
-        OpenValue(
-            row.key, row.value, row.origin, row.tested_value,
-            f"{row.figure} {row.figure_um:.1f} → {row.tested_um:.1f}, limit {row.limit_um:.1f} µm", row.share,
-        )
-        for row in rows
-    )  # fmt: skip
+    matters = []
+    for row in rows:
+        does = f"{row.figure} {row.figure_um:.1f} → {row.tested_um:.1f}, limit {row.limit_um:.1f} µm"
+        matters.append(OpenValue(row.key, row.value, row.origin, row.tested_value, does, row.share))
     warnings = (*found.warnings, note) if note else found.warnings
-    return replace(found, program=args.input, matters=matters, warnings=warnings)
+    return replace(found, program=args.input, matters=tuple(matters), warnings=warnings)
 
 
 def _diff(args: argparse.Namespace) -> int:
@@ -158,9 +155,9 @@ def file_schema(kind: str) -> str:
     from shapegcode.studies.study_file import study_schema
 
     title = f"{kind} file of shapegcode"
-    models: dict[str, type[TomlTable]] = {"machine": Machine, "tool": Tool, "stock": Stock}
     if kind == "study":
         return to_text(study_schema(title))
+    models: dict[str, type[TomlTable]] = {"machine": Machine, "tool": Tool, "stock": Stock}
     return to_text(toml_schema(models[kind], title, origins=kind == "machine"))
 
 
@@ -245,8 +242,6 @@ MACHINE = Interface(
         "schema": ("print the JSON Schema of machine, tool, stock or study files, for editors", _SCHEMA_ACTION),
     },
 )
-
-# --- shapegcode setup -------------------------------------------------------------------------------------------------
 
 
 def _set_up(args: argparse.Namespace) -> int:

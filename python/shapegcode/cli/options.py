@@ -45,10 +45,8 @@ AMOUNT = OneOf("verbosity", (
 ))  # fmt: skip
 _PAGE = ("--html", "FILE", None, "write the result as a page: one file that any browser opens, without a network")
 _CITE = ("--cite", None, bool, "also say which papers are behind the methods of this run, as BibTeX")
-RESULT = (JSON, _PAGE, SCRIPT, _CITE, AMOUNT)
-"""What every command with a result has."""
-RESULT_OF_DRAWS = (JSON, _PAGE, SCRIPT, AMOUNT)
-"""Without --cite: each draw is a run of `convert`, which cites."""
+RESULT = (JSON, _PAGE, SCRIPT, _CITE, AMOUNT)  # what every command with a result has
+RESULT_OF_DRAWS = (JSON, _PAGE, SCRIPT, AMOUNT)  # without --cite: each draw is a run of `convert`, which cites
 
 
 def program_input(metavar: str = "IN") -> tuple[Row, ...]:

@@ -27,7 +27,6 @@ from shapegcode.errors import ArgumentError
 if TYPE_CHECKING:
     from shapegcode.results.page.model import Page
 
-# --- shapegcode shaper ------------------------------------------------------------------------------------------------
 
 # The registry's, whose solvers take too long to load for a help text.
 _FAMILIES = (
@@ -99,8 +98,6 @@ SHAPER = Interface(
     ),
     _shaper,
 )  # fmt: skip
-
-# --- shapegcode report ------------------------------------------------------------------------------------------------
 
 
 def _report(args: argparse.Namespace) -> int:
@@ -176,7 +173,6 @@ REPORT = Interface(
     _report,
 )
 
-# --- shapegcode demo --------------------------------------------------------------------------------------------------
 
 _PAGES = {
     "metrology": "docs/evidence/paper000.md",
@@ -218,8 +214,6 @@ DEMO = Interface(
     _demo,
 )  # fmt: skip
 
-# --- shapegcode completion --------------------------------------------------------------------------------------------
-#
 # The shell asks the command itself at each TAB: what is offered is what the parser of this version takes.
 
 

@@ -10,8 +10,6 @@ from shapegcode.cli.arguments import NEEDED, Interface, OldName, count, line_ran
 from shapegcode.cli.options import RESULT, load_machine
 from shapegcode.io.data_file import write_lines
 
-# --- shapegcode simulate ----------------------------------------------------------------------------------------------
-
 # Of the progress bar, for the regions; the rest is the motion in time, which takes most of it.
 _REGIONS_SHARE = 0.1
 
@@ -71,8 +69,6 @@ SIMULATE = Interface(
     _simulate,
 )  # fmt: skip
 
-# --- shapegcode feed --------------------------------------------------------------------------------------------------
-
 
 def _feed(args: argparse.Namespace) -> int:
     from shapegcode.feed.schedule import schedule_feed
@@ -106,8 +102,6 @@ FEED = Interface(
     _feed,
 )
 
-# --- shapegcode expand ------------------------------------------------------------------------------------------------
-
 
 def _expand(args: argparse.Namespace) -> int:
     from shapegcode.program.expand import expand
@@ -132,8 +126,6 @@ EXPAND = Interface(
     ),
     _expand,
 )  # fmt: skip
-
-# --- shapegcode measure -----------------------------------------------------------------------------------------------
 
 
 def _measure(args: argparse.Namespace) -> int:
@@ -186,7 +178,6 @@ MEASURE = Interface(
     _measure,
 )  # fmt: skip
 
-# --- shapegcode time --------------------------------------------------------------------------------------------------
 
 # A table of more blocks is built only where it is written.
 _MAX_BLOCKS_SHOWN = 100_000
@@ -251,8 +242,6 @@ TIME = Interface(
     _time,
 )  # fmt: skip
 
-# --- shapegcode check -------------------------------------------------------------------------------------------------
-
 
 def _check(args: argparse.Namespace) -> int:
     from shapegcode.checking.check import check
@@ -273,8 +262,6 @@ CHECK = Interface(
     (*options.program_input("PROGRAM"), *RESULT),
     _check,
 )
-
-# --- shapegcode compare -----------------------------------------------------------------------------------------------
 
 
 def _compare(args: argparse.Namespace) -> int:

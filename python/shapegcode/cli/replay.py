@@ -26,17 +26,10 @@ _WITH_MOTION = ("Check", "Conversion", "CycleTime", "FeedSchedule", "Measurement
 
 def changes(provenance: Provenance, folder: Path) -> tuple[dict[tuple[str, str], Path], list[str]]:
     """Look for the files of a run where they were, and in a folder."""
-    found: dict[tuple[str, str], Path] = {}
-    problems = []
-    for file in provenance.files:
-        if file.role in ("wrote", "output of all"):
-            continue
-        place, problem = _looked_up(file, folder)
-        if place is not None:
-            found[file.role, file.name] = place
-        if problem:
-            problems.append(problem)
-    return found, problems
+    asked = [file for file in provenance.files if file.role not in ("wrote", "output of all")]
+    looked_up = [(file, *_looked_up(file, folder)) for file in asked]
+    found = {(file.role, file.name): place for file, place, _ in looked_up if place is not None}
+    return found, [problem for *_, problem in looked_up if problem]
 
 
 def _looked_up(file: ProvenanceFile, folder: Path) -> tuple[Path | None, str]:

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from shapegcode.results.result import Result
     from shapegcode.results.table import Table
 
-Output = tuple[str | Path, bytes | memoryview]
-"""The program of a command: its file, and what goes into it."""
+Output = tuple[str | Path, bytes | memoryview]  # the program of a command: its file, and what goes into it
 
 _PIPE_WIDTH = 120
 _PIECES = 4096
@@ -281,14 +280,11 @@ def _provenance(
 
 
 def _read(role: str, name: str) -> ProvenanceFile:
+    from shapegcode.machine import Machine
     from shapegcode.results.json import ProvenanceFile
 
-    if role in MACHINES and not Path(name).exists():
-        from shapegcode.machine import Machine
-
-        if name in Machine.builtin_names():
-            return ProvenanceFile.of(role, name, Machine.builtin_text(name).encode())
-    return ProvenanceFile.of(role, name)
+    is_builtin = role in MACHINES and not Path(name).exists() and name in Machine.builtin_names()
+    return ProvenanceFile.of(role, name, Machine.builtin_text(name).encode() if is_builtin else None)
 
 
 def _command(args: argparse.Namespace) -> str:

@@ -96,7 +96,6 @@ def _run_one(args: argparse.Namespace, several: Gathered) -> int:
 
 def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left: set[int]) -> None:
     """Write the one JSON and the one program, and say it."""
-    target = getattr(args, "json", None)
     outputs = {str(output) for output, _ in several.written.values()}
     # Where one of the programs misses its tolerance, the file as a whole goes beside the one that was asked for.
     asked = getattr(args, "output", None)
@@ -104,7 +103,8 @@ def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left:
     for report in several.reports:
         if output is not None and "output" in report:
             report["output"] = output
-    write_results(several.reports, target, None if output is None else (output, several.joined()))
+    program = None if output is None else (output, several.joined())
+    write_results(several.reports, getattr(args, "json", None), program)
     console = output_console(standard_output(args))
     for reason, indices in (
         ("called by others and done there", called),

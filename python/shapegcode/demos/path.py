@@ -133,11 +133,8 @@ class PathDemo(Result):
             Column("agrees", value=lambda row: _AGREEMENT[row.agreement], text=True),
             Column("note", text=True),
         )
-        rows = [
-            (each, name, run)
-            for each in self.conditions
-            for name, run in (("unshaped", each.unshaped), ("ideal", each.ideal), ("emitted", each.emitted))
-        ]
+        kinds = ("unshaped", "ideal", "emitted")
+        rows = [(each, name, getattr(each, name)) for each in self.conditions for name in kinds]
         columns = (
             Column("mm/s", value=lambda row: row[0].feed_mm_per_s if row[1] == "unshaped" else None),
             Column("slower arc", "%", lambda row: row[0].reduction_percent if row[1] == "unshaped" else None),
@@ -149,10 +146,8 @@ class PathDemo(Result):
             Column("longer", "%", lambda row: row[2].time_increase_percent or None, digits=1),
         )
         title = f"by condition, on {self.machine}; the emitted program has blocks of 5 ms"
-        return [
-            Table("", statements, self.rows, caption=self.remark),
-            Table(title, columns, rows, sections=range(3, len(rows), 3)),
-        ]
+        by_condition = Table(title, columns, rows, sections=range(3, len(rows), 3))
+        return [Table("", statements, self.rows, caption=self.remark), by_condition]
 
 
 def path_program(feed_mm_per_s: float, machine: Machine) -> Program:
@@ -214,16 +209,13 @@ def _condition(feed: int, reduction: int, machine: Machine) -> PathCondition:
     def run(time_s: float, orbit_percent: float, residual_um: Xyz[float]) -> PathRun:
         return PathRun(time_s, (time_s / unshaped_s - 1.0) * 100.0, orbit_percent, residual_um)
 
+    residual = region.residual_vibration_um
     return PathCondition(
         feed,
         reduction,
-        unshaped=run(unshaped_s, 0.0, region.residual_vibration_um.original),
+        unshaped=run(unshaped_s, 0.0, residual.original),
         ideal=run(ideal.duration_s, ideal.orbit_error_percent[0], largest_xyz_um([ideal.residual_mm])),
-        emitted=run(
-            region.time_s.emitted,
-            conversion.orbit_error_percent[-1],
-            region.residual_vibration_um.emitted,
-        ),
+        emitted=run(region.time_s.emitted, conversion.orbit_error_percent[-1], residual.emitted),
         blocks=conversion.blocks.emitted,
         ok=conversion.ok,
         published_orbit_error_percent=_PAPER_ORBIT_PERCENT[feed, reduction],

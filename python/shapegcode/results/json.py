@@ -26,8 +26,7 @@ import numpy as np
 
 from shapegcode.io.data_file import open_file
 
-FORMAT = 1
-"""Of the JSON of results: raised where an older file can no longer be read."""
+FORMAT = 1  # of the JSON of results: raised where an older file can no longer be read
 
 
 @dataclass(frozen=True)
@@ -180,17 +179,15 @@ def _plain(value: object, *, coarse: bool, every_digit: bool) -> Any:
         return _plain(entry, coarse=coarse or key.endswith(_COARSE_UNITS), every_digit=every_digit or digits)
 
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = [
-            field
-            for field in dataclasses.fields(value)
-            if not field.metadata.get("hidden")
-            and not (field.metadata.get("sparse") and getattr(value, field.name) is None)
-        ]
+        found = {}
+        for field in dataclasses.fields(value):
+            held = getattr(value, field.name)
+            if not (field.metadata.get("hidden") or (field.metadata.get("sparse") and held is None)):
+                found[field.name] = inner(held, field.name, bool(field.metadata.get("exact")))
         every = getattr(value, "json_exact", ())
-        return {
-            field.name: inner(getattr(value, field.name), field.name, bool(field.metadata.get("exact")))
-            for field in fields
-        } | {name: inner(getattr(value, name), name, name in every) for name in getattr(value, "json_extra", {})}
+        return found | {
+            name: inner(getattr(value, name), name, name in every) for name in getattr(value, "json_extra", ())
+        }
     if isinstance(value, Mapping):
         return {str(key): inner(entry, str(key)) for key, entry in value.items()}
     if isinstance(value, enum.Enum):
@@ -266,13 +263,11 @@ def _object(
     written: dict[str, Any] = {"plots": tuple[str, ...], "output": str, "provenance": Provenance} if files else {}
     properties = {}
     for name, hint in (shown | written).items():
-        properties[name] = _of(arguments.get(hint, hint), definitions)
-        if name in meanings:
-            properties[name] = properties[name] | {"description": meanings[name]}
-    summary = (cls.__doc__ or "").strip().partition("\n")[0]
+        meaning = {"description": meanings[name]} if name in meanings else {}
+        properties[name] = _of(arguments.get(hint, hint), definitions) | meaning
     return {
         "type": "object",
-        "description": summary,
+        "description": (cls.__doc__ or "").strip().partition("\n")[0],
         "properties": properties,
         "required": sorted(shown.keys() - left_out),
         "additionalProperties": False,
@@ -336,17 +331,19 @@ def _of(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
             definitions[name] = {}
             definitions[name] = _object(cls, bound, definitions)
         return {"$ref": f"#/$defs/{name}"}
-    if isinstance(cls, type) and issubclass(cls, np.ndarray):
+    if not isinstance(cls, type):
+        raise TypeError(f"{hint} has no form in JSON")
+    if issubclass(cls, np.ndarray):
         return {"type": "array"}
-    if isinstance(cls, type) and issubclass(cls, enum.Enum):
+    if issubclass(cls, enum.Enum):
         return {"enum": [each.name for each in cls]}
     if cls is tuple and arguments[-1:] != (...,) and arguments:
         items = [_of(each, definitions) for each in arguments]
         return {"type": "array", "prefixItems": items, "minItems": len(items), "maxItems": len(items)}
-    if isinstance(cls, type) and issubclass(cls, Mapping):
+    if issubclass(cls, Mapping):
         return {"type": "object", "additionalProperties": _of(arguments[1], definitions) if arguments else {}}
-    if isinstance(cls, type) and issubclass(cls, PurePath):
+    if issubclass(cls, PurePath):
         return {"type": "string"}
-    if isinstance(cls, type) and issubclass(cls, Sequence | set | frozenset):
+    if issubclass(cls, Sequence | set | frozenset):
         return {"type": "array", **({"items": _of(arguments[0], definitions)} if arguments else {})}
     raise TypeError(f"{hint} has no form in JSON")

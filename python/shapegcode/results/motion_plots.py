@@ -266,10 +266,9 @@ def _vibration_label(trace: Trace, axis: int) -> str:
     deflection = np.abs(trace.deflection_mm[:, axis])
     if not trace.stops:
         return f"{trace.label}, here up to {1e3 * float(deflection.max()):.1f} µm"
-    if trace.residual_mm is not None:
-        return f"{trace.label}, residual {1e3 * trace.residual_mm[axis]:.1f} µm"
     remaining = deflection[trace.times_s >= trace.rest_s - trace.period_s / 2]
-    return f"{trace.label}, residual {1e3 * float(remaining.max()):.1f} µm"
+    residual_mm = float(remaining.max()) if trace.residual_mm is None else trace.residual_mm[axis]
+    return f"{trace.label}, residual {1e3 * residual_mm:.1f} µm"
 
 
 def line_style(number: int, *, fine: bool = False) -> dict[str, Any]:

@@ -6,6 +6,7 @@ In a pickle a path is built again; of other objects of the core the figures trav
 
 from __future__ import annotations
 
+import contextlib
 import copyreg
 import importlib
 import math
@@ -80,19 +81,17 @@ def _is_handle(value: Any) -> bool:
 def _reduced(value: Any) -> tuple[Any, ...]:
     figures = {}
     for name, entry in vars(type(value)).items():
-        if isinstance(entry, property):
-            try:
+        with contextlib.suppress(_core.ShapegcodeError):  # a figure that this one does not have
+            if isinstance(entry, property):
                 figures[name] = getattr(value, name)
-            except _core.ShapegcodeError:
-                continue  # a figure that this one does not have
     return CoreFigures, (type(value).__name__, figures)
 
 
 def _parts(segment: _core.Segment) -> tuple[Any, ...]:
+    ends, feed = (segment.start_mm, segment.end_mm), segment.feed_mm_per_s
     if segment.kind == _core.SegmentKind.arc:
-        centre, sweep = segment.centre_mm.copy(), segment.sweep_rad
-        return segment.start_mm, segment.end_mm, centre, sweep, segment.feed_mm_per_s, segment.normal
-    return segment.start_mm, segment.end_mm, segment.feed_mm_per_s
+        return *ends, segment.centre_mm.copy(), segment.sweep_rad, feed, segment.normal
+    return *ends, feed
 
 
 def _segment(parts: tuple[Any, ...]) -> _core.Segment:
@@ -119,8 +118,7 @@ copyreg.pickle(types.MappingProxyType, lambda mapping: (types.MappingProxyType, 
 
 T = TypeVar("T")
 
-Plot = Callable[..., "Axes"]
-"""Plot one picture: ``plot(ax=None) -> Axes``, into the caller's axes or into a new figure."""
+Plot = Callable[..., "Axes"]  # plot one picture: ``plot(ax=None) -> Axes``, into the caller's axes or into a new figure
 
 
 @dataclass(frozen=True)
@@ -284,11 +282,8 @@ class Deviation:
     @classmethod
     def largest(cls, deviations: Iterable[Deviation]) -> Deviation:
         """The largest of each."""
-        rows = list(deviations)
         return cls(
-            max(each.largest_mm for each in rows),
-            max(each.left_mm for each in rows),
-            max(each.right_mm for each in rows),
+            *map(max, zip(*((each.largest_mm, each.left_mm, each.right_mm) for each in deviations), strict=True))
         )
 
     def gouge_and_excess_um(self, material_side: str) -> dict[str, float]:
@@ -318,13 +313,8 @@ class ContourError:
         squares = sum(row.sum_of_squares_mm2 for row in rows)
         largest = Deviation.of(rows) if rows else Deviation(0.0, 0.0, 0.0)
         beside = {} if material_side is None else largest.gouge_and_excess_um(material_side)
-        return cls(
-            largest.largest_mm * 1e3,
-            math.sqrt(squares / count) * 1e3 if count else 0.0,
-            largest.left_mm * 1e3,
-            largest.right_mm * 1e3,
-            **beside,
-        )
+        rms_mm = math.sqrt(squares / count) if count else 0.0
+        return cls(largest.largest_mm * 1e3, rms_mm * 1e3, largest.left_mm * 1e3, largest.right_mm * 1e3, **beside)
 
 
 def largest_xyz_um(vectors: Iterable[FloatArray]) -> Xyz[float]:

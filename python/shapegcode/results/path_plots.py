@@ -228,8 +228,7 @@ _PROGRESS_WEIGHT = 0.03
 _SEGMENTS_ASKED = 3  # on either side of the nearest vertex
 _SAGITTA_MM = 1e-5
 
-COARSE_STEP_RAD = 0.05
-"""Of an arc between two points of a polyline that is looked at from afar."""
+COARSE_STEP_RAD = 0.05  # of an arc between two points of a polyline that is looked at from afar
 
 
 def follow(
@@ -302,8 +301,7 @@ def polyline_of(path: _core.Path) -> FloatArray:
     return np.concatenate(parts)
 
 
-RECORD_SAMPLES = 1_000_000
-"""That a simulation keeps for pictures, at most."""
+RECORD_SAMPLES = 1_000_000  # that a simulation keeps for pictures, at most
 
 # A longer region shows its worst place and its stop.
 _WHOLE_S = 10.0
@@ -322,14 +320,9 @@ class SimulatedRegion:
 
     @classmethod
     def of_runs(
-        cls,
-        runs: Mapping[str, _core.SimulationFigures],
-        path: _core.Path,
-        period_s: float,
-        *,
-        lines: tuple[int, int],
-        regions: int,
-    ) -> SimulatedRegion:
+        cls, runs: Mapping[str, _core.SimulationFigures], path: _core.Path, period_s: float, *,
+        lines: tuple[int, int], regions: int,
+    ) -> SimulatedRegion:  # fmt: skip
         """The region that vibrates most, as the core simulated it."""
         traces = tuple(_trace(label, run, period_s) for label, run in runs.items())
         parts = [f"lines {lines[0]} to {lines[1]}, the region that vibrates most after its stop"] if regions > 1 else []
@@ -341,14 +334,9 @@ class SimulatedRegion:
 def _trace(label: str, run: _core.SimulationFigures, period_s: float) -> Trace:
     x, y, z = (float(value) for value in run.residual_mm)
     return Trace(
-        label,
-        period_s,
-        run.recorded_command,
-        run.recorded_response,
-        stops=len(run.recorded_command) * period_s > run.duration_s,
-        largest_mm=run.response.max_abs_mm,
-        residual_mm=(x, y, z),
-    )
+        label, period_s, run.recorded_command, run.recorded_response, residual_mm=(x, y, z),
+        stops=len(run.recorded_command) * period_s > run.duration_s, largest_mm=run.response.max_abs_mm,
+    )  # fmt: skip
 
 
 def motion_pictures(simulated: Callable[[], SimulatedRegion]) -> dict[str, Plot]:
@@ -405,17 +393,14 @@ def _worst_place(
     at = int(np.argmax(np.linalg.norm(away, axis=1)))
     around = round(_AROUND_S / first.period_s)
     ranks = np.array([max(at - around, 0), at, min(at + around, len(away) - 1)])
-    limits: FloatArray | None = None
+    limits = _progress(first, programmed)[ranks]
     near: list[Trace] = []
     for trace in traces:
-        progress = _progress(trace, programmed)
-        if limits is None:
-            limits = progress[ranks]
-        else:
+        if near:
+            progress = _progress(trace, programmed)
             ranks = np.minimum(np.searchsorted(progress, limits), len(progress) - 1)
         begin, place, end = (float(time) for time in trace.times_s[ranks])
         near.append(trace.part(begin, end, place))
-    assert limits is not None
     return tuple(near), _piece_of(programmed, float(limits[0]), float(limits[2])), float(first.times_s[at])
 
 
@@ -430,8 +415,6 @@ def _progress(trace: Trace, programmed: FloatArray) -> FloatArray:
 
 
 def _widest_plane(programmed: FloatArray) -> Plane:
-    spans = np.ptp(programmed, axis=0)
-    planes: dict[Plane, float] = {
-        "XY": spans[0] * spans[1] + 1e-6, "ZX": spans[2] * spans[0], "YZ": spans[1] * spans[2],
-    }  # fmt: skip
+    x, y, z = np.ptp(programmed, axis=0).tolist()
+    planes: dict[Plane, float] = {"XY": x * y + 1e-6, "ZX": z * x, "YZ": y * z}
     return max(planes, key=lambda plane: planes[plane])

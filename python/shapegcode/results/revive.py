@@ -119,12 +119,11 @@ def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingPr
     if not (isinstance(cls, type) and issubclass(cls, Result)):
         raise ArgumentError(f"provenance.result = {provenance.result}: not a result that this version knows")
     report = current_keys(cls, report)
-    beside = {*cls.json_extra, "provenance", "plots", "output", "program_address"}
     names = {field.name for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
-    known = names | beside
-    if unknown := sorted(report.keys() - known):
+    beside = {*cls.json_extra, "provenance", "plots", "output", "program_address"}
+    if unknown := sorted(report.keys() - names - beside):
         raise ArgumentError(f"key {unknown[0]} is not one of a {provenance.result}: written by {provenance.by}")
-    hidden = {name: value for name, value in kept.items() if name in known and value is not None}
+    hidden = {name: value for name, value in kept.items() if name in names | beside and value is not None}
     own = {key: value for key, value in report.items() if key in names}
     result: Result = _from_json(cls(**(dict(_fields(cls, own, "", {})) | hidden)))
     return result

@@ -5,6 +5,7 @@ A table fits 80 columns: numbers stay whole, texts wrap between words, and a col
 
 from __future__ import annotations
 
+import itertools
 import textwrap
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -16,8 +17,7 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
     from rich.table import Table as RichTable
 
-NO_BREAK = "\N{NO-BREAK SPACE}"
-"""Holds the words of a cell on one line."""
+NO_BREAK = "\N{NO-BREAK SPACE}"  # holds the words of a cell on one line
 _NARROWEST = 12
 
 
@@ -137,7 +137,10 @@ class Table:
         return _least_width(self.shown(), self._texts(self.shown()), whole=True)
 
     def _texts(self, shown: Sequence[Column]) -> list[list[str]]:
-        return [[_whole(column, column.cell(row)) for column in shown] for row in self.rows]
+        """Cells; a figure with its interval or unit is one word."""
+        cells = [[column.cell(row) for column in shown] for row in self.rows]
+        worded = [column.text or column.left for column in shown]
+        return [[c if w else c.replace(" ", NO_BREAK) for c, w in zip(row, worded, strict=True)] for row in cells]
 
     def _fitting(self, shown: list[Column], width: int) -> list[Column]:
         """The columns that stand side by side in a width without a cut word."""
@@ -210,15 +213,8 @@ def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int
 
 def _wrapped(cell: str, width: int) -> str:
     """In lines that fit; done here, as rich breaks a line at NO_BREAK as well. What is printed has plain spaces."""
-    lines = "\n".join(
-        line for part in cell.split("\n") for line in textwrap.wrap(part, width, break_on_hyphens=False) or [""]
-    )
-    return lines.replace(NO_BREAK, " ")
-
-
-def _whole(column: Column, cell: str) -> str:
-    """A figure with its interval or unit is one word."""
-    return cell if column.text or column.left else cell.replace(" ", NO_BREAK)
+    parts = (textwrap.wrap(part, width, break_on_hyphens=False) or [""] for part in cell.split("\n"))
+    return "\n".join(itertools.chain.from_iterable(parts)).replace(NO_BREAK, " ")
 
 
 def xyz_columns(cell: Callable[[str, Any], object]) -> tuple[Column, ...]:

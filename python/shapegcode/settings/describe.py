@@ -109,10 +109,10 @@ class _TomlWriter:
         if not tables and not self._short:
             self.lines.append("")
             self.comment(f"{key}: {field.description}.")
-        if not tables and (not self._short or self.remarks.get(key)):
             self._add(f"# [[{key}]]", key)
-        if not tables and not self._short:
             self.lines += [f"# {name} = ..." for name, inner in item.model_fields.items() if inner.is_required()]
+        elif not tables and self.remarks.get(key):
+            self._add(f"# [[{key}]]", key)
         for number, table in enumerate(tables, start=1):
             # The first of a list says what the keys of all are.
             self._explains = not self._short and number == 1
@@ -179,11 +179,9 @@ def keys_schema(model: type[TomlTable], value: dict[str, Any], kind: str, defs: 
         properties: dict[str, Any] = {}
         for key, field in model.model_fields.items():
             found = value
-            below = table_type(field)
-            if below is not None:
+            if (below := table_type(field)) is not None:
                 table = keys_schema(below, value, kind, defs)
-                table = _table({"^[1-9][0-9]*$": table}) if item_type(field) else table
-                found = {"anyOf": [value, table]}
+                found = {"anyOf": [value, _table({"^[1-9][0-9]*$": table}) if item_type(field) else table]}
             elif get_origin(field.annotation) in (dict, Mapping):
                 found = {"anyOf": [value, _table({".": value})]}
             properties[key] = found | facts(field) | {"description": field.description or ""}

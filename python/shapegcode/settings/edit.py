@@ -70,16 +70,10 @@ def take_tail(table: Table) -> list[Entry]:
     """Take away what stands behind the last key of a table and of the tables in it: it is of what follows."""
     entries = table.value.body
     last = next((item for key, item in reversed(entries) if key is not None), None)
-    if isinstance(last, AoT):
-        return take_tail(last.body[-1]) + _cut(entries)
-    if isinstance(last, Table):
-        return take_tail(last) + _cut(entries)
-    return _cut(entries)
-
-
-def _cut(entries: list[Entry]) -> list[Entry]:
+    last = last.body[-1] if isinstance(last, AoT) else last
+    tail = take_tail(last) if isinstance(last, Table) else []
     end = own_end(entries)
-    tail = entries[end:]
+    tail += entries[end:]
     del entries[end:]
     return tail
 
@@ -142,16 +136,12 @@ def with_remarks(text: str, change: Callable[[str, str], str]) -> str:
     new = {key: change(key, remark) for key, remark in old.items()}
     lines = []
     for raw, line in lines_of(text):
-        if (
-            line is None
-            or line.kind == "table"
-            or line.remark != old.get(line.key, "")
-            or new.get(line.key, "") == line.remark
-        ):
+        before, remark = ("", "") if line is None else (old.get(line.key, ""), new.get(line.key, ""))
+        if line is None or line.kind == "table" or line.remark != before or remark == before:
             lines.append(raw)
-            continue
-        body, remark = raw.rstrip("\r\n"), new[line.key]
-        lines.append(body[: line.end].rstrip() + (f"  # {remark}" if remark else "") + raw[len(body) :])
+        else:
+            body = raw.rstrip("\r\n")
+            lines.append(body[: line.end].rstrip() + (f"  # {remark}" if remark else "") + raw[len(body) :])
     return with_origin_table("".join(lines), new)
 
 

@@ -28,21 +28,12 @@ Origin = Literal["measured", "dump", "inherited", "assumed", "choice", "file", "
 """Of a value: measured on this machine; read from the control's dump; taken over from another machine; assumed; a
 choice, no property of a machine; stated in the file without a word of where it comes from; left out of the file."""
 
-DEFAULT = "default"
-"""The remark of a default that was written into a file."""
-
-ORIGIN = "origin"
-"""Name of the table, and of the key beside an inline value."""
-
+DEFAULT = "default"  # remark of a default that was written into a file
+ORIGIN = "origin"  # name of the table, and of the key beside an inline value
 ORIGIN_WORDS: dict[Origin, str] = {
-    "measured": "measured",
-    "dump": "parameters",
-    "inherited": "inherited",
-    "assumed": "assumed",
-    "choice": "choice",
-    "default": "default",
-    "file": "stated",
-}
+    "measured": "measured", "dump": "parameters", "inherited": "inherited", "assumed": "assumed", "choice": "choice",
+    "default": "default", "file": "stated",
+}  # fmt: skip
 ORIGIN_TEXT = rf"^({'|'.join(ORIGIN_WORDS.values())})($|: .|, .| \(.)"
 """Start of the text of an origin; a note may follow."""
 
@@ -69,8 +60,7 @@ def origin_of(remark: str) -> Origin:
 
 def inherited(name: str, remark: str) -> str:
     """The remark of a value that is taken over from another machine."""
-    origin = origin_of(remark)
-    if origin in ("assumed", "choice", "inherited", "default"):
+    if origin_of(remark) in ("assumed", "choice", "inherited", "default"):
         return remark
     return f"from {name}: {remark}" if remark else f"from {name}"
 
@@ -143,10 +133,8 @@ def lines_of(text: str) -> Iterator[tuple[str, KeyLine | None]]:
     texts = _lines_of_long_texts(text)
     for number, raw in enumerate(text.splitlines(keepends=True)):
         line = raw.rstrip("\r\n")
-        if number in texts:
-            yield raw, None
-        elif inside:
-            inside += open_brackets(line)
+        if number in texts or inside:
+            inside += 0 if number in texts else open_brackets(line)
             yield raw, None
         elif header := _HEADER.fullmatch(line):
             table = re.sub(r"\s*\.\s*", ".", header[2])
@@ -394,12 +382,9 @@ def values_of(
 def toml(value: object) -> str:
     """A value in TOML notation."""
     if isinstance(value, PerAxis):
-        if value.x == value.y == value.z:
-            return toml(value.x)
-        return toml(dict(value))
+        return toml(value.x if value.x == value.y == value.z else dict(value))
     if isinstance(value, InlineTable):
-        given = {name: getattr(value, name) for name in type(value).model_fields}
-        return toml({name: item for name, item in given.items() if item is not None})
+        return toml({name: item for name, item in value if item is not None})
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -61,16 +62,15 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
             problem = Problem(key, _short(value), "unknown key" + ("" if suggestion in listed else suggestion))
             if suggestion.startswith(_KNOWN):
                 listed.add(suggestion)
-        elif detail["type"] == "missing":
-            problem = Problem(key, "", limit + _unit_remark(model, location))
         elif detail["type"] == "value_error" and isinstance(value, dict):
             problem = Problem(key, "", limit)
         elif detail["type"] == "string_pattern_mismatch":
             field = field_of(model, location)
             problem = Problem(key, _short(value), f"malformed; {field.description if field else limit}")
         else:
-            problem = Problem(key, _short(value), limit + _unit_remark(model, location))
-        problem = Problem(problem.key, problem.value, problem.limit, line_of(problem.key, text))
+            shown = "" if detail["type"] == "missing" else _short(value)
+            problem = Problem(key, shown, limit + _unit_remark(model, location))
+        problem = replace(problem, line=line_of(problem.key, text))
         if problem not in problems:
             problems.append(problem)
     return (*problems, *further_problems(len(details)))
@@ -160,9 +160,7 @@ def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
         return ""
     name = str(location[-1])[:_LONGEST_NAME]
     close = difflib.get_close_matches(name, model.model_fields, n=1, cutoff=0.5)
-    if close:
-        return f"; did you mean {close[0]}?"
-    return f"{_KNOWN}{', '.join(model.model_fields)}"
+    return f"; did you mean {close[0]}?" if close else f"{_KNOWN}{', '.join(model.model_fields)}"
 
 
 @lru_cache(maxsize=1)  # every problem of a file asks

@@ -192,8 +192,7 @@ class _Choosing:
         return Candidate((), replay.time_s, self._share(replay, 0), self._share(replay, 1))
 
 
-Choices = Mapping[str, Sequence[object]]
-"""Values to choose from, by key of the machine file."""
+Choices = Mapping[str, Sequence[object]]  # values to choose from, by key of the machine file
 Ranks = tuple[int, ...]
 
 _FAMILIES = ("auto", "zv", "mzv", "zvd", "ei", "ei2")

@@ -168,15 +168,13 @@ class MachineStudy(Result):
     def next_step(self) -> str:
         """To measure what decides, or to convert."""
         if self.ok:
-            return (
-                f"convert {self.program} for {self.machine}: it stays within tolerance in spite of the uncertainties."
-            )
+            sure = "it stays within tolerance in spite of the uncertainties"
+            return f"convert {self.program} for {self.machine}: {sure}."
         if not self.parameter_sensitivity:
             return "see why samples were refused."
-        key = self.parameter_sensitivity[0].key
-        known = next(each.known for each in self.varied if each.key == key)
-        if known:
-            least = f"choose {key} where the share of the limit is least ({self.parameter_sensitivity[0].low_at})"
+        key, low_at = self.parameter_sensitivity[0].key, self.parameter_sensitivity[0].low_at
+        if next(each.known for each in self.varied if each.key == key):
+            least = f"choose {key} where the share of the limit is least ({low_at})"
             return f"{least}, or by shapegcode optimize with the same file."
         return f"measure {key} more closely, or let shapegcode optimize choose a more robust shaper."
 
@@ -192,24 +190,16 @@ class MachineStudy(Result):
         Raises:
             KeyError: it was not measured.
         """
-        for each in self.quantities:
-            if each.name == name:
-                return each
-        raise KeyError(name)
+        return {each.name: each for each in self.quantities}[name]
 
     def key_figures(self) -> tuple[Figure, ...]:
         """How likely, and the 95 % quantile of each measure beside the machine as it stands in its file."""
-        first = Figure("stay within tolerance", "%", None, self.within * 100, 1, None, "", "within", 100.0)
-        return (
-            first,
-            *(
-                Figure(
-                    f"{each.name}, 95 %", each.unit, each.nominal, each.p95, 2, self.limits_um.get(each.name),
-                    f"quantities.{rank}.nominal", f"quantities.{rank}.p95",
-                )
-                for rank, each in enumerate(self.quantities)
-            ),
-        )  # fmt: skip
+        figures = [Figure("stay within tolerance", "%", None, self.within * 100, 1, None, "", "within", 100.0)]
+        for rank, each in enumerate(self.quantities):
+            keys = f"quantities.{rank}.nominal", f"quantities.{rank}.p95"
+            limit = self.limits_um.get(each.name)
+            figures.append(Figure(f"{each.name}, 95 %", each.unit, each.nominal, each.p95, 2, limit, *keys))
+        return tuple(figures)
 
     def tables(self) -> list[Table]:
         """Quantiles, what decides, what was refused."""
@@ -282,15 +272,12 @@ class MachineStudy(Result):
             raise NotKeptError("the draws of a study are not in its JSON: run it again, or keep --csv")
         keys = {each.key for each in self.varied}
         units = {each.key: each.unit for each in self.varied} | {each.name: each.unit for each in self.quantities}
-        found = {
-            name: xr.DataArray(values, dims=["draw"], attrs={"units": units.get(name, "")})
-            for name, values in self.draws.items()
-        }
-        return xr.Dataset(
-            {name: array for name, array in found.items() if name not in keys},
-            coords={name: array for name, array in found.items() if name in keys} | {"draw": np.arange(1, self.n + 1)},
-            attrs=about,
-        )
+        measured: dict[str, Any] = {}
+        coordinates: dict[str, Any] = {"draw": np.arange(1, self.n + 1)}
+        for name, values in self.draws.items():
+            array = xr.DataArray(values, dims=["draw"], attrs={"units": units.get(name, "")})
+            (coordinates if name in keys else measured)[name] = array
+        return xr.Dataset(measured, coords=coordinates, attrs=about)
 
     def csv_lines(self) -> Iterator[str]:
         """One line for each draw.
@@ -383,8 +370,8 @@ class Optimum(Result):
         if self.best is None or self.best.time_s is None:
             asked = f"{self.probability * 100:g} % of the machines"
             return f"none of {len(self.candidates)} choices stays within tolerance on {asked}"
-        was = self.as_it_is
-        before = "" if was is None or was.time_s is None else f" (as the file has it {was.time_s:.3f} s)"
+        was_s = None if self.as_it_is is None else self.as_it_is.time_s
+        before = "" if was_s is None else f" (as the file has it {was_s:.3f} s)"
         checked = self.best.checked or 0.0
         return (
             f"{self.best.words}: {self.best.time_s:.3f} s{before}, within tolerance on {checked * 100:.1f} % of the "
@@ -397,9 +384,8 @@ class Optimum(Result):
         if self.best is None:
             return "measure what decides (shapegcode study), widen the tolerance, or ask for less."
         words = [word for each in self.best.values for word in ("--set", f"{each.key}={each.value}")]
-        return (
-            f"shapegcode convert {shlex.quote(self.program)} -m {self.machine_words} {shlex.join(words)} -o shaped.nc"
-        )
+        program = shlex.quote(self.program)
+        return f"shapegcode convert {program} -m {self.machine_words} {shlex.join(words)} -o shaped.nc"
 
     def key_figures(self) -> tuple[Figure, ...]:
         """Time and probability of the best one."""

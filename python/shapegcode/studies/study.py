@@ -303,10 +303,8 @@ def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple
     numbers = np.asarray(column, dtype=float)
     order = np.argsort(numbers, kind="stable")
     count = max(1, min(_BINS, len(order) // _MIN_IN_BIN))
-    return tuple(
-        _bin(float(np.median(numbers[part])), f"{np.median(numbers[part]):.4g}", values[part])
-        for part in np.array_split(order, count)
-    )
+    parts = ((float(np.median(numbers[part])), part) for part in np.array_split(order, count))
+    return tuple(_bin(middle, f"{middle:.4g}", values[part]) for middle, part in parts)
 
 
 def _bin(at: float, name: str, values: FloatArray) -> BinQuantiles:
@@ -336,7 +334,5 @@ def _indices(varied: Sequence[Varied], shares: FloatArray, seed: int) -> dict[st
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = sobol.analyze(index_problem(varied), shares, calc_second_order=False, seed=seed)
-    return {
-        each.key: tuple(float(found[name][rank]) for name in ("S1", "ST", "S1_conf", "ST_conf"))
-        for rank, each in enumerate(varied)
-    }
+    rows = zip(*(map(float, found[name]) for name in ("S1", "ST", "S1_conf", "ST_conf")), strict=True)
+    return {each.key: row for each, row in zip(varied, rows, strict=True)}

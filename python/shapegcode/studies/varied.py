@@ -83,9 +83,8 @@ def normal(
     """
     mean = _number("mean", mean)
     spread = _spread(sd, percent, abs(mean))
-    return Distribution(
-        f"normal, {mean:g} ± {spread:g}", lambda shares: mean + spread * _normal_quantile(shares), known
-    )
+    words = f"normal, {mean:g} ± {spread:g}"
+    return Distribution(words, lambda shares: mean + spread * _normal_quantile(shares), known)
 
 
 def lognormal(median: float, percent: float, *, known: bool | None = None) -> Distribution:
@@ -106,11 +105,8 @@ def lognormal(median: float, percent: float, *, known: bool | None = None) -> Di
     if _number("median", median) <= 0.0:
         raise ArgumentError(f"lognormal: median = {median:g}: must be > 0")
     log_sd = math.log1p(_spread(None, percent, 100.0) / 100.0)
-    return Distribution(
-        f"lognormal, {median:g} × or ÷ {math.exp(log_sd):.4g}",
-        lambda shares: median * np.exp(log_sd * _normal_quantile(shares)),
-        known,
-    )
+    words = f"lognormal, {median:g} × or ÷ {math.exp(log_sd):.4g}"
+    return Distribution(words, lambda shares: median * np.exp(log_sd * _normal_quantile(shares)), known)
 
 
 def uniform(low: float, high: float, *, known: bool | None = None) -> Distribution:
@@ -171,8 +167,7 @@ def _spread(sd: float | None, percent: float | None, whole: float) -> float:
     return _number(name, given) * (1.0 if percent is None else whole / 100.0)
 
 
-Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]
-"""What each key is sampled from."""
+Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]  # what each key is sampled from
 
 # A machine may differ from its file in these, and they are read when blocks are simulated.
 _SIMULATED = re.compile(

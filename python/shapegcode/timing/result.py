@@ -85,14 +85,9 @@ class BlockTime:
 
 
 LABELS = {
-    "cutting_s": "cutting",
-    "rapid_s": "rapid",
-    "in_position_s": "in-position",
-    "dwell_s": "dwell",
-    "acceleration_s": "lost to acceleration",
-    "tool_change_s": "tool change",
-    "function_s": "M functions",
-}
+    "cutting_s": "cutting", "rapid_s": "rapid", "in_position_s": "in-position", "dwell_s": "dwell",
+    "acceleration_s": "lost to acceleration", "tool_change_s": "tool change", "function_s": "M functions",
+}  # fmt: skip
 """Name of each part in tables and pictures."""
 
 _SLOWEST = 5
@@ -236,12 +231,8 @@ class CycleTime(TimeParts, Result):
 
     def key_figures(self) -> tuple[Figure, ...]:
         """The whole, and its parts that take time."""
-        parts = [
-            Figure(LABELS[part], "s", None, getattr(self, part), 2, key_after=part)
-            for part in PARTS
-            if getattr(self, part) > 0.0
-        ]
-        return (Figure("cycle time", "s", None, self.cycle_time_s, 2, key_after="cycle_time_s"), *parts)
+        shown = {"cycle_time_s": "cycle time"} | {part: LABELS[part] for part in PARTS if getattr(self, part) > 0.0}
+        return tuple(Figure(name, "s", None, getattr(self, key), 2, key_after=key) for key, name in shown.items())
 
     def tables(self) -> list[Table]:
         """Parts; tools; the slowest regions and blocks."""

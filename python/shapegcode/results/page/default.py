@@ -153,14 +153,10 @@ def raw_page(report: Mapping[str, Any], why: str) -> model.Page:
 
 def _json(report: Mapping[str, Any]) -> model.Section:
     """The JSON itself, if no page can be made of it."""
-    rows = [(key, _short(value)) for key, value in report.items()]
+    texts = {key: json.dumps(value, ensure_ascii=False) for key, value in report.items()}
+    rows = [(key, text if len(text) <= _SHORT_TEXT else f"{text[: _SHORT_TEXT - 1]}…") for key, text in texts.items()]
     columns = (Column("key", value=lambda row: row[0], left=True), Column("value", value=lambda row: row[1], text=True))
     return model.Section("json", "The JSON", (Table("", columns, rows),), how="Key by key; long values are cut.")
-
-
-def _short(value: object) -> str:
-    text = json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= _SHORT_TEXT else text[: _SHORT_TEXT - 1] + "…"
 
 
 def short_html(result: Outcome) -> str:

@@ -30,12 +30,16 @@ STYLES = ("page.css", "scene.css", "print.css")
 """Files of `shapegcode/data/page`, in the order in which they are put together."""
 
 
+_IDS = ("top", "theme", "print", "save-json", "result", "scene-head", "scene-data", "plotly-data")
+
+
 def to_html(page: Page, script: Script = "inline") -> str:
     """The file of a page."""
     if script not in ("inline", "beside"):
         raise ArgumentError(f'script must be "inline" or "beside", not {script!r}')
     own = _assets(SCRIPTS)
-    if taken := {section.key for section in page.sections} & _own_ids():
+    taken = {section.key for section in page.sections} & {*_IDS, *re.findall(r'\bid="([^"]+)"', _asset("scene.html"))}
+    if taken:
         raise ValueError(f"{', '.join(sorted(taken))}: a section cannot have the key of a part of the page")
     before, after = page.sections[: page.before_scene], page.sections[page.before_scene :]
     parts = [section_of(section) for section in before]
@@ -59,9 +63,8 @@ def to_html(page: Page, script: Script = "inline") -> str:
         f"default-src 'none'; script-src {' '.join(allowed)}; style-src 'unsafe-inline'; img-src data: blob:; "
         "base-uri 'none'; form-action 'none'"
     )
-    named = [(section.key, section.title) for section in before]
-    named += [("scene", "Motion")] if page.scene is not None else []
-    named += [(section.key, section.title) for section in after]
+    motion = [("scene", "Motion")] if page.scene is not None else []
+    named = [*((each.key, each.title) for each in before), *motion, *((each.key, each.title) for each in after)]
     links = "".join(f'<li><a href="#{escape(key)}">{escape(title)}</a></li>' for key, title in named)
     return Template(_asset("page.html")).substitute(
         policy=policy, version=this_version(), title=escape(page.title), styles=_assets(STYLES), start=start,
@@ -71,11 +74,9 @@ def to_html(page: Page, script: Script = "inline") -> str:
 
 
 def _problems(page: Page) -> str:
-    if not page.problems:
-        return ""
     rows = "".join(f"<li>{prose(problem)}</li>" for problem in page.problems)
     title = "<h2>Caution: about this page itself</h2>"
-    return f'<div class="warning problems" role="alert">{title}<ul>{rows}</ul></div>'
+    return f'<div class="warning problems" role="alert">{title}<ul>{rows}</ul></div>' if rows else ""
 
 
 def save(page: Page, path: str | Path, script: Script = "inline") -> list[str]:
@@ -124,12 +125,6 @@ def _asset(name: str) -> str:
 @cache
 def _assets(names: tuple[str, ...]) -> str:
     return "\n".join(map(_asset, names))
-
-
-@cache
-def _own_ids() -> set[str]:
-    own = {"top", "theme", "print", "save-json", "result", "scene-head", "scene-data", "plotly-data"}
-    return own | set(re.findall(r'\bid="([^"]+)"', _asset("scene.html")))
 
 
 def _hash(script: str) -> str:

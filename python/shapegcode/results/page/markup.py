@@ -115,12 +115,12 @@ def _heat_map(heat: model.HeatMap) -> str:
     columns = ["", *heat.columns, *([""] if has_remarks else [])]
     head = "".join(f'<th scope="col">{escape(name)}</th>' if name else "<td></td>" for name in columns)
     rows = "\n".join(_heat_row(row, heat, has_remarks) for row in heat.rows)
-    caption = f'<p class="caption">{prose(heat.caption)}</p>' if heat.caption else ""
-    return (
-        _scrolled(f'<table class="heat"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>')
-        + _LEGEND
-        + caption
-    )
+    table = f'<table class="heat"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
+    return _scrolled(table) + _LEGEND + _caption(heat.caption)
+
+
+def _caption(text: str) -> str:
+    return f'<p class="caption">{prose(text)}</p>' if text else ""
 
 
 def _heat_row(row: model.HeatRow, heat: model.HeatMap, has_remarks: bool) -> str:
@@ -142,20 +142,16 @@ def _heat_row(row: model.HeatRow, heat: model.HeatMap, has_remarks: bool) -> str
 def _heat(share: float | None) -> tuple[str, str]:
     if share is None:
         return "heat-none", ""
-    title = f' title="{share * 100.0:.0f} % of the limit"'
-    if share > 1.0:
-        return "heat-over", title
-    return f"heat-{min(int(max(share, 0.0) * _STEPS), _STEPS - 1)}", title
+    step = "over" if share > 1.0 else min(int(max(share, 0.0) * _STEPS), _STEPS - 1)
+    return f"heat-{step}", f' title="{share * 100.0:.0f} % of the limit"'
 
 
-_LEGEND = (
-    '<p class="legend">Share of the limit: '
-    + " ".join(
-        f'<span class="swatch heat-{step}">{step * 100 // _STEPS}–{(step + 1) * 100 // _STEPS} %</span>'
-        for step in range(_STEPS)
-    )
-    + ' <span class="swatch heat-over"><span class="mark">▲</span>over</span></p>'
+_SWATCHES = (
+    f'<span class="swatch heat-{step}">{step * 100 // _STEPS}–{(step + 1) * 100 // _STEPS} %</span> '
+    for step in range(_STEPS)
 )
+_OVER = '<span class="swatch heat-over"><span class="mark">▲</span>over</span>'
+_LEGEND = f'<p class="legend">Share of the limit: {"".join(_SWATCHES)}{_OVER}</p>'
 
 
 def _bars(bars: model.Bars) -> str:
@@ -176,11 +172,11 @@ def _bars(bars: model.Bars) -> str:
 
 
 def _notes(notes: model.Notes) -> str:
-    rows = "".join(
-        f"<div{' class=strong' if topic in notes.strong else ''}><dt>{escape(topic)}</dt><dd>{prose(text)}</dd></div>"
-        for topic, text in notes.rows
-    )
-    return f'<dl class="notes">{rows}</dl>'
+    rows = []
+    for topic, text in notes.rows:
+        kind = " class=strong" if topic in notes.strong else ""
+        rows.append(f"<div{kind}><dt>{escape(topic)}</dt><dd>{prose(text)}</dd></div>")
+    return f'<dl class="notes">{"".join(rows)}</dl>'
 
 
 def _command(text: str) -> str:
@@ -212,8 +208,8 @@ def _table(table: Table) -> str:
         )
         lines.append(f'<tr class="{" ".join(marks)}">{body}</tr>' if marks else f"<tr>{body}</tr>")
     title = f"<caption>{escape(table.title)}</caption>" if table.title else ""
-    caption = f'<p class="caption">{prose(table.caption)}</p>' if table.caption else ""
-    return _scrolled(f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>") + caption
+    whole = f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+    return _scrolled(whole) + _caption(table.caption)
 
 
 def _linked(text: str, column: Column, row: object) -> str:

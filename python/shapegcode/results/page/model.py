@@ -15,8 +15,7 @@ from shapegcode.results.table import Table
 if TYPE_CHECKING:
     from shapegcode.results.page.scene import Scene
 
-Script = Literal["inline", "beside"]
-"""Where the script of a page is: in its file, or in one beside it."""
+Script = Literal["inline", "beside"]  # where the script of a page is: in its file, or in one beside it
 
 Light = Literal["green", "calm", "amber", "red"]
 """Run it; leave it as it is, there is nothing to do; do something first; do not run it."""

@@ -129,11 +129,10 @@ def packed(scene: Scene) -> tuple[dict[str, Any], str]:
         entry = {"key": variant.key, "label": variant.label, "file": variant.file, "samples": variant.samples}
         entry["cuts"] = variant.cut_lines
         variants.append(entry | {"columns": columns, "text": add(text, count=len(text))})
-    spectra = [
-        {"axis": one.axis, "variant": one.variant}
-        | {"frequency_hz": ranks(one.frequency_hz), "amplitude": ranks(one.amplitude)}
-        for one in scene.spectra
-    ]
+    spectra = []
+    for one in scene.spectra:
+        columns = {"frequency_hz": ranks(one.frequency_hz), "amplitude": ranks(one.amplitude)}
+        spectra.append({"axis": one.axis, "variant": one.variant} | columns)
     shown = {name for variant in scene.variants for name in variant.channels}
     head = {
         "format": 1,
@@ -190,14 +189,9 @@ class Thinner:
         self.samples = 0
 
     def add(
-        self,
-        sample: IntArray,
-        labels: IntArray,
-        command_mm: FloatArray,
-        deviation_um: FloatArray,
-        curves: Mapping[str, FloatArray],
-        starts: npt.NDArray[np.intp],
-    ) -> None:
+        self, sample: IntArray, labels: IntArray, command_mm: FloatArray, deviation_um: FloatArray,
+        curves: Mapping[str, FloatArray], starts: npt.NDArray[np.intp],
+    ) -> None:  # fmt: skip
         """Further samples."""
         self._names = list(curves)
         values = np.column_stack([command_mm, deviation_um, *curves.values()])
@@ -217,27 +211,19 @@ class Thinner:
             self._path_spent += _path_factor(factor)
 
     def _tolerances(self, factor: float) -> FloatArray:
-        assert self._low is not None
-        assert self._high is not None
-        path = np.full(3, self._scales["path"])
+        assert self._low is not None and self._high is not None
+        # The path is drawn large: it gives way only where its points alone are too many.
+        path = np.full(3, self._scales["path"] * _path_factor(factor))
         span = np.maximum(self._high - self._low, 1e-12)
         floors = np.array([self._scales.get(name, 0.0) for name in self._names])
         curves = np.maximum(span[6:], floors) * _HALF_PIXEL / PIXELS_HIGH
         # The three components of the deviation together are as fine as its magnitude.
         deviation = np.full(3, max(float(span[3:6].max()), self._scales["deviation"])) * _HALF_PIXEL / PIXELS_HIGH
-        # The path is drawn large: it gives way only where its points alone are too many.
-        path *= _path_factor(factor)
         tolerances: FloatArray = np.concatenate([path, deviation * factor, curves * factor])
         return tolerances
 
     def _chosen(
-        self,
-        sample: IntArray,
-        values: FloatArray,
-        started: npt.NDArray[np.bool_],
-        factor: float,
-        *,
-        starts: bool = True,
+        self, sample: IntArray, values: FloatArray, started: BoolArray, factor: float, *, starts: bool = True
     ) -> npt.NDArray[np.intp]:
         rows = _core.thin_curves(sample.astype(np.float64), np.asfortranarray(values), self._tolerances(factor))
         keep = np.zeros(len(sample), dtype=bool)
@@ -310,8 +296,5 @@ class AccelerationSpectrum:
         wanted = (frequency > 0.0) & (frequency <= most_hz)
         scale = 2.0 * self._period_s / float((self._window**2).sum()) / max(self._windows, 1)
         density: FloatArray = np.sqrt(self._power * scale)
-        return [
-            SceneSpectrum("xyz"[axis], variant, frequency[wanted], density[wanted, axis])
-            for axis in range(3)
-            if density[:, axis].max() > _STILL
-        ]
+        moving = np.flatnonzero(density.max(axis=0) > _STILL)
+        return [SceneSpectrum("xyz"[axis], variant, frequency[wanted], density[wanted, axis]) for axis in moving]

@@ -117,7 +117,7 @@ def calibrate_cycle_time(
     if not fitted:
         raise ArgumentError(f'{file.path}: no run has use = "fit": there is nothing to calibrate with')
     folds = _folds(fitted)
-    meter = _Meter(on_progress, len(tried) * (1 + (len(folds) if len(folds) > 1 else 0)))
+    meter = _Meter(on_progress, len(tried) * (1 + len(folds)))
     fits, scores = _tried(tried, fitted, folds, machine, rate, meter)
     order = [score.cross_validated_s if score.cross_validated_s is not None else score.fitted_s for score in scores]
     best = 0
@@ -125,17 +125,14 @@ def calibrate_cycle_time(
         best = index if error < _BETTER * order[best] else best
     motion = fits[best]
     learned = _Calibration.of(fitted, motion, machine)
-    weighted = zip(fits, open_times.kind_weights(order, best), strict=True)
-    rivals = [
-        (_Calibration.of(fitted, fit, machine), weight)
-        for fit, weight in weighted
-        if fit is not motion and weight >= open_times.MIN_WEIGHT
-    ]
-    others = _left_out(fitted, folds, motion, machine, rate) if len(folds) > 1 else {}
+    rivals = []
+    for fit, weight in zip(fits, open_times.kind_weights(order, best), strict=True):
+        if fit is not motion and weight >= open_times.MIN_WEIGHT:
+            rivals.append((_Calibration.of(fitted, fit, machine), weight))
+    others = _left_out(fitted, folds, motion, machine, rate)
     rows = [_row(run, learned, others.get(id(run))) for run in observed]
-    with_it, remarks, numbers, undetermined = learned_machine(
-        learned, fitted, rivals, _scatters(rows, observed, learned)
-    )
+    scatters = _scatters(rows, observed, learned)
+    with_it, remarks, numbers, undetermined = learned_machine(learned, fitted, rivals, scatters)
     rows = [_with_interval(row, run, with_it) for row, run in zip(rows, observed, strict=True)]
     return CycleTimeCalibration(
         machine=machine.name,
@@ -188,16 +185,17 @@ def _observed(file: RunsFile, machine: Machine) -> list[ObservedRun]:
 
 
 def _folds(runs: Sequence[ObservedRun]) -> list[list[ObservedRun]]:
-    """Runs that are left out together: those of a program; with one program, which shows less, every other run."""
+    """Runs that are left out together: those of a program; with one program, which shows less, every other run.
+
+    None where there is but one such group.
+    """
     by_program: dict[int, list[ObservedRun]] = defaultdict(list)
     for run in runs:
         by_program[id(run.timed)].append(run)
     groups = list(by_program.values()) if len(by_program) > 1 else [[run] for run in runs]
     count = min(_MAX_FOLDS if len(by_program) > 1 else 2, len(groups))
-    folds: list[list[ObservedRun]] = [[] for _ in range(count)]
-    for index, group in enumerate(groups):
-        folds[index % len(folds)] += group
-    return folds
+    folds = [[run for group in groups[rank::count] for run in group] for rank in range(count)]
+    return folds if count > 1 else []
 
 
 def _tried(
@@ -214,7 +212,7 @@ def _tried(
         fit = fit_motion(runs, family, machine, rate, on_step=meter.step)
         meter.next()
         left_out = []
-        for fold in folds if len(folds) > 1 else ():
+        for fold in folds:
             rest = [run for run in runs if run not in fold]
             part = fit_motion(rest, family, machine, rate, on_step=meter.step, thorough=False)
             left_out.append(misfit(sections_of(fold), part.model(machine)))
@@ -522,9 +520,8 @@ def _had(machine: Machine, key: str) -> float | None:
     target: object = machine
     for name in key.split("."):
         target = getattr(target, name, None)
-    if isinstance(target, int | float):
-        return float(target)
-    return float(target.x) if target is not None and hasattr(target, "x") else None
+    target = getattr(target, "x", target)
+    return float(target) if isinstance(target, int | float) else None
 
 
 def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dict[str, object]:

@@ -194,9 +194,8 @@ class CycleTimeCalibration(Result):
         head = f"{self.machine}: {learned} parameters calibrated with {sum(run.use == 'fit' for run in self.runs)} runs"
         if largest is None:
             return f"{head}; no log has a complete run to check them"
-        kind = (
-            "left out" if any(run.cross_validated_s is not None or run.use == "test" for run in self.runs) else "fitted"
-        )
+        left_out = any(run.cross_validated_s is not None or run.use == "test" for run in self.runs)
+        kind = "left out" if left_out else "fitted"
         within = "within" if self.ok else "NOT within"
         return f"{head}; runs {kind} are {within} {TOLERANCE_PERCENT:g} % (at most {largest:.1f} %)"
 
@@ -237,10 +236,6 @@ class CycleTimeCalibration(Result):
         ]
 
 
-def _interval(number: CalibratedParameter) -> str:
-    return f"{number.low:.4g} ... {number.high:.4g}" if number.is_determined else "not determined"
-
-
 _RUNS = (
     Column("run", value="name", text=True),
     Column("use", value="use", left=True),
@@ -267,7 +262,10 @@ _FAMILIES = (
 _NUMBERS = (
     Column("number", value="meaning", text=True),
     Column("value", value=lambda number: f"{number.value:.4g} {number.unit}"),
-    Column("95 % interval", value=_interval),
+    Column(
+        "95 % interval",
+        value=lambda row: f"{row.low:.4g} ... {row.high:.4g}" if row.is_determined else "not determined",
+    ),
     Column("file had", value=lambda number: None if number.previous_value is None else f"{number.previous_value:.4g}"),
     Column("key", value="key", text=True),
 )

@@ -10,6 +10,7 @@ from __future__ import annotations
 import glob
 import re
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -140,15 +141,13 @@ class _RunsRow(TomlTable):
             raise ValueError("one of log and logs must be given")
         if self.log is not None and self.logs is not None:
             raise KeyProblem("logs", self.logs, "only one of log and logs must be given")
-        try:
-            if self.feed_unit is not None:
-                stated_feed_unit(self.feed_unit)
-        except RecordError as error:
-            raise KeyProblem("feed_unit", self.feed_unit, str(error).partition(": ")[2]) from error
-        try:
-            ItemTable(self.items)
-        except RecordError as error:
-            raise KeyProblem("items", self.items, str(error).partition(": ")[2]) from error
+        for name, read in (("feed_unit", stated_feed_unit), ("items", ItemTable)):
+            value = getattr(self, name)
+            try:
+                if value is not None:
+                    read(value)
+            except RecordError as error:
+                raise KeyProblem(name, value, str(error).partition(": ")[2]) from error
         return self
 
 
@@ -197,21 +196,14 @@ class _Found:
         program = self._folder / row.program
         if row.leave_out is None and not program.is_file():
             self._problem(f"{where}.program", row.program, "no such file")
-        key = "log" if row.logs is None else "logs"
-        logs = tuple(
-            log
-            for pattern in row.logs or [row.log or ""]
-            for log in self._logs(f"{where}.{key}", pattern, number, program, row.leave_out is None)
-        )
+        key, used = "log" if row.logs is None else "logs", row.leave_out is None
+        logs = [self._logs(f"{where}.{key}", each, number, program, used) for each in row.logs or [row.log or ""]]
         same = ("use", "format", "override_percent", "rapid_override_percent", "leave_out", "logged_as")
         return RunEntry(
-            program,
-            logs,
+            program, tuple(chain.from_iterable(logs)), items=tuple((row.items or {}).items()),
             feed_unit=None if row.feed_unit is None else stated_feed_unit(row.feed_unit),
-            items=tuple((row.items or {}).items()),
-            line=line_of(where, self._text),
-            **{name: getattr(row, name) for name in same},
-        )
+            line=line_of(where, self._text), **{name: getattr(row, name) for name in same},
+        )  # fmt: skip
 
     def shared(self, entry: RunEntry) -> tuple[Path, ...]:
         """The logs of an entry that others have too."""
