@@ -113,10 +113,14 @@ LINUXCNC_TESTS ?= -m 'not slow'
 test-linuxcnc: package dev
 	$(BIN)/python -m pytest tests/linuxcnc $(LINUXCNC_TESTS)
 
+# Of benchmarks only whether they call what there is: nobody runs all of them.
+BENCHMARK_CHECK := --follow-imports=silent --ignore-missing-imports --no-warn-unused-ignores \
+  $(addprefix --disable-error-code=,arg-type call-overload index misc no-any-return no-untyped-call)
 lint: test-packages dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --strict python/shapegcode
+	$(BIN)/mypy $(BENCHMARK_CHECK) tests/benchmarks
 	clang-format --dry-run -Werror $(CPP_FILES)
 	$(MAKE) tidy
 	@echo 'lint: nothing to complain about'

@@ -84,7 +84,8 @@ def guard_table() -> str:
             grid_long = widest(mode, on_grid.duration_s, BLOCK_S, mirrored=mirrored)
             rows.append([f"`{name}`, same band", *_figures(*periods(same_band)), _ms(grid_band), "any"])
             rows.append([f"`{name}`, as long", *_figures(*periods(as_long)), _ms(grid_long), "any"])
-        signed, grid = (shortest(*mode.band, period_s, negative=True) for period_s in (FINE_S, BLOCK_S))
+        low, high = mode.band
+        signed, grid = (shortest(low, high, period_s, negative=True) for period_s in (FINE_S, BLOCK_S))
         rows.append(
             [f"same band, taps < 0, Σ\\|a\\| ≤ {NEGATIVE_SUM:g}", *_figures(*periods(signed)), _ms(grid), "any"]
         )

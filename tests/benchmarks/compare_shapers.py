@@ -23,7 +23,7 @@ from table import markdown
 import shapegcode as sg
 from shapegcode import _core
 from shapegcode.cli.runner import progress
-from shapegcode.conversion import convert as converter
+from shapegcode.conversion import plan as converter
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping import design, machine_bands
 from shapegcode.shaping.grid import Grid, choose_grid, make_grid
@@ -292,7 +292,7 @@ def main() -> int:
     tight: dict[str, list[Outcome]] = {}
     steps = len(PROGRAMS) * (1 + 2 * len(WAYS))
     done = 0
-    with progress("comparing shapers") as bar:
+    with progress("comparing shapers", arguments) as bar:
 
         def advance() -> None:
             nonlocal done

@@ -71,7 +71,7 @@ def linear(repetitions: int) -> list[dict[str, Any]]:
     whole = [_filter_of(modes) for modes in _MODES]
     sections = [[_filter_of([mode]) for mode in modes] for modes in _MODES]
     systems = [_system_of(modes) for modes in _MODES]
-    plant = sg.LinearPlant(*_joint(systems), _PERIOD_S)
+    plant = sg.LinearPlant(*_joint(systems), _PERIOD_S)  # type: ignore[call-arg]
     few = rows // 10
     times = np.arange(few) * _PERIOD_S
 

@@ -51,7 +51,7 @@ def faster(path: _core.Path) -> _core.Path:
         else _core.Segment.arc(
             each.start_mm, each.end_mm, each.centre_mm, each.sweep_rad, each.feed_mm_per_s * FASTER, each.normal
         )
-        for each in path
+        for each in path  # type: ignore[attr-defined]
     ])  # fmt: skip
 
 

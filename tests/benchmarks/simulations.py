@@ -19,9 +19,9 @@ import workload
 import shapegcode as sg
 from shapegcode import _core, cli
 from shapegcode.conversion.write import RegionWriter
-from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.machine_model import BLOCK_ENDS, MachineModel
 from shapegcode.shaping.grid import choose_grid
-from shapegcode.verdict.cases import BLOCK_ENDS, Case, CaseSimulation
+from shapegcode.verdict.cases import Case, CaseSimulation
 
 _WITH, _WITHOUT = "with-override-contours", "without-override-contours"
 _TEN_LINES = b"%\nO1\nG21G17G90G94G40G49G80\nG0X0.Y0.Z0.\nG1X50.F3000\nY50.\nX20.\nY20.\nM30\n%\n"
@@ -88,7 +88,7 @@ def _override_rows(folder: Path, long_file: Path, repetitions: int) -> None:
         ("PARALLEL.NC, 10 um", _PARALLEL, {"tolerance.contour_um": 10}),
         (long_file.name, long_file, {}),
     ):
-        settings = [word for key, value in {**processes.ROOM, **values}.items() for word in ("--set", f"{key}={value}")]
+        settings = [word for key, value in values.items() for word in ("--set", f"{key}={value}")]
         ratios = []
         for _ in range(repetitions):
             without, now = (

@@ -78,7 +78,7 @@ def _converted_for_each(machine: sg.Machine, options: dict[str, object]) -> list
     begin = time.perf_counter()
     for draw in range(found.n):
         replay = Replay.of(program, machine)
-        replay.play(
+        replay.simulate(
             machine.with_values({each.key: float(found.draws[each.key][draw]) for each in found.varied}),
             (*DEFAULT_MEASURES, SHARE),
         )
