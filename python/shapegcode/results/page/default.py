@@ -67,7 +67,7 @@ def next_steps(result: Outcome, *further: model.NextStep) -> model.Section:
 
 def _is_typed(text: str) -> bool:
     """Whether all of it can be typed: behind the command stand options with their values, and files."""
-    program, _, *words = (*text.split(" "), "") if " " not in text else text.split(" ")
+    program, _, *words = text.split(" ") if " " in text else (text, "")
     is_typed = all(before.startswith("-") or _NO_WORD.search(word) for before, word in pairwise(("", *words)))
     return program == "shapegcode" and bool(words) and is_typed
 
