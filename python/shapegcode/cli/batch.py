@@ -11,15 +11,7 @@ from typing import TYPE_CHECKING
 
 from shapegcode.cli import ExitCode, parser_of, runner
 from shapegcode.cli.arguments import NEEDED, Interface, Row, count, ratio, seconds, size
-from shapegcode.cli.options import (
-    AMOUNT,
-    MACHINE_OR_NONE,
-    RESULT_OF_DRAWS,
-    cluster,
-    cluster_of,
-    load_machine,
-    plots,
-)
+from shapegcode.cli.options import AMOUNT, MACHINE_OR_NONE, RESULT_OF_DRAWS, cluster, cluster_of, load_machine, plots
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import write_lines
 

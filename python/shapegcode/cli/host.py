@@ -31,10 +31,8 @@ _LOADED = (
 )  # fmt: skip
 _OF_COMMAND = {
     "convert": ("shapegcode.conversion.convert", "shapegcode.shaping.registry", "shapegcode.model.signatures"),
-    "time": ("shapegcode.timing.cycle_time",),
-    "check": ("shapegcode.checking.check",),
-    "feed": ("shapegcode.feed.schedule",),
-    "measure": ("shapegcode.metrology.measure",),
+    "time": ("shapegcode.timing.cycle_time",), "check": ("shapegcode.checking.check",),
+    "feed": ("shapegcode.feed.schedule",), "measure": ("shapegcode.metrology.measure",),
     "simulate": ("shapegcode.simulation.simulate",),
 }  # fmt: skip
 """Modules that a run imports only when it needs them; loaded here, so that no run has to."""
@@ -72,20 +70,13 @@ def _run(job: Mapping[str, Any]) -> dict[str, Any] | None:
         os.close(ended)
         _be_the_command(job, parent)
     os.close(held)
-    limit = job["seconds"] or None
-    left = limit
-    out_of_time = False
-    while True:
-        ready, _, _ = select.select([ended, sys.stdin.fileno()], [], [], left)
-        if ended in ready:
-            break
-        if not ready or sys.stdin.fileno() in ready:
-            os.kill(pid, signal.SIGKILL)
-            out_of_time = not ready
-            if not out_of_time:
-                os.waitpid(pid, 0)
-                return None
-            left = None
+    left, out_of_time = job["seconds"] or None, False
+    while ended not in (ready := select.select([ended, sys.stdin.fileno()], [], [], left)[0]):
+        os.kill(pid, signal.SIGKILL)
+        if ready:  # the input has ended
+            os.waitpid(pid, 0)
+            return None
+        left, out_of_time = None, True
     os.close(ended)
     _, status, used = os.wait4(pid, 0)
     return {

@@ -10,19 +10,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode.cli import options, runner
-from shapegcode.cli.arguments import (
-    NEEDED,
-    Interface,
-    count,
-    frequency_band,
-    nonzero,
-    positive,
-    program_number,
-    ratio,
-    seconds,
-    start_time,
-)
+from shapegcode.cli import arguments, options, runner
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import write_text
 
@@ -37,13 +25,13 @@ _OF_FILES = (
     ("--time-unit", "UNIT", None, "s, ms or us"),
     ("--force-unit", "UNIT", None, "N, kN, kgf or lbf"),
     ("--response-unit", "UNIT", None, "for example m/s^2, g, mm/s or um"),
-    ("--sample-period", "TIME", {"dest": "period_s", "type": seconds}, "between samples, such as 0.1ms"),
+    ("--sample-period", "TIME", {"dest": "period_s", "type": arguments.seconds}, "between samples, such as 0.1ms"),
     ("--quantity", None, ("acceleration", "velocity", "displacement"), "what the sensor measured"),
-    ("--force-scale", "N", nonzero, "N for 1 in the file (integer WAV: full scale)"),
-    ("--response-scale", "X", nonzero, "m/s^2, m/s or m for 1 in the file (integer WAV: full scale)"),
+    ("--force-scale", "N", arguments.nonzero, "N for 1 in the file (integer WAV: full scale)"),
+    ("--response-scale", "X", arguments.nonzero, "m/s^2, m/s or m for 1 in the file (integer WAV: full scale)"),
     ("--force-sensitivity", "mV/N", None, "of the hammer, where the force is in volts: 2.25mV/N"),
     ("--response-sensitivity", "mV/g", None, "of the sensor, where the response is in volts: 100mV/g"),
-    ("--exponential-window", "TIME", {"dest": "exponential_window_s", "type": seconds},
+    ("--exponential-window", "TIME", {"dest": "exponential_window_s", "type": arguments.seconds},
      "time constant of an exponential window that the analyser applied to the response, such as 50ms"),
     ("--response-first", None, bool, "in a WAV file the response is the first channel, not the force"),
 )  # fmt: skip
@@ -118,7 +106,7 @@ def _decide(args: argparse.Namespace, machine: Machine, axis: str | None) -> Non
     require_decisions(found, args.keep_modes, args.rigid, args.update)
 
 
-IDENTIFY = Interface(
+IDENTIFY = arguments.Interface(
     "Finds vibration modes from impact tests or frequency responses (natural frequency, damping ratio; equivalent "
     "mass, damping and stiffness), from the decay after a rapid stop, or from a record made during a sweep "
     "(frequency and damping ratio), each with its 95 % interval. A mode that the data do not support is refused. "
@@ -137,16 +125,16 @@ IDENTIFY = Interface(
         *options.MODES,
         ("--tap-plan", None, bool, "say how to do the test (for the modes of -m MACHINE), nothing else"),
         *options.MACHINE_OR_NONE,
-        ("--modes", "N", count, "how many (default: chosen by evidence)"),
-        ("--max-modes --most-modes", "N", {"dest": "max_modes", "type": count},
+        ("--modes", "N", arguments.count, "how many (default: chosen by evidence)"),
+        ("--max-modes --most-modes", "N", {"dest": "max_modes", "type": arguments.count},
          "largest number of modes (default: 40 over frequency, 8 over time)"),
         ("--force", None, bool, "write modes with --update even if the answer is not to use them"),
-        ("--frequencies", "LOW:HIGH", frequency_band, "look for modes between these frequencies, Hz"),
+        ("--frequencies", "LOW:HIGH", arguments.frequency_band, "look for modes between these frequencies, Hz"),
         ("--decay --ignore-force", None, {"dest": "ignore_force", "action": "store_true"},
          "take it as a free decay: do not use the force, even if there is one"),
         ("--stops", None, bool,
          "the record is of an ordinary run: use every stop in it behind which the machine rests"),
-        ("--start", "TIME", start_time,
+        ("--start", "TIME", arguments.start_time,
          "where the decay begins in the file, for example 250ms (default: found by itself)"),
         *_OF_FILES,
         options.plots("write pictures (PNG and SVG) of records, fit and stabilisation into this folder"),
@@ -169,7 +157,7 @@ def _sweep(args: argparse.Namespace) -> int:
     return runner.finish(found, args, output=(args.output, text.encode("ascii")))
 
 
-SWEEP = Interface(
+SWEEP = arguments.Interface(
     "Writes a program that shakes one axis: moves back and forth whose frequency rises and falls, band by band, "
     "with pauses. Reports the band that the control can reach and the acceleration of each part, simulated from "
     "the written program. Any logger records accelerations while it runs; `identify --sweep` finds the "
@@ -177,16 +165,16 @@ SWEEP = Interface(
     (
         *options.MACHINE,
         ("--axis", None, ("x", "y", "z"), "that is shaken (default: %(default)s)", "x"),
-        ("--frequencies", "LOW:HIGH", frequency_band,
+        ("--frequencies", "LOW:HIGH", arguments.frequency_band,
          "of the moves back and forth, Hz (default: from 8 Hz up to what the control reaches, at most 200 Hz)"),
-        ("--travel", "MM", positive,
+        ("--travel", "MM", arguments.positive,
          "longest move, in the positive direction from the start point (default: 5)", 5.0),
-        ("--acceleration", "SHARE", ratio,
+        ("--acceleration", "SHARE", arguments.ratio,
          "amplitude, of the largest acceleration of the axis: a drive tolerates some 30%% for the whole sweep "
          "(default: 30%%)", 0.3),
-        ("--seconds", "S", positive, "approximate duration of all moves together (default: 60)", 60.0),
-        ("-o --output", "OUT.NC", None, "program", NEEDED),
-        ("--program", "O1234", program_number, "number of the program (default: O7201)", 7201),
+        ("--seconds", "S", arguments.positive, "approximate duration of all moves together (default: 60)", 60.0),
+        ("-o --output", "OUT.NC", None, "program", arguments.NEEDED),
+        ("--program", "O1234", arguments.program_number, "number of the program (default: O7201)", 7201),
         *options.RESULT,
     ),
     _sweep,

@@ -12,16 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli import command_in, parser_of, runner
 from shapegcode.cli.arguments import Interface, OldName, positive, ratio, seconds, share
-from shapegcode.cli.options import (
-    AMOUNT,
-    JSON,
-    MACHINE_OR_NONE,
-    RESULT,
-    SCRIPT,
-    load_machine,
-    plots,
-    refuse_same_file,
-)
+from shapegcode.cli.options import AMOUNT, JSON, MACHINE_OR_NONE, RESULT, SCRIPT, load_machine, plots, refuse_same_file
 from shapegcode.errors import ArgumentError
 
 if TYPE_CHECKING:

@@ -206,14 +206,8 @@ class Result(Outcome):
         """
         import xarray as xr
 
-        parts: dict[str, dict[str, np.ndarray[Any, Any]]] = {}
-        own = _arrays(self)
-        if own:
-            parts[type(self).__name__] = own
-        for field in _fields(self):
-            value = getattr(self, field.name)
-            if dataclasses.is_dataclass(value) and not isinstance(value, type) and (found := _arrays(value)):
-                parts[field.name] = found
+        holders = {type(self).__name__: self} | {field.name: getattr(self, field.name) for field in _fields(self)}
+        parts = {name: found for name, held in holders.items() if (found := _arrays(held))}
         name = _chosen(what, parts, "arrays")
         arrays = parts[name]
         # They share the dimension that is as long as the times or frequencies; one of length three is the axis.
@@ -221,10 +215,8 @@ class Result(Outcome):
         length = len(arrays[index]) if index is not None else -1
         variables = {}
         for key, array in arrays.items():
-            dimensions = [
-                (index or key) if size == length and rank == 0 else ("axis" if size == len(_AXES) else f"{key}_{rank}")
-                for rank, size in enumerate(array.shape)
-            ]
+            dimensions = ["axis" if size == len(_AXES) else f"{key}_{rank}" for rank, size in enumerate(array.shape)]
+            dimensions[0] = index or key if array.shape[0] == length else dimensions[0]
             variables[key] = xr.DataArray(array, dims=dimensions, attrs={"units": unit} if (unit := _unit(key)) else {})
         whole = xr.Dataset(variables, attrs={"of": name})
         return whole.assign_coords(axis=list(_AXES)) if "axis" in whole.dims else whole
@@ -237,7 +229,7 @@ class Result(Outcome):
 
 
 def _fields(value: object) -> Sequence[dataclasses.Field[Any]]:
-    return dataclasses.fields(value) if dataclasses.is_dataclass(value) else ()
+    return dataclasses.fields(value) if dataclasses.is_dataclass(value) and not isinstance(value, type) else ()
 
 
 def _is_list_of_rows(value: object) -> bool:
@@ -263,8 +255,5 @@ def _chosen(what: str, there: Mapping[str, object], kind: str) -> str:
 
 def _unit(name: str) -> str:
     """Of a plain number, as its name ends; of a nested one by the name that says it."""
-    for part in reversed(name.split(".")):
-        for ending, unit in _UNITS.items():
-            if part.endswith(ending):
-                return unit
-    return ""
+    parts = reversed(name.split("."))
+    return next((unit for part in parts for ending, unit in _UNITS.items() if part.endswith(ending)), "")

@@ -58,12 +58,12 @@ def written_reports(path: str | Path) -> list[dict[str, Any]]:
         why = f"the file ends in the middle ({len(error.doc)} characters): it was cut off" if cut else error.msg
         raise ArgumentError(f"{path}: line {error.lineno}, column {error.colno}: {why}") from None
     found = found if isinstance(found, list) else [found]
+    if not found:
+        raise ArgumentError(f"{path}: an empty list: there is no result in it")
     for rank, each in enumerate(found, 1):
         if not isinstance(each, dict):
             where = f"entry {rank} of the list" if len(found) > 1 else "the file"
             raise ArgumentError(f"{path}: {where} is no object: this is not what --json writes")
-    if not found:
-        raise ArgumentError(f"{path}: an empty list: there is no result in it")
     return found
 
 

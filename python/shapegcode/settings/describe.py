@@ -50,8 +50,6 @@ def write_toml(machine: TomlTable, remarks: Mapping[str, str], *, short: bool = 
 
 
 class _TomlWriter:
-    """Writes a machine as commented TOML."""
-
     def __init__(self, remarks: dict[str, str], short: bool) -> None:
         self.remarks = remarks  # that are not yet written
         self.written: dict[str, str] = {}
@@ -66,7 +64,6 @@ class _TomlWriter:
         self.lines.append(f"{line}  # {remark}" if remark else line)
 
     def comment(self, text: str) -> None:
-        """Words on lines of their own."""
         self.lines += textwrap.wrap(
             text, _LINE_WIDTH, initial_indent="# ", subsequent_indent="# ", break_long_words=False,
             break_on_hyphens=False,

@@ -128,8 +128,6 @@ def _check_values(machine: Machine, choices: Choices) -> None:
 
 
 class _Choosing:
-    """A running search."""
-
     def __init__(
         self, program: Program | str, machine: Machine, choices: Choices,
         rows: Sequence[tuple[Mapping[str, object], ...]], probability: float, shape_all: bool,
@@ -141,7 +139,6 @@ class _Choosing:
         self.candidates: dict[Ranks, Candidate] = {}
 
     def converted(self, ranks: Ranks) -> Candidate:
-        """A candidate with its time."""
         if ranks not in self.candidates:
             values = {key: listed[rank] for (key, listed), rank in zip(self._choices.items(), ranks, strict=True)}
             chosen = tuple(ChosenValue(key, toml(value)) for key, value in values.items())
@@ -184,7 +181,6 @@ class _Choosing:
         return next((each for each in candidates if (each.checked or 0.0) >= self._probability), None)
 
     def as_it_is(self) -> Candidate | None:
-        """The machine file without a choice."""
         try:
             replay = Replay.of(self._program, self._machine, shape_all=self._shape_all)
         except (ArgumentError, DesignError):

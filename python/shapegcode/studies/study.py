@@ -140,8 +140,6 @@ class _Text:
 
 
 class _StudyRun:
-    """A running study."""
-
     def __init__(
         self, program: Program | str, machine: Machine, varied: Sequence[Varied], columns: Columns,
         wanted: tuple[str, ...], pool: Executor | None, shape_all: bool, on_progress: Progress,
@@ -153,7 +151,6 @@ class _StudyRun:
         self.nominal: dict[str, float] = {}
 
     def simulate(self) -> list[_Text]:
-        """Convert each program and simulate its samples."""
         groups: dict[str, list[int]] = {}
         rows = [self._row(index, known=True) for index in range(self.count)]
         for index, row in enumerate(rows):

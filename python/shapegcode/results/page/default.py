@@ -6,7 +6,9 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from html import escape
+from importlib import resources
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,7 @@ _NO_WORD = re.compile(r"^-|[A-Z0-9./=]")
 _UNFOLDED_ROWS = 24
 _SHORT_ROWS = 12
 _SHORT_TEXT = 120
+_UNKNOWN = "Labels and units are at the axes."
 _PRINTED_PICTURES = 2  # so that the page stays within four sheets
 
 
@@ -64,7 +67,7 @@ def next_steps(result: Outcome, *further: model.NextStep) -> model.Section:
 
 def _is_typed(text: str) -> bool:
     """Whether all of it can be typed: behind the command stand options with their values, and files."""
-    program, _, *words = (*text.split(" "), "") if " " not in text else text.split(" ")
+    program, _, *words = text.split(" ") if " " in text else (text, "")
     is_typed = all(before.startswith("-") or _NO_WORD.search(word) for before, word in pairwise(("", *words)))
     return program == "shapegcode" and bool(words) and is_typed
 
@@ -80,9 +83,17 @@ def _tables(tables: Sequence[Table]) -> Iterator[model.Section]:
         yield model.Section(key, title[:1].upper() + title[1:], (table,), printed=False, folded=True)
 
 
+@cache
+def _captions() -> dict[str, str]:
+    """How to read each picture, by the names that `plots()` has."""
+    text = (resources.files("shapegcode") / "data" / "page" / "captions.txt").read_text(encoding="utf-8")
+    return dict(line.split(": ", 1) for line in text.splitlines())
+
+
 def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[model.Section]:
     """The pictures, each with a line that says how to read it."""
-    pictures = [model.Picture(name, plot, HOW.get(name, UNKNOWN)) for name, plot in result.plots().items()]
+    how = _captions()
+    pictures = [model.Picture(name, plot, how.get(name, _UNKNOWN)) for name, plot in result.plots().items()]
     chosen = [each for each in pictures if each.name in printed] or pictures[:_PRINTED_PICTURES]
     if chosen:
         yield model.Section("pictures", "Pictures", tuple(chosen))
@@ -173,42 +184,3 @@ def short_html(result: Outcome) -> str:
         more = f"<p>and {len(rows) - _SHORT_ROWS} more rows</p>" if len(rows) > _SHORT_ROWS else ""
         parts.append(f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}")
     return "".join([*parts, f"<p>next: {escape(result.next_step)}</p>"])
-
-
-UNKNOWN = "Labels and units are at the axes."
-
-HOW: Mapping[str, str] = {
-    "path": "The programmed path beside the table's, magnified as the title says: a gap is an error.",
-    "feed": "Speed along the path over time: a dip is a corner or a short block, and costs time.",
-    "vibration": "Response of the machine table minus command over time: what oscillates after the stop is the "
-    "residual vibration.",
-    "tolerance": "Each point is the program at a contour tolerance: left of the knee each micrometre is dear.",
-    "motion": "The whole program in time; each band spans the minimum and the maximum of a section.",
-    "time": "Each bar is a tool or a region; its colours are where its time goes.",
-    "measure-part": "Where on the part each program leaves the contour: further from its line is worse.",
-    "measure-walls": "Each wall as a probe would see it, one line for each program; zero is the drawing.",
-    "feed-along-path": "Feed and force along the path: where the force reaches its limit, the feed is reduced.",
-    "feed-path": "The tool path from above, coloured by force: bright is where the cutter works hardest.",
-    "feed-surface": "What bending of the tool leaves on the wall: blue too little cut, red too much.",
-    "shaper-pareto": "Each point is a shaper: further left is faster, further down leaves less vibration.",
-    "shaper-sensitivity": "How much vibration is left if the mode is not where it was measured: low and wide is good.",
-    "shaper-impulses": "The taps of each shaper: a move is split into so many parts, so far apart.",
-    "shaper-steps": "Response of the machine table to a step through each shaper: what oscillates after the "
-    "last impulse is the residual vibration.",
-    "shaper-branches": "Duration of the shortest shaper over the ratio of two modes: each branch is one construction.",
-    "identify-sweep": "Each column is a place of the axis: where its peak moves, the mode moves with the position.",
-    "identify-response": "Peaks of the measured response are modes; the model should lie on the measurement.",
-    "identify-stabilisation": "A mode is where the marks stand one above the other, whatever the order of the model.",
-    "identify-traces": "Hammer and response over time; the model should lie on the measurement until both are noise.",
-    "identify-decay": "Envelopes of the modes while they die out: a straight line is one mode with constant damping.",
-    "identify-spectrum": "Amplitude over frequency: a peak with a label was taken as a mode.",
-    "testcut-forces": "Measured forces beside those of the fitted model, over the travel of the tool.",
-    "testcut-coefficients": "Each coefficient with its interval: one that reaches zero is not determined by the cut.",
-    "testcut-corner": "Measured load at the corner beside the predicted one.",
-    "testcut-interval": "Measured times between feeds beside the fitted ones.",
-    "study-tornado": "The longest bar is the value that decides: its ends say where the verdict is best and worst.",
-    "study-bands": "Where the band reaches the dashed line, one machine in twenty or more is out of tolerance.",
-    "servo": "Position minus command over time, measured and of the fitted loop.",
-    "clock": "Each point is a run: on the diagonal the predicted time is the measured one.",
-}
-"""By the names that `plots()` has."""

@@ -38,11 +38,11 @@ class LookAhead:
     """A rule for corners with its limits."""
 
     name: str  # as it is shown
-    motion: str  # `controller.motion`
-    law: str  # `controller.law`
-    rule: str  # `controller.corner_rule`
-    parameters: tuple[Parameter, ...]  # what is fitted
     meaning: str
+    parameters: tuple[Parameter, ...]  # what is fitted
+    rule: str = "speed_difference"  # `controller.corner_rule`
+    law: str = "jerk_limited"  # `controller.law`
+    motion: str = "look_ahead"  # `controller.motion`
 
 
 _ACCELERATION = "axes.{axis}.max_acceleration_mm_s2"
@@ -73,35 +73,32 @@ _BLOCK_TIME = Parameter(
 # fmt: on
 _BOTH = (_RAPID_TIME, _ARRIVAL)
 
+_SPEED = (_ACROSS, _ALONG_Z, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS)
+
 FAMILIES = (
     LookAhead(
-        "speed difference", "look_ahead", "jerk_limited", "speed_difference",
-        (_ACROSS, _ALONG_Z, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS, *_BOTH),
-        "look-ahead with a largest speed step of each axis at corners (FANUC 1783)",
+        "speed difference", "look-ahead with a largest speed step of each axis at corners (FANUC 1783)",
+        (*_SPEED, *_BOTH),
     ),
     LookAhead(
-        "speed difference, block time", "look_ahead", "jerk_limited", "speed_difference",
-        (_ACROSS, _ALONG_Z, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS, _BLOCK_TIME, *_BOTH),
-        "the same, and blocks are read no faster than so",
+        "speed difference, block time", "the same, and blocks are read no faster than so",
+        (*_SPEED, _BLOCK_TIME, *_BOTH),
     ),
     LookAhead(
-        "speed difference, constant time", "look_ahead", "constant_time", "speed_difference",
-        (_ACROSS, _ALONG_Z, _TIME_CONSTANT, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS, *_BOTH),
-        "the same, with ramps of a constant time",
+        "speed difference, constant time", "the same, with ramps of a constant time",
+        (_ACROSS, _ALONG_Z, _TIME_CONSTANT, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS, *_BOTH), law="constant_time",
     ),
     LookAhead(
-        "junction deviation", "look_ahead", "jerk_limited", "junction_deviation",
-        (_ACROSS, _ALONG_Z, _JERK_TIME, _DEVIATION, _ARCS, *_BOTH),
-        "look-ahead that passes a corner as an arc within a deviation",
+        "junction deviation", "look-ahead that passes a corner as an arc within a deviation",
+        (_ACROSS, _ALONG_Z, _JERK_TIME, _DEVIATION, _ARCS, *_BOTH), "junction_deviation",
     ),
     LookAhead(
-        "stops at corners", "look_ahead", "jerk_limited", "stops",
-        (_ACROSS, _ALONG_Z, _JERK_TIME, _STOP_ANGLE, _ARCS, *_BOTH),
-        "look-ahead that stops at sharp corners",
+        "stops at corners", "look-ahead that stops at sharp corners",
+        (_ACROSS, _ALONG_Z, _JERK_TIME, _STOP_ANGLE, _ARCS, *_BOTH), "stops",
     ),
     LookAhead(
-        "after interpolation", "after_interpolation", "constant_time", "speed_difference", (_TIME_CONSTANT, *_BOTH),
-        "no look-ahead: blocks overlap within the time constant (FANUC 1622)",
+        "after interpolation", "no look-ahead: blocks overlap within the time constant (FANUC 1622)",
+        (_TIME_CONSTANT, *_BOTH), law="constant_time", motion="after_interpolation",
     ),
 )  # fmt: skip
 """What is tried."""
@@ -547,10 +544,10 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     def errors(point: FloatArray) -> FloatArray:
         values = dict(zip(names, point.tolist(), strict=True))
         starts = starts_of(whole_model(machine, motion, values, kept))
-        taken = [
-            starts(span.run, 1.0)[span.end] - (starts(span.run, 1.0)[span.begin] if span.begin > 0 else 0.0)
-            for span in spans
-        ]
+        taken = []
+        for span in spans:
+            of_run = starts(span.run, 1.0)
+            taken.append(of_run[span.end] - (of_run[span.begin] if span.begin > 0 else 0.0))
         return np.concatenate([(np.array(taken) - seconds) / _READING_S, pull * point])
 
     begin = np.array([4.0 if name.endswith("from") else 0.3 for name in names])
@@ -566,11 +563,12 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     spread = np.linalg.pinv(slope.T @ slope) * 2.0 * max(1.0, (middle / _READING_S) ** 2)
     # The same with what is usual in place of the ridge, which is a choice and no knowledge.
     usual = np.array([_USUAL_KRPM if name.endswith("from") else _USUAL_S for name in names])
-    told = slope[: len(spans)].T @ slope[: len(spans)] / (2.0 * max(1.0, (middle / _READING_S) ** 2))
+    seen = slope[: len(spans)]
+    told = seen.T @ seen / (2.0 * max(1.0, (middle / _READING_S) ** 2))
     covariance = np.linalg.inv(told + np.diag(usual**-2.0))
     # A parameter that changes nothing is not determined.
-    unseen = np.abs(slope[: len(spans)]).sum(axis=0) < _UNSEEN
+    unseen = np.abs(seen).sum(axis=0) < _UNSEEN
     reach = np.where(unseen, _MAX_S, 2.0 * np.sqrt(np.maximum(np.diag(spread), 0.0)))
-    low = {name: max(0.0, values[name] - float(each)) for name, each in zip(names, reach, strict=True)}
-    high = {name: min(_MAX_S, values[name] + float(each)) for name, each in zip(names, reach, strict=True)}
+    low = dict(zip(names, np.maximum(found.x - reach, 0.0).tolist(), strict=True))
+    high = dict(zip(names, np.minimum(found.x + reach, _MAX_S).tolist(), strict=True))
     return FunctionFit(values, low, high, covariance, kept, middle)

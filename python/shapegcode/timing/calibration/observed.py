@@ -182,18 +182,17 @@ def feed_unit(entry: RunEntry, log: RunLog, timed: TimedProgram) -> float:
     steady = steady_value(np.log(ratio)) if len(ratio) else None
     name = entry.feed_unit or log.feed_unit
     stated = find_unit(name) if name is not None else None
-    if steady is None:
-        return float(stated.factor) * 1000.0 if stated is not None else math.nan
     # An override is between a half and twice the programmed feed: units lie further apart.
     units = [float(stated.factor) * 1000.0] if stated is not None else list(_FEED_UNITS.values())
+    if steady is None:
+        return units[0] if stated is not None else math.nan
     best = min(units, key=lambda unit: abs(steady + math.log(unit)))
     if abs(steady + math.log(best)) > math.log(2.0):
         tried = name if stated is not None else f"no unit of {', '.join(_FEED_UNITS)}"
         raise RecordError(
             f"{log.source}: steady feeds of {entry.program.name} are {math.exp(steady):.4g} times the programmed ones "
             f"in mm/s: {tried} does not make that an override of 50 to 200 %; the log is of another program, the "
-            "program in another unit (G20, G21), or feed_unit must be stated"
-            + (" otherwise" if stated is not None else "")
+            f"program in another unit (G20, G21), or feed_unit must be stated{' otherwise' if stated else ''}"
         )
     return best
 
@@ -213,8 +212,7 @@ def cut_sections_of(
     entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float, notes: list[str]
 ) -> list[CutSection]:
     """Feed override of each section: what steady cuts show, else what is stated, else that of the run, else 1."""
-    ratio = np.empty(0)
-    line = np.empty(0, dtype=np.int64)
+    ratio, line = np.empty(0), np.empty(0, dtype=np.int64)
     if log.feed is not None and math.isfinite(unit):
         line = lines_at(log.feed, log, timed)
         ratio = log.feed.value * unit / timed.feed_mm_per_s[line]
@@ -233,8 +231,7 @@ def cut_sections_of(
     for first, last in timed.sections:
         inside = ratio[(line >= first) & (line <= last) & (ratio >= _MIN_OVERRIDE) & (ratio <= _MAX_OVERRIDE)]
         seen = steady_value(inside) if len(inside) else None
-        fallback = stated if stated is not None else whole
-        value = seen if seen is not None else fallback if fallback is not None else 1.0
+        value = next(each for each in (seen, stated, whole, 1.0) if each is not None)
         found.append(CutSection((first, last), to_whole_percent(value), seen is not None))
     used = sorted({cut_section.feed_override for cut_section in found if cut_section.measured})
     if any(abs(value - 1.0) > 0.005 for value in used):
@@ -352,20 +349,15 @@ def _compare_tools(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: lis
 
 def _rising(line: IntArray) -> npt.NDArray[np.bool_]:
     """Which values belong to the longest row that never falls."""
-    ends: list[int] = []  # value at which the best row of each length ends
-    positions: list[int] = []  # and where
+    ends: list[int] = []  # where the best row of each length ends
     before = np.full(len(line), -1, dtype=np.int64)
-    for index, value in enumerate(line.tolist()):
-        length = bisect_right(ends, value)
-        if length == len(ends):
-            ends.append(value)
-            positions.append(index)
-        else:
-            ends[length] = value
-            positions[length] = index
-        before[index] = positions[length - 1] if length > 0 else -1
+    values = line.tolist()
+    for index, value in enumerate(values):
+        length = bisect_right(ends, value, key=values.__getitem__)
+        before[index] = ends[length - 1] if length > 0 else -1
+        ends[length : length + 1] = [index]
     kept = np.zeros(len(line), dtype=bool)
-    at = positions[-1] if positions else -1
+    at = ends[-1] if ends else -1
     while at >= 0:
         kept[at] = True
         at = int(before[at])
