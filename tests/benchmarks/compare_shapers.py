@@ -108,6 +108,7 @@ def machine_of(way: Way, contour_um: float, finer: int = 0) -> sg.Machine:
     for unit in ("mm", "inch"):
         data["controller"][f"least_increment_{unit}"] *= 10.0**-finer
         data["controller"][f"feed_decimals_{unit}"] += finer
+    data["price"] = {"program_time_percent": 1e6, "cut_time_percent": 1e6}
     data["shaping"]["contour"] = way.contour
     if way.family != "minimal":
         data["shaping"]["family"] = way.family
