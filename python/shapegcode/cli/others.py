@@ -166,20 +166,17 @@ REPORT = Interface(
 
 
 _PAGES = {
-    "metrology": "docs/evidence/paper000.md",
-    "corner": "docs/evidence/paper001.md",
-    "shaper": "docs/evidence/paper002.md",
-    "tap": "docs/evidence/paper003.md",
-    "cycle-time": "docs/evidence/paper004.md",
-    "evidence": "docs/evidence/evidence.md",
-}
+    "metrology": "paper000", "corner": "paper001", "shaper": "paper002", "tap": "paper003", "cycle-time": "paper004",
+    "evidence": "evidence",
+}  # fmt: skip
 """Pages of the book that repeat what the command of that name did up to version 0.1.0."""
 
 
 def _name(word: str) -> str:
     if word in _PAGES:
+        page = f"docs/evidence/{_PAGES[word]}.md"
         raise argparse.ArgumentTypeError(
-            f"{word} is a page of the book now, which says what repeats its figures: {_PAGES[word]}"
+            f"{word} is a page of the book now, which says what repeats its figures: {page}"
         )
     return word
 

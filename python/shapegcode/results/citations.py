@@ -23,13 +23,7 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "shaper ei3": ("singhose1997",),
     "shaper si": ("singhose1996",),
     "shaper negative-zv": ("singhose1994negative",),
-    "shaper simultaneous": (),
     "shaper minimal": ("park2009",),
-    "shaper polynomial": (),
-    "shaper non-negative": (),
-    "shaper robust": (),
-    "shaper mirrored": (),
-    "shaper taps": (),
     **{f"shaper smooth-{name}": ("kalico",) for name in ("zv", "mzv", "ei", "ei2", "si", "zvd-ei")},
     "rounding of block ends": ("jelinek1971",),
     "comparison of programs": ("myers1986",),
@@ -39,9 +33,10 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "cutting force": ("kim2001",),
     "modes from records": ("back2003", "steiglitz1965", "roy1989", "golub2003"),
     "modes from frequency responses": ("guillaume2003", "ewins", "golub2003"),
-    "modes from a sweep": (),
     "circle fit": ("chernov2010",),
     "path of paper 000": ("ko2023",),
+    "modes from a sweep": (),
+    **{f"shaper {name}": () for name in ("simultaneous", "polynomial", "non-negative", "robust", "mirrored", "taps")},
 }
 
 

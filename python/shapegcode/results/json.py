@@ -184,10 +184,8 @@ def _plain(value: object, *, coarse: bool, every_digit: bool) -> Any:
             held = getattr(value, field.name)
             if not (field.metadata.get("hidden") or (field.metadata.get("sparse") and held is None)):
                 found[field.name] = inner(held, field.name, bool(field.metadata.get("exact")))
-        every = getattr(value, "json_exact", ())
-        return found | {
-            name: inner(getattr(value, name), name, name in every) for name in getattr(value, "json_extra", ())
-        }
+        exact_ones, extra = getattr(value, "json_exact", ()), getattr(value, "json_extra", ())
+        return found | {name: inner(getattr(value, name), name, name in exact_ones) for name in extra}
     if isinstance(value, Mapping):
         return {str(key): inner(entry, str(key)) for key, entry in value.items()}
     if isinstance(value, enum.Enum):
@@ -222,15 +220,7 @@ def to_text(value: object) -> str:
 
 # --- the schema -------------------------------------------------------------------------------------------------------
 
-_SIMPLE: dict[Any, dict[str, Any]] = {
-    bool: {"type": "boolean"},
-    int: {"type": "integer"},
-    float: {"type": "number"},
-    str: {"type": "string"},
-    type(None): {"type": "null"},
-    Any: {},
-    object: {},
-}
+_SIMPLE = {bool: "boolean", int: "integer", float: "number", str: "string", type(None): "null"}
 
 
 def schema(result: type) -> dict[str, Any]:
@@ -316,8 +306,10 @@ def _comments(cls: type) -> dict[str, str]:
 
 
 def _of(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
+    if hint in (Any, object):
+        return {}
     if hint in _SIMPLE:
-        return dict(_SIMPLE[hint])
+        return {"type": _SIMPLE[hint]}
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin in (types.UnionType, typing.Union):
         return {"anyOf": [_of(each, definitions) for each in arguments]}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -143,9 +143,9 @@ def line_numbers(log: RunLog, timed: TimedProgram) -> IntArray:
         return value
     found, at = np.zeros(len(value), dtype=np.int64), 0
     for index, sequence_number in enumerate(value.tolist()):
-        later = [candidate for candidate in timed.sequence_lines.get(sequence_number, []) if candidate >= at]
-        if later:
-            at = found[index] = later[0]
+        places = timed.sequence_lines.get(sequence_number, [])
+        if (rank := bisect_left(places, at)) < len(places):
+            at = found[index] = places[rank]
     return found
 
 
