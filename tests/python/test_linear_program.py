@@ -13,7 +13,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from shapegcode.shaping.cutting_planes import LinearProgram
+from shapegcode import Mode
+from shapegcode.shaping.bands import ModeBand
+from shapegcode.shaping.cutting_planes import LinearProgram, _Band
 
 FloatArray = NDArray[np.float64]
 
@@ -67,3 +69,17 @@ def test_the_solver_prints_nothing(tmp_path: Path) -> None:
         [sys.executable, "-m", "shapegcode", *program], capture_output=True, text=True, check=True, cwd=tmp_path
     )
     assert json.loads(done.stdout)
+
+
+def test_no_maximum_of_the_residual_over_a_band_is_missed() -> None:
+    """Beside a fine sweep: maxima between an end of the band and the frequency next to it are found too."""
+    band = ModeBand(Mode(40.0, 0.02), 0.2)
+    times_s = 0.001 * np.arange(41)
+    swept = _Band(band, times_s)
+    fine = np.linspace(swept.low, swept.high, 20_001)
+    random = np.random.default_rng(5)
+    for _ in range(300):
+        taps = random.dirichlet(np.full(times_s.size, 0.2))
+        most = float(np.abs(swept.residual(taps, fine)).max())
+        found = float(np.abs(swept.peaks(taps)[1]).max())
+        assert found == pytest.approx(most, rel=2e-4, abs=1e-6)
