@@ -41,10 +41,11 @@ def plots_of(found: Identification) -> dict[str, Plot]:
         decays = ["decay"] if found.modes else []
         names = ["traces", "stabilisation", *decays, "spectrum" if found.decay else "response"]
     drawn_by = {
-        "traces": plot_traces, "response": plot_response, "stabilisation": plot_stabilisation, "decay": plot_decay,
-        "spectrum": plot_spectrum, "sweep": plot_sweep,
+        "identify-traces": plot_traces, "identify-response": plot_response, "identify-decay": plot_decay,
+        "identify-stabilisation": plot_stabilisation, "identify-spectrum": plot_spectrum, "identify-sweep": plot_sweep,
     }  # fmt: skip
-    return {f"identify-{name}": partial(drawn_by[name], found) for name in names}
+    wanted = [f"identify-{name}" for name in names]
+    return {name: partial(drawn_by[name], found) for name in wanted}
 
 
 def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:
