@@ -24,6 +24,7 @@ import shapegcode as sg
 from shapegcode import _core
 from shapegcode.cli.runner import progress
 from shapegcode.conversion import plan as converter
+from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping import design, machine_bands
 from shapegcode.shaping.grid import Grid, choose_grid, make_grid
@@ -108,7 +109,6 @@ def machine_of(way: Way, contour_um: float, finer: int = 0) -> sg.Machine:
     for unit in ("mm", "inch"):
         data["controller"][f"least_increment_{unit}"] *= 10.0**-finer
         data["controller"][f"feed_decimals_{unit}"] += finer
-    data["price"] = {"program_time_percent": 1e6, "cut_time_percent": 1e6}
     data["shaping"]["contour"] = way.contour
     if way.family != "minimal":
         data["shaping"]["family"] = way.family
@@ -117,7 +117,7 @@ def machine_of(way: Way, contour_um: float, finer: int = 0) -> sg.Machine:
     for axis in data["axes"].values():
         for mode in axis["modes"] if way.band else ():
             mode["frequency_uncertainty_percent"] = 100.0 * way.band
-    return sg.Machine.from_data(data, f"vx500 for {way.name}")
+    return sg.Machine.from_data(data, f"vx500 for {way.name}").with_values(ANY_PRICE)
 
 
 def shifted(machine: sg.Machine, share: float) -> sg.Machine:

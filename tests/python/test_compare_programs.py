@@ -469,7 +469,7 @@ def test_a_real_change_does_not_pass_the_proof_of_a_conversion() -> None:
 
 
 @pytest.mark.parametrize("step_mm", [0.3, 1.0, 4.0])
-def test_two_passes_of_sixty_are_missed_by_the_proof_of_a_conversion(step_mm: float) -> None:
+def test_the_proof_of_a_conversion_finds_that_two_of_sixty_passes_are_missing(step_mm: float) -> None:
     from shapegcode.conversion.outcome import prove
 
     passes = [(x, step_mm * y) for y in range(60) for x in ((0.0, 30.0) if y % 2 == 0 else (30.0, 0.0))]

@@ -184,8 +184,7 @@ std::uint64_t OnlinePlanner::look_ahead(const PathPoint& from, std::uint64_t pus
     double jerk = least_jerk_;
     if (std::isfinite(entry.max_acceleration)) a = std::min(a, entry.max_acceleration);
     if (std::isfinite(entry.max_jerk)) jerk = std::min(jerk, entry.max_jerk);
-    // At most: with the acceleration as if it were there at once, and what building it up and down takes.
-    const double stop_s = v / a + std::min(2.0 * std::sqrt(v / jerk), 2.0 * a / jerk);
+    const double stop_s = stopping_time(v, a, jerk);
     const double sections_s = rules_.period_s * static_cast<double>(longest_section + margin_periods);
     longest_stop_mm_ = std::max(longest_stop_mm_, v * (0.5 * stop_s + sections_s));
     ahead += entry.segment.length_mm;

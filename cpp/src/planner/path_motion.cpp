@@ -270,10 +270,8 @@ bool PathMotion::holds(const Landing& landing, double most_jerk, double steepest
 double PathMotion::stop_from_here() const noexcept {
   const Station& here = plan_->station(station_);
   const Derivatives path = path_here();
-  const double a = plan_->steepest(here, path);
-  const double jerk = plan_->highest_jerk(here, path);
-  const double v = state_.speed;
-  return 0.5 * v * (v / a + std::min(2.0 * std::sqrt(v / jerk), 2.0 * a / jerk));
+  const double stop_s = stopping_time(state_.speed, plan_->steepest(here, path), plan_->highest_jerk(here, path));
+  return 0.5 * state_.speed * stop_s;
 }
 
 // The shortest landing after `travel` mm within the limits times `excess`.

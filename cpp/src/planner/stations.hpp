@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -77,6 +78,11 @@ struct Station {
 [[nodiscard]] inline double highest_jerk(const Station& station, const Derivatives& path,
                                          const AxisLimits& limits) noexcept {
   return std::min(station.max_jerk, along(path.first, limits.jerk, limits.axes));
+}
+
+/// The longest time of a stop: as if the acceleration were reached at once, plus the time to build it up and down.
+[[nodiscard]] inline double stopping_time(double speed, double acceleration, double jerk) noexcept {
+  return speed / acceleration + std::min(2.0 * std::sqrt(speed / jerk), 2.0 * acceleration / jerk);
 }
 
 /// Derivatives of so many axes at `x` mm behind a station.
