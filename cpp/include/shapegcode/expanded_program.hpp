@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace shapegcode {
+
+/// A note about a line of a program for another control.
+struct SourceNote {
+  std::uint32_t line = 0;  ///< of the source, from 1
+  std::string text;        ///< one sentence, with both meanings where a word means another thing on FANUC
+};
+
+/// A program for another control, translated into FANUC's words: loops, calls and expressions are executed, numbers
+/// have a point where a unit hangs on them, I J K are distances from the start, dwells are G04 X in seconds. It begins
+/// and ends with a line `%`.
+struct ExpandedProgram {
+  std::string text;
+  std::vector<std::uint32_t> lines;  ///< for each line of the text, from 0, the line of the source, from 1
+  std::vector<SourceNote> notes;     ///< ascending by line
+  std::vector<std::string> files;    ///< names of other files whose lines are in it (subprograms)
+  /// For each line of the text its file: 0 the source, n the n-th of `files`; empty: all of the source.
+  std::vector<std::uint32_t> line_files;
+};
+
+}  // namespace shapegcode
