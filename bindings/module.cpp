@@ -21,6 +21,7 @@ PYBIND11_MODULE(_core, module) {
   register_identification(module);
   register_shaped_command(module);
   register_emission(module);
+  register_linear_feed(module);
   register_simulation(module);
   register_metrology(module);
   register_follow(module);

@@ -19,6 +19,7 @@ void register_planner_models(pybind11::module_& module);
 void register_controller(pybind11::module_& module);
 void register_shaped_command(pybind11::module_& module);
 void register_emission(pybind11::module_& module);
+void register_linear_feed(pybind11::module_& module);
 void register_plant(pybind11::module_& module);
 void register_feed_drive(pybind11::module_& module);
 void register_metrology(pybind11::module_& module);

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'CommandPlanner', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerEvent', 'ControllerKind', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedOf', 'FeedRate', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'JogResult', 'LimitedFeed', 'LinearPlant', 'LinuxcncSlowing', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OffsetLimits', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlannerRules', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'SegmentRules', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'controlled_motion', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'linuxcnc_slowing', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_optimal_trajectory', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'CommandPlanner', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerEvent', 'ControllerKind', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedOf', 'FeedRate', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'JogResult', 'LimitedFeed', 'LinearBlock', 'LinearPlant', 'LinuxcncSlowing', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OffsetLimits', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlannerRules', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'SegmentRules', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'controlled_motion', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_difference_mm', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_blocks', 'linear_distance_mm', 'linear_duration_s', 'linear_end_speed', 'linear_model', 'linear_positions_mm', 'linuxcnc_slowing', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_optimal_trajectory', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -4238,6 +4238,69 @@ class WriterOptions:
     @position_decimals.setter
     def position_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+class LinearBlock:
+    """
+    A block of linear feed that takes the place of some of constant feed.
+    """
+    def __init__(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], length_mm: typing.SupportsFloat | typing.SupportsIndex, start_feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, radius_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0, sweep_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        A line, or an arc in the XY plane.
+        """
+    @property
+    def duration_s(self) -> float:
+        """
+        How long it lasts, s.
+        """
+    @property
+    def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        (3,) where it ends, mm.
+        """
+    @property
+    def feed_mm_per_min(self) -> float:
+        """
+        At its end, mm/min.
+        """
+    @property
+    def first(self) -> int:
+        """
+        Index of the first block that it replaces.
+        """
+    @property
+    def is_linear(self) -> bool:
+        """
+        False: its feed is constant.
+        """
+    @property
+    def last(self) -> int:
+        """
+        Index of the last one.
+        """
+    @property
+    def length_mm(self) -> float:
+        """
+        Of its path, mm.
+        """
+    @property
+    def radius_mm(self) -> float:
+        """
+        Of an arc, mm; 0: a line.
+        """
+    @property
+    def sets_feed(self) -> bool:
+        """
+        The feed at its start is not that of the block before: a line before it sets it.
+        """
+    @property
+    def start_feed_mm_per_min(self) -> float:
+        """
+        At its start, mm/min.
+        """
+    @property
+    def sweep_rad(self) -> float:
+        """
+        Of an arc, rad.
+        """
 class BlockEnd:
     """
     When a block's successor starts.
@@ -7359,6 +7422,10 @@ def interpolate_program(program: ProgramText, model: FanucModel) -> Interpolated
     """
     The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no controller can have, or a program of more than 4e9 set-points.
     """
+def largest_difference_mm(path: Path, blocks: collections.abc.Sequence[LinearBlock], period_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    By how much the motion of joined blocks differs from the blocks of constant feed at the ends of their periods.
+    """
 def largest_feed(force: MillingForce, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], limits: FeedLimits, lowest: typing.SupportsFloat | typing.SupportsIndex, highest: typing.SupportsFloat | typing.SupportsIndex) -> LimitedFeed:
     """
     Highest feed between `lowest` and `highest` (mm/min) within all limits: never above, and within 0.1 % of the one that binds. Raises ArgumentError unless 0 < lowest <= highest.
@@ -7375,6 +7442,22 @@ def line_sections(path: Path, ranges: collections.abc.Sequence[tuple[typing.Supp
     """
     The parts of a path that come from source lines, pairs of first and last. Raises ArgumentError if a range runs backwards or two overlap.
     """
+def linear_blocks(path: Path, period_s: typing.SupportsFloat | typing.SupportsIndex, tolerance_mm: typing.SupportsFloat | typing.SupportsIndex, joints: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], modes: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> list[LinearBlock]:
+    """
+    Join blocks of constant feed, each of whole periods, into blocks of linear feed, where the motion stays within a tolerance of the ends of their periods. A block begins at each of `joints` (ascending); speeds at the end of the path are chosen so that `modes` of X, Y and Z are at rest there.
+    """
+def linear_distance_mm(length_mm: typing.SupportsFloat | typing.SupportsIndex, start_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, end_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, time_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Distance along such a block at a time since its start, mm.
+    """
+def linear_duration_s(length_mm: typing.SupportsFloat | typing.SupportsIndex, start_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, end_mm_per_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Time of a block whose speed is linear along its path, s.
+    """
+def linear_end_speed(length_mm: typing.SupportsFloat | typing.SupportsIndex, start_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, time_s: typing.SupportsFloat | typing.SupportsIndex) -> float | None:
+    """
+    Speed at the end of a block that lasts a given time, or at its start where these are swapped, mm/s; None: no such speed.
+    """
 def linear_model(parameters: FeedDriveParameters) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]:
     """
     The drive as x' = A x + B w, y = C x + D w with inputs linear between the set-points.
@@ -7389,6 +7472,10 @@ def linear_model(parameters: FeedDriveParameters) -> tuple[typing.Annotated[nump
     
     Raises:
         ArgumentError: The drive is not linear.
+    """
+def linear_positions_mm(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], blocks: collections.abc.Sequence[LinearBlock], times_s: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    (n, 3) positions of the motion of blocks at ascending times, mm; after the last block its end.
     """
 def linuxcnc_slowing(path: Path, limits: MotionLimits, rules: PlannerRules, corner_rad: typing.SupportsFloat | typing.SupportsIndex) -> LinuxcncSlowing:
     """

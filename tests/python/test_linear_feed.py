@@ -16,7 +16,7 @@ import shapegcode as sg
 from acceptance import machine_with, moves_of
 from judge import Mode, residual_um
 from linear_feed_reader import command, cuts_with_flin
-from shapegcode.conversion.linear_feed import LinearBlock, distance_mm, duration_s, end_speed, positions_mm
+from shapegcode import _core
 from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.program.foreign.siemens import read_siemens
 
@@ -45,23 +45,25 @@ SPEEDS = [(10.0, 20.0), (20.0, 10.0), (100.0, 101.0), (50.0, 50.0), (1.0, 200.0)
 @pytest.mark.parametrize(("start", "end"), SPEEDS)
 def test_time_and_distance_against_quadrature(start: float, end: float) -> None:
     length = 3.7
-    time_s = duration_s(length, start, end)
+    time_s = _core.linear_duration_s(length, start, end)
     assert time_s == pytest.approx(quad(lambda s: 1.0 / (start + (end - start) * s / length), 0.0, length)[0], rel=1e-9)
-    assert distance_mm(length, start, end, np.array([0.0, time_s])) == pytest.approx([0.0, length], abs=1e-9)
-    half_s = brentq(lambda t: float(distance_mm(length, start, end, np.array([t]))[0]) - 0.5 * length, 0.0, time_s)
-    assert half_s == pytest.approx(duration_s(0.5 * length, start, 0.5 * (start + end)), rel=1e-9)
-    assert end_speed(length, start, time_s) == pytest.approx(end, rel=1e-6)
+    found = [_core.linear_distance_mm(length, start, end, t) for t in (0.0, time_s)]
+    assert found == pytest.approx([0.0, length], abs=1e-9)
+    half_s = brentq(lambda t: _core.linear_distance_mm(length, start, end, t) - 0.5 * length, 0.0, time_s)
+    assert half_s == pytest.approx(_core.linear_duration_s(0.5 * length, start, 0.5 * (start + end)), rel=1e-9)
+    assert _core.linear_end_speed(length, start, time_s) == pytest.approx(end, rel=1e-6)
 
 
 def test_what_no_speed_can_do() -> None:
-    assert end_speed(1.0, 10.0, 1e6) is None and end_speed(0.0, 10.0, 1.0) is None and end_speed(1.0, 0.0, 1.0) is None
+    for length, start, time_s in ((1.0, 10.0, 1e6), (0.0, 10.0, 1.0), (1.0, 0.0, 1.0)):
+        assert _core.linear_end_speed(length, start, time_s) is None
 
 
 def test_positions_of_arcs_and_lines() -> None:
-    line = LinearBlock(0, 0, np.array([3.0, 0.0, 0.0]), 0.0, 0.0, 3.0, 2, 60.0, 180.0)
-    arc = LinearBlock(1, 1, np.array([5.0, 2.0, 0.0]), 2.0, math.pi / 2.0, math.pi, 2, 180.0, 180.0)
-    times = np.array([0.0, line.time_s, line.time_s + 0.5 * arc.time_s, 99.0])
-    found = positions_mm(np.zeros(3), [line, arc], times)
+    line = _core.LinearBlock(np.array([3.0, 0.0, 0.0]), 3.0, 60.0, 180.0)
+    arc = _core.LinearBlock(np.array([5.0, 2.0, 0.0]), math.pi, 180.0, 180.0, 2.0, math.pi / 2.0)
+    times = np.array([0.0, line.duration_s, line.duration_s + 0.5 * arc.duration_s, 99.0])
+    found = _core.linear_positions_mm(np.zeros(3), [line, arc], times)
     middle = [3.0 + 2.0 * math.sin(math.pi / 4.0), 2.0 - 2.0 * math.cos(math.pi / 4.0), 0.0]
     assert np.allclose(found, [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], middle, [5.0, 2.0, 0.0]], atol=1e-12)
 
@@ -112,7 +114,7 @@ def test_the_siemens_reader_reads_it_back() -> None:
     )
     tick_s = 0.001
     known = command(few, tick_s)
-    total_s = sum(duration_s(block.length, block.before / 60.0, block.feed / 60.0) for block in few)
+    total_s = sum(_core.linear_duration_s(block.length, block.before / 60.0, block.feed / 60.0) for block in few)
     assert times[-1] == pytest.approx(total_s, abs=5e-6)
     clock = np.arange(len(known) - 1) * tick_s
     read = np.stack([np.interp(clock, times, points[:, k]) for k in range(3)], axis=1)

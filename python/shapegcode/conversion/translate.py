@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget
-from shapegcode.conversion.linear_feed import joints_of, largest_difference_mm, linear_blocks, linear_lines
+from shapegcode.conversion.linear_feed import joints_of, linear_lines
 from shapegcode.conversion.result import Conversion, DialectNotes
 from shapegcode.errors import RoundTripError
 from shapegcode.io.units import MM_PER_INCH
@@ -224,10 +224,12 @@ class _Translator:
             self.cautions["constant"] = f"{self._where(numbers[0])}: this cut stays in blocks of constant feed: {why}"
             return
         increment_mm = written_increment_mm(self._machine, 21)
-        axes = enumerate(self._machine.axes.as_tuple())
-        modes = [(k, mode.frequency_hz, mode.damping_ratio) for k, axis in axes for mode in axis.modes]
-        joined = linear_blocks(blocks, period_s, increment_mm, joints, modes)
-        off_mm = largest_difference_mm(blocks, joined, period_s)
+        modes = [
+            [_core.Mode(mode.frequency_hz, mode.damping_ratio) for mode in axis.modes]
+            for axis in self._machine.axes.as_tuple()
+        ]
+        joined = _core.linear_blocks(blocks, period_s, increment_mm, joints, modes)
+        off_mm = _core.largest_difference_mm(blocks, joined, period_s)
         if off_mm > 1.5 * increment_mm:
             raise RoundTripError(f"line {numbers[0]}: joined blocks are {off_mm * 1e3:.2f} µm off the shaped ones")
         self._linear |= linear_lines(lines, blocks, joined, round(-math.log10(increment_mm)))
