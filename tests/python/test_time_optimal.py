@@ -67,6 +67,24 @@ def test_it_takes_little_more_than_the_shortest_time(seed: int) -> None:
     assert 0.998 <= ratio <= 1.10
 
 
+def test_corners_that_do_not_limit_the_motion_are_braked_through() -> None:
+    """Short lines at a low jerk limit: 1.055 of the shortest time if braking ends at each corner."""
+    flat = [[0.0, 0.0], [0.35, 0.1], [1.16, 0.26], [3.27, 0.12], [7.24, -1.47], [7.66, -1.76], [8.38, -2.41]]
+    corners = np.column_stack([np.array(flat), np.zeros(len(flat))])
+    limits = {
+        "max_feed_mm_per_s": [123.0, 160.0, 212.0],
+        "max_acceleration_mm_per_s2": [1650.0, 1380.0, 1800.0],
+        "max_jerk_mm_per_s3": [25_400.0, 24_500.0, 25_400.0],
+    }
+    half_widths = np.array([0.36199599, 0.74988169, 0.83358408, 0.75284616, 0.75284616])  # their sum is the tolerance
+    oracle = time_optimal(
+        rounded_polyline(corners, half_widths),
+        Limits(*map(np.array, limits.values()), feed=lambda p: np.full(len(p), 174.0)),
+    )
+    points = sg.time_optimal_trajectory(corners, contour_tolerance_mm=0.044, feed_mm_per_s=174.0, **limits)
+    assert 0.998 <= (len(points) - 1) * PERIOD_S / oracle.time_s <= 1.04
+
+
 def test_a_fine_polyline_is_run_through_at_its_feed() -> None:
     """A circle of chords: no corner slows it, and the limits hold."""
     angle = np.linspace(0.0, 2.0 * np.pi, 721)

@@ -25,6 +25,12 @@ constexpr double same_share = 1e-9;
 constexpr double slow_share = 0.01;
 // Where keeping sets was of no use, because nearly all of them depend on the end, so many plans are made without.
 constexpr int plans_anew = 16;
+// Rounds in which each valley is tried; what makes one worth while, and all of them, as a share of the time.
+constexpr int valley_rounds = 2;
+constexpr double least_gain_s = 1e-5;
+constexpr double least_gain = 0.001;
+// Of an interval at rest, mm/s.
+constexpr double least_speed = 1e-9;
 // Behind a valley, over which the time is compared, and shares of the square of its highest speed that are tried.
 constexpr int passing_stations = 64;
 constexpr std::array<double, 5> passings{1.0, 0.85, 0.7, 0.55, 0.4};
@@ -165,45 +171,130 @@ bool PathPlan::is_changed(std::size_t index) const noexcept {
   return index == 0 || !courses_[index - 1].is_kept || !courses_[index].is_kept || !courses_[index + 1].is_kept;
 }
 
+// Makes one set; whether it is another than before.
+bool PathPlan::make_set(std::size_t index) noexcept {
+  const Station& here = stations_[index];
+  const PlannedSegment& segment = segment_of(here);
+  Course& course = courses_[index];
+  const Course& next = courses_[index + 1];
+  Making making = making_of(index);
+  if (here.valley) making.cap = std::min(making.cap, best_passing(index));
+  course.approaches = is_approach(index);
+  if (course.approaches) {
+    course.approach = rules_.hardest_before(here, segment, making.cap, next.approach);
+    course.approach_begin = next.approach_begin;
+    making.least_acceleration = course.approach.acceleration;
+    course.approaches = course.approach.speed_squared < making.cap;
+  }
+  if (here.valley) making.least_acceleration = 0.0;
+  const ControllableSet set = rules_.before(here, segment, making, sets_[index + 1]);
+  const bool differs = !is_same(set, sets_[index]);
+  course.is_another = course.is_another || differs;
+  sets_[index] = set;
+  course.is_remade = true;
+  if (here.valley) {
+    course.approaches = true;
+    course.approach = {ControllableSets::steady(set), 0.0};
+    course.approach_begin = here.distance - segment.half_width;
+  }
+  return differs;
+}
+
 // Of the first round, those of intervals that are not those of the plan before; later, those that depend on tangents
 // that were laid again.
 void PathPlan::make_sets(bool is_first) noexcept {
   bool differs = false;  // the next one
   for (std::size_t k = end(); k-- > 0;) {
-    const Station& here = stations_[k];
-    const PlannedSegment& segment = segment_of(here);
     Course& course = courses_[k];
-    const Course& next = courses_[k + 1];
-    const bool is_new = is_first ? is_changed(k) : course.relaid || next.relaid;
+    const bool is_new = is_first ? is_changed(k) : course.relaid || courses_[k + 1].relaid;
     if (ends_in_stop(k)) {
-      if (is_first && is_new) sets_[k] = rules_.before_stop(here, segment, cap_at(k));
+      if (is_first && is_new) sets_[k] = rules_.before_stop(stations_[k], segment_of(stations_[k]), cap_at(k));
       course.is_remade = course.is_remade || (is_first && is_new);
       course.approaches = false;
       differs = false;
-      continue;
-    }
-    if (!is_new && !differs) continue;
-    Making making = making_of(k);
-    if (here.valley) making.cap = std::min(making.cap, best_passing(k));
-    course.approaches = is_approach(k);
-    if (course.approaches) {
-      course.approach = rules_.hardest_before(here, segment, making.cap, next.approach);
-      course.approach_begin = next.approach_begin;
-      making.least_acceleration = course.approach.acceleration;
-      course.approaches = course.approach.speed_squared < making.cap;
-    }
-    if (here.valley) making.least_acceleration = 0.0;
-    const ControllableSet set = rules_.before(here, segment, making, sets_[k + 1]);
-    differs = !is_same(set, sets_[k]);
-    course.is_another = course.is_another || differs;
-    sets_[k] = set;
-    course.is_remade = true;
-    if (here.valley) {
-      course.approaches = true;
-      course.approach = {ControllableSets::steady(set), 0.0};
-      course.approach_begin = here.distance - segment.half_width;
+    } else if (is_new || differs) {
+      differs = make_set(k);
     }
   }
+}
+
+double PathPlan::duration_s(std::size_t index, double squared, double squared_after) const noexcept {
+  return 2.0 * stations_[index].length / (std::sqrt(squared) + std::sqrt(squared_after) + least_speed);
+}
+
+// How much less time the path is expected to take if the motion may brake through a valley; 0: no less, it may not.
+double PathPlan::brake_through(std::size_t valley) {
+  struct Saved {
+    ControllableSet set;
+    Course course;
+  };
+  std::vector<Saved> saved;
+  stations_[valley].valley = false;
+  std::size_t first = valley;
+  while (true) {
+    saved.push_back({sets_[first], courses_[first]});
+    const bool approached = courses_[first].approaches;
+    const bool differs = make_set(first) || courses_[first].approaches != approached || first == valley;
+    if (!differs || first == 0 || ends_in_stop(first - 1)) break;
+    --first;
+  }
+  // From there on the motion is another, until it is again what it was.
+  std::vector<PathState> states;
+  PathState state = courses_[first].expected;
+  double gain_s = 0.0;
+  std::size_t k = first;
+  while (!ends_in_stop(k)) {
+    states.push_back(state);
+    const PathState next = fastest_after(k, state);
+    gain_s += duration_s(k, courses_[k].expected.speed_squared, courses_[k + 1].expected.speed_squared) -
+              duration_s(k, state.speed_squared, next.speed_squared);
+    state = next;
+    ++k;
+    if (k > valley && is_near(courses_[k].expected, state, stations_[k].length)) break;
+  }
+  if (ends_in_stop(k)) {
+    states.push_back(state);
+    gain_s += duration_s(k, courses_[k].expected.speed_squared, 0.0) - duration_s(k, state.speed_squared, 0.0);
+  }
+  if (gain_s > least_gain_s) {
+    for (std::size_t i = 0; i < states.size(); ++i) {
+      courses_[first + i].expected = states[i];
+      courses_[first + i].is_another = false;
+    }
+    return gain_s;
+  }
+  stations_[valley].valley = true;
+  for (std::size_t i = 0; i < saved.size(); ++i) {
+    sets_[valley - i] = saved[i].set;
+    courses_[valley - i] = saved[i].course;
+  }
+  return 0.0;
+}
+
+// Tried one by one: where the motion is slower than a corner allows, braking need not be over there.
+bool PathPlan::choose_valleys() {
+  expect();
+  double gain_s = 0.0;
+  double whole_s = 0.0;
+  for (std::size_t k = 0; k < end(); ++k) {
+    whole_s += duration_s(k, courses_[k].expected.speed_squared, courses_[k + 1].expected.speed_squared);
+  }
+  for (int n = 0; n < valley_rounds; ++n) {
+    bool is_any = false;
+    for (std::size_t k = 1; k < end(); ++k) {
+      if (!stations_[k].valley || ends_in_stop(k)) continue;
+      const double less_s = brake_through(k);
+      gain_s += less_s;
+      is_any = is_any || less_s > 0.0;
+    }
+    if (gain_s <= least_gain * whole_s) return false;
+    if (!is_any) break;
+    for (int round = 0; round < rounds && lay_tangents(); ++round) {
+      make_sets(false);
+      expect();
+    }
+  }
+  return true;
 }
 
 // Those that differ from the sets that approach valleys, as far as these are not those of the plan before.
@@ -264,7 +355,7 @@ double PathPlan::best_passing(std::size_t index) const noexcept {
     for (int n = 0; n < passing_stations && !ends_in_stop(k); ++n, ++k) {
       if (k > index && stations_[k].valley) break;
       const PathState next = fastest_after(k, state);
-      time_s += 2.0 * stations_[k].length / (std::sqrt(state.speed_squared) + std::sqrt(next.speed_squared) + 1e-9);
+      time_s += duration_s(k, state.speed_squared, next.speed_squared);
       state = next;
     }
     if (time_s < least_s) {

@@ -25,6 +25,10 @@ class PathPlan {
   /// reach.
   void make(const PathStart& start, const AlongPath& state, std::uint64_t end, const FeedRatios& ratios);
 
+  /// Lets the motion brake through corners where that is expected to take less time; whether that is worth while. It is
+  /// only expected: compare the motion of this plan with that of the one before.
+  bool choose_valleys();
+
   /// Nothing of the plan before holds for what comes.
   void forget() noexcept {
     count_ = 0;
@@ -80,7 +84,10 @@ class PathPlan {
   void make_stations();
   void keep(const Station& station, std::size_t before, std::size_t before_end) noexcept;
   [[nodiscard]] bool is_changed(std::size_t index) const noexcept;
+  bool make_set(std::size_t index) noexcept;
   void make_sets(bool is_first) noexcept;
+  [[nodiscard]] double duration_s(std::size_t index, double squared, double squared_after) const noexcept;
+  double brake_through(std::size_t valley);
   void make_slow_sets() noexcept;
   [[nodiscard]] Making making_of(std::size_t index) const noexcept;
   [[nodiscard]] bool is_approach(std::size_t index) const noexcept;

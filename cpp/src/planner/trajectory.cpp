@@ -62,9 +62,7 @@ struct Run {
   bool ends = true;
 };
 
-Run run(SegmentRing& segments, std::size_t count, const AxisLimits& limits, double period_s) {
-  PathPlan plan(segments, limits, period_s, 0);
-  plan.make({}, {}, count, {});
+Run follow(const PathPlan& plan, const SegmentRing& segments, std::size_t count, double period_s) {
   PathMotion motion(plan, period_s);
   Run run{{segments[0].segment.start_mm}, {0}, count};
   Vector3 seen = run.points.back();
@@ -148,6 +146,31 @@ double worst_of(const Run& run, const TrajectoryLimits& limits, double period_s,
   return std::max(worst, fastest);
 }
 
+// A motion within the limits: planned with less acceleration and jerk where it exceeds one, until it keeps them.
+Run run_within(SegmentRing& segments, std::size_t count, const TrajectoryLimits& limits, double period_s) {
+  double feed_share = 1.0;
+  for (int n = 0; n < most_plans; ++n) {
+    AxisLimits asked;
+    for (std::size_t i = 0; i < axis_count; ++i) {
+      const auto axis = static_cast<Eigen::Index>(i);
+      asked.speed[i] = feed_share * limits.max_feed_mm_per_s[axis];
+      asked.acceleration[i] = limits.max_acceleration_mm_per_s2[axis];
+      asked.jerk[i] = limits.max_jerk_mm_per_s3[axis];
+    }
+    PathPlan plan(segments, planned_limits(asked, period_s), period_s, 0);
+    plan.make({}, {}, count, {});
+    Run found = follow(plan, segments, count, period_s);
+    if (worst_of(found, limits, period_s, segments, feed_share) > kept) continue;
+    if (plan.choose_valleys()) {
+      Run other = follow(plan, segments, count, period_s);
+      const bool is_faster = other.ends && other.points.size() < found.points.size();
+      if (is_faster && worst_of(other, limits, period_s, segments, feed_share) <= kept) return other;
+    }
+    return found;
+  }
+  throw Error(ErrorKind::numeric, "no motion within the limits was found");
+}
+
 void check(const TrajectoryLimits& limits, double period_s) {
   require_period(period_s);
   require_not_below_zero(limits.contour_tolerance_mm, "contour tolerance", "mm");
@@ -172,25 +195,13 @@ TimeOptimalMotion time_optimal_motion(const Path& path, const TrajectoryLimits& 
     samples.positions_mm.resize(0, axis_count);
     return motion;
   }
-  double feed_share = 1.0;
-  for (int n = 0; n < most_plans; ++n) {
-    AxisLimits asked;
-    for (std::size_t i = 0; i < axis_count; ++i) {
-      const auto axis = static_cast<Eigen::Index>(i);
-      asked.speed[i] = feed_share * limits.max_feed_mm_per_s[axis];
-      asked.acceleration[i] = limits.max_acceleration_mm_per_s2[axis];
-      asked.jerk[i] = limits.max_jerk_mm_per_s3[axis];
-    }
-    const Run found = run(segments, count, planned_limits(asked, period_s), period_s);
-    if (worst_of(found, limits, period_s, segments, feed_share) > kept) continue;
-    samples.positions_mm.resize(std::ssize(found.points), axis_count);
-    for (std::size_t k = 0; k < found.points.size(); ++k) {
-      samples.positions_mm.row(static_cast<Eigen::Index>(k)) = found.points[k];
-      motion.segments.push_back(numbers[found.segments[k]]);
-    }
-    return motion;
+  const Run found = run_within(segments, count, limits, period_s);
+  samples.positions_mm.resize(std::ssize(found.points), axis_count);
+  for (std::size_t k = 0; k < found.points.size(); ++k) {
+    samples.positions_mm.row(static_cast<Eigen::Index>(k)) = found.points[k];
+    motion.segments.push_back(numbers[found.segments[k]]);
   }
-  throw Error(ErrorKind::numeric, "no motion within the limits was found");
+  return motion;
 }
 
 Samples time_optimal_trajectory(const Path& path, const TrajectoryLimits& limits, double period_s) {
