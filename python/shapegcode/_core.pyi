@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'CommandPlanner', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerEvent', 'ControllerKind', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedOf', 'FeedRate', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'JogResult', 'LimitedFeed', 'LinearBlock', 'LinearPlant', 'LinuxcncSlowing', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OffsetLimits', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlannerRules', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'SegmentRules', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'controlled_motion', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_difference_mm', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_blocks', 'linear_distance_mm', 'linear_duration_s', 'linear_end_speed', 'linear_model', 'linear_positions_mm', 'linuxcnc_slowing', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_optimal_trajectory', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'CommandPlanner', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerEvent', 'ControllerKind', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExpandedProgram', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedOf', 'FeedRate', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'JogResult', 'LimitedFeed', 'LinearBlock', 'LinearPlant', 'LinuxcncOptions', 'LinuxcncProgram', 'LinuxcncSlowing', 'LinuxcncToolTable', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OffsetLimits', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlannerRules', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'SegmentRules', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'controlled_motion', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_difference_mm', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_blocks', 'linear_distance_mm', 'linear_duration_s', 'linear_end_speed', 'linear_model', 'linear_positions_mm', 'linuxcnc_peck_clearance_mm', 'linuxcnc_slowing', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_linuxcnc', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_optimal_trajectory', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -7101,6 +7101,165 @@ class ProgramComparison:
         """
         Largest distance of the paths of a cut that both have, seen from either, mm.
         """
+class ExpandedProgram:
+    """
+    A program for another control, in FANUC's words.
+    """
+    @property
+    def files(self) -> list[str]:
+        """
+        Names of other files whose lines are in it.
+        """
+    @property
+    def line_files(self) -> list[int]:
+        """
+        For each line its file: 0 the source, n the n-th of `files`; empty: all of the source.
+        """
+    @property
+    def lines(self) -> list[int]:
+        """
+        For each line of the text the line of the source, from 1.
+        """
+    @property
+    def notes(self) -> list[tuple[int, str]]:
+        """
+        Line of the source and text of each note, ascending by line.
+        """
+    @property
+    def text(self) -> bytes:
+        """
+        From one line `%` to the other.
+        """
+class LinuxcncToolTable:
+    """
+    The tools by number.
+    """
+    def __init__(self, file: str, unit: str, unit_mm: typing.SupportsFloat | typing.SupportsIndex, tools: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, tuple[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        """
+        `tools`: by number the offsets of X, Y, Z and the diameter, mm.
+        """
+class LinuxcncOptions:
+    """
+    What the machine says of a LinuxCNC program.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def adds_points(self) -> bool:
+        """
+        Numbers of whole units need a point in the expanded program.
+        """
+    @adds_points.setter
+    def adds_points(self, arg0: bool) -> None:
+        ...
+    @property
+    def block_skip(self) -> bool | None:
+        """
+        Switch of /: on, off, or None: not known.
+        """
+    @block_skip.setter
+    def block_skip(self, arg1: bool | None) -> None:
+        ...
+    @property
+    def file(self) -> str:
+        """
+        Name of the program in messages.
+        """
+    @file.setter
+    def file(self, arg0: str) -> None:
+        ...
+    @property
+    def find_subroutine(self) -> bool:
+        """
+        Called with the name of a subroutine that the program does not hold; gives (name, bytes) or None.
+        """
+    @find_subroutine.setter
+    def find_subroutine(self, arg1: typing.Any) -> None:
+        ...
+    @property
+    def first_codes(self) -> str:
+        """
+        Set what LinuxCNC begins in, where the machine begins otherwise.
+        """
+    @first_codes.setter
+    def first_codes(self, arg0: str) -> None:
+        ...
+    @property
+    def inch(self) -> bool:
+        """
+        Unit in force at the first line.
+        """
+    @inch.setter
+    def inch(self, arg0: bool) -> None:
+        ...
+    @property
+    def machine_unit_mm(self) -> float:
+        """
+        Length of the machine's own unit.
+        """
+    @machine_unit_mm.setter
+    def machine_unit_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_expansion_bytes(self) -> int:
+        """
+        Bytes by which the expanded program may be larger than the program.
+        """
+    @max_expansion_bytes.setter
+    def max_expansion_bytes(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_steps(self) -> int:
+        """
+        Lines executed, not counting one for each line.
+        """
+    @max_steps.setter
+    def max_steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tool_length_mm(self) -> dict[int, float]:
+        """
+        By H number, before those of the table.
+        """
+    @tool_length_mm.setter
+    def tool_length_mm(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def tool_table(self) -> LinuxcncToolTable | None:
+        """
+        None: there is none.
+        """
+    @tool_table.setter
+    def tool_table(self, arg0: LinuxcncToolTable | None) -> None:
+        ...
+    @property
+    def work_offset(self) -> int:
+        """
+        In force at the first line, 1 ... 9: G54 ... G59.3.
+        """
+    @work_offset.setter
+    def work_offset(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def work_offsets_mm(self) -> dict[int, typing.Annotated[list[float], "FixedSize(3)"]]:
+        """
+        By work offset, 1 ... 9.
+        """
+    @work_offsets_mm.setter
+    def work_offsets_mm(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]) -> None:
+        ...
+class LinuxcncProgram:
+    """
+    A LinuxCNC program in FANUC's words.
+    """
+    @property
+    def expanded(self) -> ExpandedProgram:
+        ...
+    @property
+    def path_tolerance_mm(self) -> tuple[float | None, float | None] | None:
+        """
+        The one P and Q of all its G64, mm, None for a word that is left out; None: there are several, or none.
+        """
 def acceleration_filters(model: FanucModel) -> list[Fir]:
     """
     Filters behind interpolation in order, none, one or two.
@@ -7731,6 +7890,10 @@ def rapid_time_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float
     """
     Time of a rapid from rest to rest without the wait for in-position, s (paper 004, eq. 6 to 16). `travel_mm`: signed travel of each axis, shape (3,). Raises ArgumentError on a model that no controller can have.
     """
+def read_linuxcnc(text: bytes, options: LinuxcncOptions) -> LinuxcncProgram:
+    """
+    Executes a LinuxCNC program as its interpreter does, and writes what it executes in FANUC's words. Raises ProgramError with the file (empty: the program itself), line and column of what is not read.
+    """
 def read_parts(parts: list, options: ReaderOptions) -> ProgramText:
     """
     The same of a text in parts (a list of bytes); the list is empty behind it, so that the text stands in memory once.
@@ -7989,3 +8152,4 @@ def zv_on_grid(mode: Mode, period_s: typing.SupportsFloat | typing.SupportsIndex
     Source: this project.
     """
 __version__: str = '0.1.0'
+linuxcnc_peck_clearance_mm: float = 0.254

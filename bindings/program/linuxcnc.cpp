@@ -1,0 +1,101 @@
+#include <pybind11/stl.h>
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "register.hpp"
+#include "shapegcode/linuxcnc_program.hpp"
+
+namespace py = pybind11;
+
+namespace shapegcode::bindings {
+namespace {
+
+using Subroutine = std::pair<std::string, std::string>;
+
+/// Asks Python for the file of a subroutine; the name is Latin-1, as the text.
+auto subroutine_finder(py::object find) {
+  return [find = std::move(find)](const std::string& name) -> std::optional<Subroutine> {
+    const py::gil_scoped_acquire gil;
+    const py::object found = find(py::bytes(name).attr("decode")("latin-1"));
+    if (found.is_none()) return std::nullopt;
+    const auto [file, text] = found.cast<std::pair<std::string, py::bytes>>();
+    return Subroutine{file, static_cast<std::string>(text)};
+  };
+}
+
+LinuxcncToolTable tool_table(std::string file, std::string unit, double unit_mm,
+                             const std::map<std::int64_t, std::pair<std::array<double, 3>, double>>& tools) {
+  LinuxcncToolTable table{.tools = {}, .file = std::move(file), .unit = std::move(unit), .unit_mm = unit_mm};
+  for (const auto& [number, tool] : tools) table.tools[number] = {tool.first, tool.second};
+  return table;
+}
+
+void define_options(py::module_& module) {
+  py::class_<LinuxcncToolTable>(module, "LinuxcncToolTable", "The tools by number.")
+      .def(py::init(&tool_table), py::arg("file"), py::arg("unit"), py::arg("unit_mm"), py::arg("tools"),
+           "`tools`: by number the offsets of X, Y, Z and the diameter, mm.");
+  py::class_<LinuxcncOptions>(module, "LinuxcncOptions", "What the machine says of a LinuxCNC program.")
+      .def(py::init<>())
+      .def_readwrite("file", &LinuxcncOptions::file, "Name of the program in messages.")
+      .def_readwrite("first_codes", &LinuxcncOptions::first_codes,
+                     "Set what LinuxCNC begins in, where the machine begins otherwise.")
+      .def_readwrite("inch", &LinuxcncOptions::inch, "Unit in force at the first line.")
+      .def_readwrite("work_offset", &LinuxcncOptions::work_offset,
+                     "In force at the first line, 1 ... 9: G54 ... G59.3.")
+      .def_readwrite("work_offsets_mm", &LinuxcncOptions::work_offsets_mm, "By work offset, 1 ... 9.")
+      .def_readwrite("tool_table", &LinuxcncOptions::tool_table, "None: there is none.")
+      .def_readwrite("tool_length_mm", &LinuxcncOptions::tool_length_mm, "By H number, before those of the table.")
+      .def_readwrite("machine_unit_mm", &LinuxcncOptions::machine_unit_mm, "Length of the machine's own unit.")
+      .def_readwrite("adds_points", &LinuxcncOptions::adds_points,
+                     "Numbers of whole units need a point in the expanded program.")
+      .def_property(
+          "block_skip",
+          [](const LinuxcncOptions& self) -> std::optional<bool> {
+            if (self.block_skip == BlockSkip::unknown) return std::nullopt;
+            return self.block_skip == BlockSkip::on;
+          },
+          [](LinuxcncOptions& self, std::optional<bool> is_on) {
+            self.block_skip = !is_on ? BlockSkip::unknown : *is_on ? BlockSkip::on : BlockSkip::off;
+          },
+          "Switch of /: on, off, or None: not known.")
+      .def_readwrite("max_steps", &LinuxcncOptions::max_steps, "Lines executed, not counting one for each line.")
+      .def_readwrite("max_expansion_bytes", &LinuxcncOptions::max_expansion_bytes,
+                     "Bytes by which the expanded program may be larger than the program.")
+      .def_property(
+          "find_subroutine", [](const LinuxcncOptions& self) { return static_cast<bool>(self.find_subroutine); },
+          [](LinuxcncOptions& self, py::object find) { self.find_subroutine = subroutine_finder(std::move(find)); },
+          "Called with the name of a subroutine that the program does not hold; gives (name, bytes) or None.");
+}
+
+}  // namespace
+
+void register_linuxcnc(py::module_& module) {
+  define_options(module);
+  py::class_<LinuxcncProgram>(module, "LinuxcncProgram", "A LinuxCNC program in FANUC's words.")
+      .def_readonly("expanded", &LinuxcncProgram::expanded)
+      .def_property_readonly(
+          "path_tolerance_mm",
+          [](const LinuxcncProgram& self) -> std::optional<std::pair<std::optional<double>, std::optional<double>>> {
+            if (!self.path_tolerance) return std::nullopt;
+            return std::pair(self.path_tolerance->p_mm, self.path_tolerance->q_mm);
+          },
+          "The one P and Q of all its G64, mm, None for a word that is left out; None: there are several, or none.");
+  module.attr("linuxcnc_peck_clearance_mm") = linuxcnc_peck_clearance_mm;
+  module.def(
+      "read_linuxcnc",
+      [](const py::bytes& text, const LinuxcncOptions& options) {
+        const auto view = static_cast<std::string_view>(text);
+        const py::gil_scoped_release release;
+        return read_linuxcnc(view, options);
+      },
+      py::arg("text"), py::arg("options"),
+      "Executes a LinuxCNC program as its interpreter does, and writes what it executes in FANUC's words. Raises "
+      "ProgramError with the file (empty: the program itself), line and column of what is not read.");
+}
+
+}  // namespace shapegcode::bindings
