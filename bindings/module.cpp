@@ -31,4 +31,6 @@ PYBIND11_MODULE(_core, module) {
   register_milling(module);
   register_feed_schedule(module);
   register_compare(module);
+  register_expanded_program(module);
+  register_siemens(module);
 }

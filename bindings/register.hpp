@@ -32,5 +32,7 @@ void register_engagement(pybind11::module_& module);
 void register_milling(pybind11::module_& module);
 void register_feed_schedule(pybind11::module_& module);
 void register_compare(pybind11::module_& module);
+void register_expanded_program(pybind11::module_& module);
+void register_siemens(pybind11::module_& module);
 
 }  // namespace shapegcode::bindings
