@@ -33,4 +33,5 @@ PYBIND11_MODULE(_core, module) {
   register_compare(module);
   register_expanded_program(module);
   register_linuxcnc(module);
+  register_siemens(module);
 }

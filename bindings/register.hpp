@@ -34,5 +34,6 @@ void register_feed_schedule(pybind11::module_& module);
 void register_compare(pybind11::module_& module);
 void register_expanded_program(pybind11::module_& module);
 void register_linuxcnc(pybind11::module_& module);
+void register_siemens(pybind11::module_& module);
 
 }  // namespace shapegcode::bindings
