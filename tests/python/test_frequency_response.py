@@ -121,7 +121,7 @@ def test_the_driving_point_of_several_is_taken_and_coherence_is_read(tmp_path: P
     assert found.responses[0].coherence is not None
     other = identify(path, ReadOptions(response_columns=("1",)))
     check(other, "x")
-    assert any("the sign is turned" in warning for warning in other.warnings)
+    assert any("the sign is reversed" in warning for warning in other.warnings)
     with pytest.raises(RecordError, match=r"--response-column 9: datasets with frequency responses are 1, 2"):
         identify(path, ReadOptions(response_columns=("9",)))
 

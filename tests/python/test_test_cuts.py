@@ -503,7 +503,7 @@ def test_bad_arguments_of_the_fit_are_refused(tmp_path: Path, capsys: pytest.Cap
         ([file, f"1={file}", *cut], "pass 1 is given twice"),
         ([file, *cut, "--edge-forces"], "edge forces and chip thickness go with a taper"),
         ([file, *cut, "-o", str(tmp_path / "c.toml")], "describes a corner: -o goes with a taper"),
-        ([file, "--cut", file], "no JSON"),
+        ([file, "--cut", file], "not valid JSON"),
         ([file, *cut, "--json", file], "would overwrite"),
         ([file, *cut], "a table of means: a corner needs"),
     ):
