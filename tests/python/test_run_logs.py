@@ -344,7 +344,7 @@ def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
     refused(tmp_path, LOG.replace("2026-03-02T", "heute "), r"run.txt:1: 'heute 08:00:00.0000000Z' is not a time stamp")
     refused(
         tmp_path, LOG.replace("Block_Number", "Satzzaehler"),
-        r"run.txt:13: no line numbers of the program: searched for block_number, line_number.*the log has Current_Tool, "
+        r"run.txt:13: no line numbers of the program: searched for block_number, .*the log has Current_Tool, "
         r"Feed_Override, Satzzaehler.*items = \{ block",
     )  # fmt: skip
     refused(
