@@ -114,7 +114,7 @@ def test_a_hold_is_found_and_left_out(tmp_path: Path) -> None:
     run = next(run for run in clock.runs if run.log.endswith("p2-0.txt"))
     assert run.held_s == pytest.approx(17.0, abs=1.0)
     assert abs(run.error_percent or 99.0) < 2.0
-    assert any("held at" in warning for warning in clock.warnings)
+    assert any("hold at" in warning for warning in clock.warnings)
 
 
 def later(row: str, seconds: float) -> str:

@@ -227,7 +227,7 @@ def test_refusal_shows_the_nearest() -> None:
     assert float(match[1]) == pytest.approx(100.0 * least_possible(PAPER_BANDS, 0.005, 4), rel=0.005)
     assert least_possible(PAPER_BANDS, 0.005, round(int(match[2]) / 5)) <= 0.01
     assert least_possible(PAPER_BANDS, 0.005, round(int(match[2]) / 5) - 2) > 0.01
-    with pytest.raises(DesignError, match=r"nor does 40 ms; .* reaches"):
+    with pytest.raises(DesignError, match=r"40 ms do not; .* reaches"):
         minimax_robust(PAPER_BANDS, 0.005, vibration_limit=0.0001, max_duration_s=0.01)
 
 

@@ -672,7 +672,7 @@ def test_a_cut_universal_file(tmp_path: Path) -> None:
     pyuff.UFF(str(path)).write_sets([dataset(RINGING, 12)], mode="add")
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     path.write_text("".join(lines[:20] + lines[-1:]), encoding="utf-8")
-    with pytest.raises(RecordError, match="values, its header says 200: the file is truncated"):
+    with pytest.raises(RecordError, match="values, but 200 by its header: the file is truncated"):
         read_records(path)
     path.write_text("".join(lines[:20]), encoding="utf-8")
     with pytest.raises(RecordError, match="no time record: the file contains no dataset"):

@@ -32,7 +32,7 @@ _FEWEST_PARTS = 2
 
 
 def is_capture(path: Path) -> bool:
-    """Whether a file holds commands and actual positions of axes."""
+    """Whether a file contains commands and actual positions of axes."""
     with open_file(path) as file:
         head = file.read(4096)
     return is_edge_json(head) or is_servo_log(path, head)
@@ -62,7 +62,7 @@ def _axis_of(source: str, traces: Sequence[ServoTrace], axis: str | None) -> Ser
     wanted = "add --axis x, y or z"
     if axis is not None:
         wanted = f"{'several are' if named else 'no linear one is'} called {axis.upper()}"
-    raise RecordError(f"{source}: holds command and actual position of {names}: {wanted}")
+    raise RecordError(f"{source}: contains command and actual position of {names}: {wanted}")
 
 
 def _response(

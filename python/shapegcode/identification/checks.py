@@ -56,7 +56,7 @@ class Prepared:
     usable: tuple[Usable, ...]
     refused: tuple[RecordUse, ...]  # the others
     warnings: tuple[str, ...]  # for the user
-    notes: tuple[str, ...]  # what was left out of the files
+    notes: tuple[str, ...]  # parts of the files that were ignored
 
     @property
     def records(self) -> tuple[Record, ...]:

@@ -66,7 +66,7 @@ def identify(
         response: what a sensor measured at these instants, shape (n,), in the unit of `quantity`. Read options are
             taken here too.
         force: of the hammer at these instants in N, shape (n,); None: a free decay.
-        options: what the files do not say.
+        options: information missing in the files.
         quantity: of `response`: "acceleration" in m/s², "velocity" in m/s or "displacement" in m.
         max_modes: largest number of modes; None: 40 over frequency, 8 over time.
         modes: number of modes; None: by information criterion.
@@ -113,7 +113,7 @@ def identify(
         raise ArgumentError("across: a sweep needs one record of all axes, whose other channels are used")
     options = options or ReadOptions()
     if sweep is not None and (stops or start_s is not None or options.ignore_force):
-        raise ArgumentError("a sweep with its program has neither a start of a decay nor stops: leave them out")
+        raise ArgumentError("a sweep with its program has neither a start of a decay nor stops: omit them")
     found = _identified(
         sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is not False, strict=strict
     )
@@ -452,7 +452,7 @@ def _thinned_note(ready: Prepared, problem: FitProblem, band_hz: tuple[float, fl
     rates = f"{1.0 / ready.records[0].period_s:.6g} samples per second are decimated to {1.0 / problem.period_s:.6g}"
     if band_hz is not None:
         return [
-            f"{rates}, which the band up to {band_hz[1]:g} Hz and what stands out of the response above it need, "
+            f"{rates}, enough for the band up to {band_hz[1]:g} Hz and response peaks above it, "
             "with one filter for force and response"
         ]
     return [

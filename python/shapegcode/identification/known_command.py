@@ -407,7 +407,7 @@ class _Clock:
         if missing:
             begin = self.windows[missing[0]][0]
             what = f"in {len(missing)} of {len(self.windows)} parts"
-            cause = "little of it was recorded, or the control does not move as its machine file says"
+            cause = "little of it was recorded, or the control does not move as in its machine file"
             if missing == list(range(missing[0], len(self.windows))):
                 what = f"from {begin:.1f} s on"
                 cause = (
@@ -465,7 +465,7 @@ def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
 
     lags = moved(np.zeros(len(rows)), each, _LONGEST_LAG_S)
     # A rise dominates the other parts' harmonics in the band of its fall and determines the time between the two; all
-    # parts first get the median of that. Then both move together: each alone would be held in place by the other.
+    # parts first get the median of that. Then both move together: alone, each would be kept in place by the other.
     between = [lags[pair[1]] - lags[pair[0]] for pair in pairs if len(pair) > 1]
     lags = np.asarray((float(np.median(between)) if between else 0.0) * (rows - np.mean(rows)), dtype=np.float64)
     lags = moved(lags, each, _IRREGULAR_S)

@@ -52,7 +52,7 @@ def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:
     """Force and response over time, with the model's response; the first ones of many taps.
 
     Args:
-        found: what was identified.
+        found: the identification.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -90,7 +90,7 @@ def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
     """Frequency response, measured and of the model: magnitude, phase, coherence.
 
     Args:
-        found: what was identified, from taps or from frequency responses.
+        found: an identification from taps or from frequency responses.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -130,7 +130,7 @@ def plot_stabilisation(found: Identification, ax: Axes | None = None) -> Axes:
     """Poles by the order of the model over the spectrum, and the chosen order.
 
     Args:
-        found: what was identified.
+        found: the identification.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -180,7 +180,7 @@ def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
     band's filter.
 
     Args:
-        found: what was identified, with a mode or more.
+        found: an identification with a mode or more.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -220,7 +220,7 @@ def plot_spectrum(found: Identification, ax: Axes | None = None) -> Axes:
     """Amplitude spectrum of a decay with its peaks labelled.
 
     Args:
-        found: what was identified, from decays.
+        found: an identification from decays.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -246,7 +246,7 @@ def plot_sweep(found: Identification, ax: Axes | None = None) -> Axes:
     """Amplitude of a sweep relative to its command, measured and modelled.
 
     Args:
-        found: what was identified, from a sweep.
+        found: an identification from a sweep.
         ax: where to draw; None: a new figure.
 
     Returns:

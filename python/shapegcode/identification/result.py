@@ -327,7 +327,7 @@ class Identification(Result):
         if not self.modes:
             return "shapegcode identify --tap-plan describes the test"
         if self._unsupported or self.doubt:
-            return "tap again, longer or more often, for what is not supported (shapegcode identify --tap-plan)"
+            return "tap again, longer or more often, for the unsupported modes (shapegcode identify --tap-plan)"
         if self.machine_file is not None:
             return f"shapegcode shaper -m {self.machine_file.path}"
         if self.sweep is not None and self.sweep.command not in ("", self.sweep.source):
@@ -343,7 +343,7 @@ class Identification(Result):
         return "\n".join(lines)
 
     def tables(self) -> list[Table]:
-        """Modes with their intervals; what is not supported; the records."""
+        """Tables of modes with intervals; refused modes; records."""
         check, caption = self.mass_check, ""
         if check is not None:
             caption = (

@@ -126,7 +126,7 @@ class EdgeCapture:
     """A capture of a Sinumerik control, from `read_edge_json`.
 
     Units are those of the control: positions in mm (rotary axes in degrees), speeds per second, torques in Nm (N for a
-    linear motor). DES_POS is the command behind the fine interpolator, ENC_POS the active encoder, CONT_DEV the lag
+    linear motor). DES_POS is the command after the fine interpolator, ENC_POS the active encoder, CONT_DEV the lag
     minus that of the control's axis model, VEL_FFW the velocity feed-forward.
 
     Attributes:

@@ -154,13 +154,13 @@ def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, fl
     if found is not None:
         measures = next(each for each in _RESPONSES if each == found[0].measures)
         if options.quantity not in {None, measures}:
-            raise RecordError(f"{where}: {label!r} is of {measures}, --quantity says {options.quantity}: must agree")
+            raise RecordError(f"{where}: {label!r} is of {measures}, --quantity is {options.quantity}: must agree")
         return measures, found[1], []
     if named is not None:
         si = {"acceleration": "(m/s²)/N", "velocity": "(m/s)/N", "displacement": "m/N"}[named]
         return named, 1.0 / over, [f"{where}: the response has no unit: {si} is assumed"]
     raise RecordError(
-        f"{where}: cannot tell whether it is displacement, velocity or acceleration over force: needed is a unit such "
+        f"{where}: unclear whether it is displacement, velocity or acceleration over force: needed is a unit such "
         "as m/N, µm/N, (m/s)/N, (m/s²)/N or g/N in the header, or --response-unit (of the response, over N), or "
         "--quantity"
     )

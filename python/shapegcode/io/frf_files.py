@@ -221,7 +221,7 @@ def read_frf_mat(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
     name = next((each for each in held if each.lower() in (*_FREQUENCIES, *_ANGULAR)), None)
     if name is None:
         raise RecordError(
-            f"{path}: no vector of frequencies (f, freq, frequency, or w in rad/s); the file holds {listed}"
+            f"{path}: no vector of frequencies (f, freq, frequency, or w in rad/s); the file contains {listed}"
         )
     frequency = np.ravel(np.asarray(held[name], dtype=np.float64))
     if name.lower() in _ANGULAR:
@@ -287,13 +287,13 @@ def _response(path: Path, held: dict[str, Any], lines: int, options: ReadOptions
         if len(complex_ones) != 1:
             what = "no complex variable" if not complex_ones else f"{len(complex_ones)} complex variables"
             raise RecordError(
-                f"{path}: {what} of {lines} lines: name one with --response-column NAME (or NAME:2 for its 2nd "
-                f"column); the file holds {listed}"
+                f"{path}: {what} of {lines} lines: choose one with --response-column NAME (or NAME:2 for its 2nd "
+                f"column); the file contains {listed}"
             )
         wanted = complex_ones[0]
     name, _, column = wanted.partition(":")
     if name not in held or isinstance(held[name], str):
-        raise RecordError(f"{path}: --response-column {name!r}: no such variable; the file holds {listed}")
+        raise RecordError(f"{path}: --response-column {name!r}: no such variable; the file contains {listed}")
     values = np.asarray(held[name], dtype=np.complex128)
     if values.ndim == 1 and not column:
         columns = values[:, None]

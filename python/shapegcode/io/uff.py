@@ -179,7 +179,7 @@ class UffFile:
         if label is not None:
             if system is not None and not np.isclose(system, label.factor, rtol=1e-4):
                 self.warnings.append(
-                    f"dataset {where.rsplit(' ', 1)[1]}: its unit is {label.name}, dataset 164 says "
+                    f"dataset {where.rsplit(' ', 1)[1]}: its unit is {label.name}, dataset 164 has "
                     f"{system:g} SI units: the label is used"
                 )
             return label.factor
@@ -216,7 +216,7 @@ def whole_values(where: str, data: dict[str, Any]) -> npt.NDArray[Any]:
     values = np.asarray(data["data"])
     if len(values) != int(data["num_pts"]):
         raise RecordError(
-            f"{where}: {len(values)} values, its header says {data['num_pts']}: the file is truncated or damaged"
+            f"{where}: {len(values)} values, but {data['num_pts']} by its header: the file is truncated or damaged"
         )
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:

@@ -139,7 +139,7 @@ def _limit(value: float | None) -> float:
 
 
 BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)  # both rules of block timing
-PLANTS = ("modal", "feed-drive")  # modes behind an ideal servo; motor, ball screw and table with their servo loops
+PLANTS = ("modal", "feed-drive")  # ideal servo followed by modes; motor, ball screw and table with their servo loops
 _DRIVE_REST_S = 0.5  # time after a stop in which the error of feed drives is evaluated
 _LEAST_DECAY_PER_S = 0.01  # below it a mode counts as undamped
 

@@ -329,7 +329,7 @@ def plant_response(
     Args:
         command_mm: set-points in mm, shape (n_samples, n_axes), one per period.
         modes: for each axis core or machine-file modes; none: the axis follows its command. A machine
-            stands for the modes of its X, Y, Z, as many as the command has axes. Modes with tables over a position are
+            is used for its modes of X, Y, Z, as many as the command has axes. Modes with tables over a position are
             nominal.
         period_s: time between samples in s, above 0.
 

@@ -155,7 +155,7 @@ class Program:
         """Read an emitted program from the parts of its text.
 
         Args:
-            parts: parts of the text; the list is emptied, so that memory holds the text once.
+            parts: parts of the text; the list is emptied, so that the text is in memory only once.
             machine: whose controller reads it.
             source: names the text in messages.
             probe_lines: as in `from_text`.

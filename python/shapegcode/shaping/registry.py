@@ -110,7 +110,7 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "minimal", "one impulse more than modes",
         "Park, Hong and Danielson 2009 (paper 002), eq. 4-17; searches of this project",
-        "one to six modes, damped or not, at continuous times (on a grid the polynomial stands for it); exact at the "
+        "one to six modes, damped or not, at continuous times (on a grid replaced by the polynomial); exact at the "
         "nominal frequencies only; impulses may be negative", True, False, solvers.solve_minimal,
     ),
     Family(

@@ -121,7 +121,7 @@ def _hints(task: Task, limit: float, max_duration_s: float) -> str:
             text += f"; {no_exact(task, most * task.period_s)}"
         longest = min(_LONGER * most, max(_HINT_PERIODS, most))
         enough = smallest_below(task, limit, longest, too_few=most, precision=_HINT_PRECISION)
-        text += f"; {ms(enough * task.period_s)} suffices" if enough else f"; nor does {ms(longest * task.period_s)}"
+        text += f"; {ms(enough * task.period_s)} suffices" if enough else f"; {ms(longest * task.period_s)} do not"
     return f"{text}; {_other_period(task, limit, max_duration_s)}"
 
 

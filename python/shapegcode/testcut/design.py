@@ -335,7 +335,7 @@ def write_test_cut(design: CutDesign, file: str | Path, number: int = 7101) -> C
     """Write the program of a test cut, and next to it the side file (JSON) that `fit_test_cut` reads.
 
     Args:
-        design: what to cut.
+        design: the test cut.
         file: program file; the side file has its name with the suffix ``.json``.
         number: program number (O word).
 

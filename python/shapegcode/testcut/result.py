@@ -231,7 +231,7 @@ class CornerPass:
     measured_peak_n: float  # largest magnitude, as recorded
     expected_mean_n: float  # largest mean of the force law
     expected_peak_n: float  # largest magnitude of the force law
-    record: Revolutions = field(metadata=hidden())  # what was recorded, by revolution
+    record: Revolutions = field(metadata=hidden())  # recorded means by revolution
     forecast: Expected = field(metadata=hidden())  # expected by the force law
 
 

@@ -189,7 +189,7 @@ class CycleTime(TimeParts, Result):
         cutting, programmed = sum(r.cutting_s for r in self.regions), sum(r.programmed_s for r in self.regions)
         if cutting - programmed > _NOTABLE * self.cycle_time_s:
             return (
-                f"cutting takes {cutting / programmed:.2f} times what its feeds say: check for feeds above the limits "
+                f"cutting takes {cutting / programmed:.2f} times its time by feed: check for feeds above the limits "
                 "of the axes, and for blocks of a few interpolation periods, which are rounded up to whole ones."
             )
         worst = max(_REMEDIES, key=lambda part: float(getattr(self, part)))

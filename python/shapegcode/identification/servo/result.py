@@ -65,7 +65,7 @@ class ServoAxis:
         deviation_rms: RMS of the control's contour deviation; null if not recorded.
         models: models compared with the record; none if the axis kept its speed.
         parameters: of the dead time and servo lag, then of the drive and of the torque.
-        note: what the record cannot determine, or no model explains.
+        note: undetermined or unexplained behaviour.
         curves: data to plot.
     """
 

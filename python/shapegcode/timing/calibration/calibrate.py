@@ -249,7 +249,7 @@ def _warnings(row: CalibrationRun) -> Iterator[str]:
             f"{row.holds[0]}: the program may have been changed after the run"
         )
     else:
-        yield from (f"{row.name}: held at {hold}" for hold in row.holds)
+        yield from (f"{row.name}: hold at {hold}" for hold in row.holds)
 
 
 def _row(run: ObservedRun, learned: _Calibration, other: _Calibration | None) -> CalibrationRun:
@@ -353,7 +353,7 @@ def _held_rapids(run: ObservedRun) -> list[_Hold]:
         if found and begin - (found[-1][0] + found[-1][1]) < 0.5:
             found[-1] = (found[-1][0], float(end) - found[-1][0], found[-1][2])
         else:
-            found.append((float(begin), float(end - begin), "rapids held by their override"))
+            found.append((float(begin), float(end - begin), "rapids stopped by their override"))
     return [hold for hold in found if hold[1] > 1.0]
 
 
