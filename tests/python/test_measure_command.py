@@ -76,10 +76,11 @@ def test_table_like_a_measuring_report(
     assert main(words) == 0
     said = capsys.readouterr().out
     for text in (
-        "2 arc R20, line 6", "inside wall mm (µm off)", "18.500", "cut-width band left / right µm",
+        "2 arc R20, line 6", "inside wall mm (deviation µm)", "18.500", "cut-width band left / right µm",
         "Ra left / right µm", "settled to 1 µm X / Y / Z ms", "next: ",
-        "part.nc: simulated with the controller's own motion, measured against its own path, to compare the shaped",
-        "shaped.nc: within tolerance: deviates from the path by up to", "pictures: plots/measure-part.png, plots/measure-walls.png",
+        "part.nc: simulated with the controller's own motion, measured against its own path, to compare with",
+        "shaped.nc: within tolerance: deviates from the path by up to",
+        "pictures: plots/measure-part.png, plots/measure-walls.png",
         "shaped.nc: simulated block by block, as a shaped program, measured against the path of part.nc",
     ):  # fmt: skip
         assert text in said, text
@@ -127,7 +128,7 @@ def test_exit_code_1_is_explained(folder: Path, capsys: pytest.CaptureFixture[st
     said = capsys.readouterr().out
     assert "shaped.nc: OUT OF TOLERANCE" in said
     assert "part.nc: OUT OF TOLERANCE" not in said
-    assert "next: the lag of the servo loops" in said
+    assert "next: servo lag moves the table" in said
     assert "convert again" not in said
 
 
