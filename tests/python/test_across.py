@@ -231,7 +231,7 @@ def test_a_hit_against_the_arrow_has_the_same_signs(count: int) -> None:
     records = [record for seed in (1, 2, 3) for record in pushed_back(hit(MODES[:count], seed))]
     found = sg.identify(along(records, "y"), across=records)
     check(found, MODES[:count])
-    assert any("sign is turned" in warning for warning in found.warnings)
+    assert any("sign is reversed" in warning for warning in found.warnings)
 
 
 def test_frequency_responses_against_the_arrow() -> None:
@@ -295,7 +295,7 @@ def test_a_dead_or_clipped_channel_is_refused(share: float, words: str) -> None:
 def test_why_there_is_no_mode_comes_before_what_is_missing_across(files: list[Path], tmp_path: Path) -> None:
     done = run(tmp_path, "identify", str(files[0]), "--axis", "y", "--across", "--stops")
     assert done.returncode == 2
-    assert "holds a force" in done.stdout
+    assert "contains a force" in done.stdout
 
 
 def test_the_next_step_looks_across_too(files: list[Path], tmp_path: Path) -> None:
@@ -305,7 +305,7 @@ def test_the_next_step_looks_across_too(files: list[Path], tmp_path: Path) -> No
 
 @pytest.mark.parametrize(("options", "word"), [({"stops": True}, "--stops"), ({"start_s": 0.1}, "--start")])
 def test_a_frequency_response_has_no_stops(options: dict[str, Any], word: str) -> None:
-    with pytest.raises(sg.ArgumentError, match=f"{word} changes nothing"):
+    with pytest.raises(sg.ArgumentError, match=f"{word} has no effect"):
         sg.identify([responses(MODES)["y"]], **options)
 
 
@@ -313,7 +313,7 @@ def test_the_phase_of_next_to_nothing_is_not_told() -> None:
     lines = responses(MODES)
     lines["x"] = replace(lines["x"], response=0.004j * lines["y"].response)
     found = sg.identify([lines["y"]], across=[lines["x"], lines["z"]])
-    assert not any("behind or ahead" in note for note in found.notes)
+    assert not any("out of phase" in note for note in found.notes)
 
 
 def test_another_quantity_is_refused() -> None:

@@ -167,7 +167,7 @@ def test_an_edit_is_noticed_and_said_by_every_command(
         ({"axes.x.modes": [{"frequency_hz": 47.0, "damping_ratio": 0.02}]}, "other_machine", "X 47 HZ"),
         ({"controller.shaped_time_constant_s": 0.1}, "other_machine", "100 MS here"),
         ({"emission.block_period_s": 0.008}, "other_period", "emission.block_period_s is 8 ms here"),
-        ({"controller.interpolation_period_s": 0.002}, "other_period", "no whole number"),
+        ({"controller.interpolation_period_s": 0.002}, "other_period", "not a whole number"),
         ({"controller.block_time_s": 0.008}, "other_period", "needs 8 ms for a block"),
     ],
 )
@@ -223,5 +223,5 @@ def test_every_function_takes_the_path_of_a_file(emitted: Path, original: Path, 
 
 
 def test_emitted_programs_are_not_shaped_twice(emitted: Path, machine: sg.Machine) -> None:
-    with pytest.raises(sg.ProgramError, match="shaped by shapegcode already"):
+    with pytest.raises(sg.ProgramError, match="already shaped by shapegcode"):
         sg.convert(emitted, machine)

@@ -96,7 +96,7 @@ REFUSED = [
     ("check good.nc --program P1", "must be a program number"),
     ("simulate good.nc --lines 90-99", "1-9"),
     ("simulate good.nc --lines 3-10", "1-9"),
-    ("simulate good.nc --lines 1-2", "nothing happens"),
+    ("simulate good.nc --lines 1-2", "no motion there"),
     ("simulate good.nc --lines 9-3", "first to last"),
     ("simulate good.nc --lines 0", "first to last"),
     ("simulate good.nc --every 0", "1 or more"),

@@ -83,7 +83,7 @@ def test_a_rigid_axis_shows_no_mode(command: KnownCommand, tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     ("axis", "words"),
-    [(None, "say --axis x, y or z"), ("y", "called Y")],
+    [(None, "add --axis x, y or z"), ("y", "called Y")],
 )
 def test_the_axis_must_be_said(
     command: KnownCommand, actual_m: FloatArray, tmp_path: Path, axis: str | None, words: str
@@ -128,7 +128,7 @@ def test_what_goes_with_a_sensor_is_refused(tmp_path: Path, options: list[str]) 
     done = run(tmp_path, "identify", "trace.csv", "--axis", "x", *options)
     assert done.returncode == 2
     named = options[0].replace("--decay", "--ignore-force")
-    assert f"a capture of command and encoder, in which {named} changes nothing" in done.stdout
+    assert f"a capture of command and encoder, for which {named} has no effect" in done.stdout
 
 
 def test_a_column_of_a_sensor_makes_it_a_record(tmp_path: Path) -> None:
@@ -147,5 +147,5 @@ def test_a_column_of_a_sensor_makes_it_a_record(tmp_path: Path) -> None:
 def test_a_band_beyond_the_sampling_is_told_with_its_limits(tmp_path: Path) -> None:
     moving = np.cumsum(np.random.default_rng(1).standard_normal(20_000)) * 1e-3
     file = write(tmp_path / "trace.csv", moving, moving)
-    with pytest.raises(sg.RecordError, match=r"tells of 4 to 400 Hz, asked for are 500 to 900 Hz"):
+    with pytest.raises(sg.RecordError, match=r"resolves 4 to 400 Hz, the band asked for is 500 to 900 Hz"):
         sg.identify(file, sg.ReadOptions(axis="x"), band_hz=(500.0, 900.0))

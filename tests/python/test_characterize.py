@@ -259,7 +259,7 @@ def test_a_time_that_contradicts_the_others_is_named(folder: Path, tmp_path: Pat
         ("times_s = []", "time_s = [34]", ":11: tests.overhead.time_s = [34]: unknown key"),
         ("resolution_s = 0.1", "resolution_s = 0", ":5: resolution_s = 0: must be 1e-06 or more (unit: s)"),
         ('pattern = "dwell"', 'pattern = "dwel"', 'tests.stop_below.parts.1.pattern = "dwel": must be "pause", '),
-        ("feed_mm_per_min = 3000.0", "feed_mm_per_min = 0.0", "feed_mm_per_min = 0.0: must not be 0 where something"),
+        ("feed_mm_per_min = 3000.0", "feed_mm_per_min = 0.0", "feed_mm_per_min = 0.0: must not be 0 with motion"),
         ('"O7001.nc"', '"7001.nc"', ':9: tests.overhead.program = "7001.nc": malformed; as'),
         ('log = ""', 'log = "gone.csv"', "tests.log_cutting.log = gone.csv: no such file"),
         ("[tests.overhead]", "[tests.overhead", "RESULTS.toml:8: "),

@@ -357,7 +357,7 @@ def test_the_command(tmp_path: Path) -> None:
         run(tmp_path, "compare", "a.nc", "c.nc", *step.rpartition(" allow it: ")[2].rstrip(".").split()).returncode == 0
     )
     for words, said in (
-        (("--allow", "feed"), "no difference of this name; there are cuts, rapids, tools"),
+        (("--allow", "feed"), "unknown kind of difference; known are cuts, rapids, tools"),
         (("--allow", "path=20"), "path needs a length with its unit"),
         (("--allow", "path=0um"), "must be above 0"),
         (("--allow", "path=-1um"), "must be above 0"),

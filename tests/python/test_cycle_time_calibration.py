@@ -114,7 +114,7 @@ def test_a_hold_is_found_and_left_out(tmp_path: Path) -> None:
     run = next(run for run in clock.runs if run.log.endswith("p2-0.txt"))
     assert run.held_s == pytest.approx(17.0, abs=1.0)
     assert abs(run.error_percent or 99.0) < 2.0
-    assert any("held at" in warning for warning in clock.warnings)
+    assert any("hold at" in warning for warning in clock.warnings)
 
 
 def later(row: str, seconds: float) -> str:
@@ -166,7 +166,7 @@ def unit_of_another(folder: Path) -> None:
         (without_lines, "Block_Number|block"),
         (few_readings, "reports|readings|lines"),
         (broken_off, "completed at line .* s before its end"),
-        (unit_of_another, "mm/s does not make that an override.*feed_unit"),
+        (unit_of_another, "mm/s would not be an override.*feed_unit"),
     ],
 )
 def test_what_does_not_belong_together_is_refused(spoil: Callable[[Path], None], said: str, tmp_path: Path) -> None:

@@ -133,7 +133,7 @@ def test_a_machine_has_no_thousands_of_modes() -> None:
 
 @pytest.mark.parametrize("given", [None, b"G1", 3], ids=repr)
 def test_what_names_no_file_is_an_error_of_arguments(given: object) -> None:
-    with pytest.raises(sg.ArgumentError, match="a file's name is needed, not "):
+    with pytest.raises(sg.ArgumentError, match="a file name is needed, not "):
         sg.convert(given, "vx500")  # type: ignore[arg-type]
 
 

@@ -155,14 +155,14 @@ BAD: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
         _row(lambda row: row.__setitem__(1, 10**400)),
         r"whole number 100000000000\.\.\. \(401 digits\): must be",
     ),
-    (_row(lambda row: row.__setitem__(0, 5_000_090)), r"HFData\[7\]: CYCLE = 5000090 behind 5000107: the counter goes"),
+    (_row(lambda row: row.__setitem__(0, 5_000_090)), r"HFData\[7\]: CYCLE = 5000090 after 5000107: the counter goes"),
     (_row(lambda row: row.__setitem__(0, 5_000_107)), r"HFData\[7\]: CYCLE = 5000107 .* other values under the same"),
     (_row(lambda row: row.__setitem__(0, 5_000_107.5)), r"CYCLE = .*: must be a whole number"),
     (_row(lambda row: row.__setitem__(0, None)), r"CYCLE = nan: must be a whole number"),
     (_set({}, "Payload", 1, "HFData"), r"Payload\[1\].HFData = '\{\}': must be a list"),
     (_set([3], "Payload", 1, "HFData"), r"Payload\[1\].HFData\[0\] has '3'"),
     (_set("x", "Payload", 2), r"Payload\[2\] = 'x': must be an object"),
-    (_set([], "Payload"), "holds 0 rows of HFData"),
+    (_set([], "Payload"), "has 0 rows of HFData"),
     (_set(None, "Payload"), "Payload is missing"),
     (_set("2.0", "Header", "Version", "outputFileFormatVersion"), "outputFileFormatVersion = 2.0: must be 0.6 to 1.1"),
     (_set("0.5", "Header", "Version", "outputFileFormatVersion"), "= 0.5: must be 0.6"),
@@ -195,7 +195,7 @@ def test_a_file_that_is_cut_off(share: float, document: dict[str, Any], tmp_path
     text = json.dumps(document)
     file = tmp_path / "cut.json"
     file.write_text(text[: int(share * len(text))])
-    with pytest.raises(sg.RecordError, match=r"cut.json:1: not whole JSON: column"):
+    with pytest.raises(sg.RecordError, match=r"cut.json:1: not complete JSON: column"):
         sg.read_edge_json(file)
     packed = gzip.compress(text.encode())
     file.write_bytes(packed[: int(share * len(packed)) - 1])
@@ -209,8 +209,8 @@ def test_a_file_that_is_cut_off(share: float, document: dict[str, Any], tmp_path
         (b"", "the file is empty"),
         (b"\xff\xfe\x00", "not UTF-8"),
         (b"[1, 2]", "no Header"),
-        (b"time_s,X\n0,1\n", "not whole JSON"),
-        (b"[" * 200_000, "nested too deeply|not whole JSON"),
+        (b"time_s,X\n0,1\n", "not complete JSON"),
+        (b"[" * 200_000, "nested too deeply|not complete JSON"),
         (b"PK\x03\x04rest", "cut off or damaged"),
     ],
 )
@@ -235,7 +235,7 @@ def test_what_is_missing_is_said(document: dict[str, Any], tmp_path: Path) -> No
         "ENC_POS|1: no value in 2 of 301",
         "1 entries ExternalData",
         "data lost",
-        "goes on in b.json",
+        "continues in b.json",
         "newer",
     ):
         assert part in said

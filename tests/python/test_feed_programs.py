@@ -146,5 +146,5 @@ def test_a_shaped_program_gets_no_other_feeds() -> None:
     original = HEAD + "G01 X50. F5000.\nY20.\nX0.\n" + TAIL
     shaped = sg.convert(original, machine, shape_all=True).text.decode()
     tool = sg.Tool.from_toml(TOOL.format(number="", flutes=20.0, overhang=32.0, feed=""))
-    with pytest.raises(sg.ProgramError, match="1:1: shaped by shapegcode already"):
+    with pytest.raises(sg.ProgramError, match="1:1: already shaped by shapegcode"):
         sg.schedule_feed(shaped, machine, tool, sg.Stock.from_toml(BOX))

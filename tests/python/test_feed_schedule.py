@@ -174,7 +174,7 @@ def test_a_plunge_into_material_keeps_its_feed() -> None:
     result = scheduled(text, tool("resultant_n = 60"), BOX)
     lines = result.text.decode().splitlines()
     assert "G01 Z-5. F120." in lines
-    assert any("left as it was: plunges into material" in warning for warning in result.warnings)
+    assert any("left unchanged: plunges into material" in warning for warning in result.warnings)
     kept = [entry for entry in result.limits if entry.limit == "kept"]
     assert kept[0].lines == (6, 6)
 
@@ -263,7 +263,7 @@ def test_a_missed_limit_of_the_cut_is_no_missed_tolerance_but_no_success_either(
     assert (scheduled.within_tolerance, scheduled.feed_schedule.ok, scheduled.ok) == (True, False, False)
     assert scheduled.answer.startswith("do not run, OUT OF TOLERANCE: ")
     assert "NOT within limits: peak resultant" in scheduled.answer
-    assert scheduled.next_step.startswith("do not run it: take less material at once")
+    assert scheduled.next_step.startswith("do not run it: reduce the depth of cut there")
     assert b"(OUT OF TOLERANCE - DO NOT RUN  )" in scheduled.text
     assert [table.title for table in scheduled.tables()][:2] == [
         "part.nc on VX500, tool E8", "what limits the feed",

@@ -78,7 +78,7 @@ def test_a_fast_record_is_thinned_out_and_says_the_same(monkeypatch: pytest.Monk
     record = tap(FAST, np.random.default_rng(5), snr_db=50.0, rate_hz=51200.0, samples=12800, pulse_samples=80)
     thinned = identify([record])
     assert len(thinned.fitted_records[0].response) < len(record.response) / 4
-    assert "51200 samples per second are thinned out to" in thinned.notes[-1]
+    assert "51200 samples per second are decimated to" in thinned.notes[-1]
     monkeypatch.setattr(problem, "thin", lambda *_: None)
     whole = identify([record])
     assert len(whole.fitted_records[0].response) == len(record.response)

@@ -138,9 +138,7 @@ def test_behind_a_feed_hold_and_a_jump_of_the_clock_the_part_before_is_used(
     held = np.concatenate((values[:at], np.zeros(48_000), values[at:]))
     found = found_in(program, record((np.arange(len(held)) / 16_000.0, held)))
     check(found, MODES)
-    assert any(
-        "from" in note and "on the record does not go with the program (feed hold" in note for note in found.notes
-    )
+    assert any("from" in note and "on the record does not match the program (feed hold" in note for note in found.notes)
     jumped = record(motion)
     where = int((command.parts[11][0] + 4.0) * 808.0)
     lost = np.concatenate((jumped.response[:where], jumped.response[where + 600 :]))
@@ -189,7 +187,7 @@ def test_what_is_refused_with_its_reason(program: Path, motion: tuple[FloatArray
     coarse = found_in(program, record(motion, Logger(rate_hz=100.0)))
     assert [round(mode.frequency_hz.value) for mode in coarse.modes] == [23]
     assert any(
-        re.match(r"looked at from \d+ to \d+ Hz; 100 samples per second reach 40 Hz", note) for note in coarse.notes
+        re.match(r"searched from \d+ to \d+ Hz; 100 samples per second reach 40 Hz", note) for note in coarse.notes
     )
     faster = good.response[: len(good.response) // 2]
     with pytest.raises(RecordError, match="no relation to the command"):
@@ -202,7 +200,7 @@ def test_what_is_refused_with_its_reason(program: Path, motion: tuple[FloatArray
     refused = (
         ("X1. F100.\nY1.", "Y by 1 mm too"),
         ("M00", "nothing moves"),
-        ("X1. F100.", r"moves without a rest of 0.5 s or more: needed are 2 parts"),
+        ("X1. F100.", r"has no rest of 0.5 s or more: needed are 2 parts"),
     )
     for text, why in refused:
         other = tmp_path / "other.nc"
@@ -226,7 +224,7 @@ def test_the_command_finds_the_axis_of_a_phone_and_writes_the_machine(
     )  # fmt: skip
     assert answer.returncode == 0, answer.stderr
     assert answer.stdout.startswith("use: 2 modes of the X axis in a sweep without force: 23, 46 Hz")
-    assert "of the axes of the sensor this one goes with the command best" in answer.stdout
+    assert "this axis of the sensor matches the command best" in answer.stdout
     assert sorted(round(mode.frequency_hz) for mode in Machine.load(tmp_path / "mine.toml").axes.x.modes) == [23, 46]
     assert json.loads((tmp_path / "found.json").read_text())["axis"] == "x"
     assert {each.stem for each in (tmp_path / "plots").iterdir()} == {"identify-sweep"}
@@ -235,7 +233,7 @@ def test_the_command_finds_the_axis_of_a_phone_and_writes_the_machine(
     assert f"next: shapegcode identify phone.csv --sweep {program} -m mine.toml --update mine.toml" in again.stdout
     bare = run(tmp_path, "identify", "phone.csv", "--sweep", program)
     assert (bare.returncode, "--sweep needs -m" in bare.stderr) == (2, True)
-    with pytest.raises(RecordError, match=r"axis Y is asked for, .* moves X: leave the axis out"):
+    with pytest.raises(RecordError, match=r"axis Y is asked for, .* moves X: omit the axis"):
         identify(tmp_path / "phone.csv", ReadOptions(axis="y"), sweep=program, machine=VX500)
     found = identify(tmp_path / "phone.csv", sweep=program, machine=VX500)
     assert update_machine(tmp_path / "mine.toml", found, keep_modes="yz").machine.axes.x.modes

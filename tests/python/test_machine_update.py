@@ -260,7 +260,7 @@ def test_what_is_refused() -> None:
     )
     with pytest.raises(ArgumentError, match=r"written inline; write each as a table \[\[axes\.x\.modes\]\]"):
         update_modes(inline, "x", [tap(46.0)], source="s")
-    with pytest.raises(ArgumentError, match="no mode that the data support"):
+    with pytest.raises(ArgumentError, match="no supported mode"):
         update_modes(VX500, "x", [], source="s")
     with pytest.raises(ArgumentError, match="not supported: too short"):
         update_modes(VX500, "x", [tap(46.0, refusal="too short")], source="s")
@@ -291,4 +291,4 @@ def test_a_mode_that_the_test_shows_but_does_not_support_stays() -> None:
     modes = tomllib.loads(update.text)["axes"]["x"]["modes"]
     assert [mode["frequency_hz"] for mode in modes] == [46.0, 118.0]
     assert modes[0] == tomllib.loads(VX500)["axes"]["x"]["modes"][0]
-    assert any(note.startswith("kept 46.0 Hz as it is") for note in update.notes)
+    assert any(note.startswith("kept 46.0 Hz unchanged") for note in update.notes)

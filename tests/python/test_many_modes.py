@@ -129,7 +129,7 @@ def test_no_more_modes_than_asked_for() -> None:
     assert sum("its peak is lower" in mode.refusal for mode in two.refused) == 2
     assert two.exit_code == 0
     assert "NOT supported" not in two.answer
-    with pytest.raises(sg.RecordError, match="9 modes are asked for, and the data hold no more than 4"):
+    with pytest.raises(sg.RecordError, match="9 modes are asked for, and the data support no more than 4"):
         identify([point], modes=9)
 
 

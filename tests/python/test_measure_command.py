@@ -76,10 +76,11 @@ def test_table_like_a_measuring_report(
     assert main(words) == 0
     said = capsys.readouterr().out
     for text in (
-        "2 arc R20, line 6", "inside wall mm (µm off)", "18.500", "cut-width band left / right µm",
+        "2 arc R20, line 6", "inside wall mm (deviation µm)", "18.500", "cut-width band left / right µm",
         "Ra left / right µm", "settled to 1 µm X / Y / Z ms", "next: ",
-        "part.nc: simulated with the controller's own motion, measured against its own path, to compare the shaped",
-        "shaped.nc: within tolerance: leaves the path by", "pictures: plots/measure-part.png, plots/measure-walls.png",
+        "part.nc: simulated with the controller's own motion, measured against its own path, to compare with",
+        "shaped.nc: within tolerance: deviates from the path by up to",
+        "pictures: plots/measure-part.png, plots/measure-walls.png",
         "shaped.nc: simulated block by block, as a shaped program, measured against the path of part.nc",
     ):  # fmt: skip
         assert text in said, text
@@ -118,13 +119,16 @@ def test_exit_code_1_is_explained(folder: Path, capsys: pytest.CaptureFixture[st
     assert main([*words, "--json", "m.json"]) == 1
     largest = json.loads((folder / "m.json").read_text())["programs"][0]["contour_error_um"]["response"]["max"]
     said = capsys.readouterr().out
-    assert f"part.nc: OUT OF TOLERANCE by {largest - 20.0:.2f} µm: leaves the path by {largest:.2f} µm" in said
+    assert (
+        f"part.nc: OUT OF TOLERANCE by {largest - 20.0:.2f} µm: deviates from the path by up to {largest:.2f} µm"
+        in said
+    )
     assert "limit 20 µm (tolerance.contour_um), in section 2 arc R20, line 6" in said
     assert main(["measure", "part.nc", "shaped.nc", *words[2:], "--plant", "feed-drive"]) == 1
     said = capsys.readouterr().out
     assert "shaped.nc: OUT OF TOLERANCE" in said
     assert "part.nc: OUT OF TOLERANCE" not in said
-    assert "next: the lag of the servo loops" in said
+    assert "next: servo lag moves the table" in said
     assert "convert again" not in said
 
 

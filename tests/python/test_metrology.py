@@ -300,7 +300,7 @@ def test_a_spacing_that_a_long_path_cannot_have_is_said() -> None:
 
 def test_a_program_without_cuts_measures_nothing() -> None:
     machine = sg.Machine.load("vx500")
-    with pytest.raises(sg.ArgumentError, match="no cutting move, so there is nothing to measure"):
+    with pytest.raises(sg.ArgumentError, match="no cutting move, nothing to measure"):
         sg.measure(program(["G00X10."], machine), machine, TOOL_MM)
 
 

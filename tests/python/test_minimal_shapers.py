@@ -256,7 +256,7 @@ def test_what_is_refused_names_value_and_limit() -> None:
 
 def test_the_registry_says_how_far_it_is_proven_that_there_is_none() -> None:
     bands = [ModeBand(mode) for mode in THREE]
-    with pytest.raises(DesignError, match=r"no minimal shaper of 20 Hz, 71 Hz, 160 Hz lasts up to 15 ms.*proven"):
+    with pytest.raises(DesignError, match=r"no minimal shaper of 20 Hz, 71 Hz, 160 Hz takes up to 15 ms.*proven"):
         design("minimal", bands, DesignOptions(max_duration_s=0.015))
     with pytest.raises(ArgumentError, match="no design on a grid"):
         design("minimal", bands, DesignOptions(period_s=0.001))

@@ -99,7 +99,7 @@ def test_an_unknown_position_is_shaped_for_the_nominal_frequency() -> None:
     options = RegionWriter(model, grid).options(model.limits(), _core.FilterTolerance(), offset)
     assert options.following is None
     report = sg.convert(program, machine).to_dict()
-    assert any("position of Z is not known" in warning for warning in report["warnings"])
+    assert any("position of Z is unknown" in warning for warning in report["warnings"])
     assert report["residual_vibration_um"]["emitted"]["x"] < 0.1
 
 

@@ -123,7 +123,7 @@ def test_what_the_user_is_told() -> None:
     assert "part_mass_kg is not given" in missing
     assert "46 Hz" in missing
     (unused,) = machine_warnings(machine_with(OVER_Z, more="part_mass_kg = 20"))
-    assert "changes nothing" in unused
+    assert "has no effect" in unused
     (outside,) = machine_warnings(machine_with(OVER_MASS, more="part_mass_kg = 400"))
     assert "outside the table of axes.x.modes.1, 0 to 300 kg" in outside
     assert "40 Hz" in outside
@@ -144,7 +144,7 @@ def test_positions_of_a_program_are_those_of_the_machine() -> None:
     assert "covers 0 to 400 mm" in beyond
     unknown = Program.from_text(b"%\nO0001\nG21 G90 G54 G00 X0 Y0\nG01 X10. F1000\nX20. Y5.\nM30\n%\n", machine)
     (said,) = region_range_warnings(unknown.regions, machine)
-    assert "position of Z is not known" in said
+    assert "position of Z is unknown" in said
     assert region_offset(unknown.regions[0], machine)[2] is None
 
 

@@ -105,7 +105,7 @@ def test_values_of_nist_are_those_of_the_lines() -> None:
         np.testing.assert_allclose(signal.time_s, [time for time, _ in expected], atol=2e-6)
         np.testing.assert_array_equal(signal.value, [value for _, value in expected])
     assert run.program == "NIST_MTC_CRADA_PLATE-13.NC"
-    assert run.notes == ("line 3192: Block_Number is empty, left out",)
+    assert run.notes == ("line 3192: Block_Number is empty, ignored",)
     assert rows[3191][1:] == ["Block_Number", ""]
 
 
@@ -114,7 +114,7 @@ def test_an_override_that_was_moved_is_read_as_a_ratio_and_what_held_before_is_s
     assert run.feed_override is not None and run.rapid_override is not None
     assert run.feed_override.value[0] == 1.07
     assert run.rapid_override.value.min() == 0.0
-    assert "Feed_Override is first logged at 1.89 s: what held before is not known" in run.notes
+    assert "Feed_Override is first logged at 1.89 s: the value before is unknown" in run.notes
 
 
 # --- SHDR -------------------------------------------------------------------------------------------------------------
@@ -156,11 +156,11 @@ def test_several_items_in_a_line_and_what_is_no_item(tmp_path: Path, ending: str
     assert values(run.tool) == [(3.0, 4)]
     assert run.duration_s == 5.0
     assert set(run.notes) == {
-        "line 3: the condition system, left out",
-        "line 4: the condition system, left out",
-        "line 5: '2026-03-02T08:10:01.500Z|message|M12|change the insert' is not time|item|value, left out",
-        "line 6: an asset, left out",
-        "line 9: M1:line is 'UNAVAILABLE', no line number, left out",
+        "line 3: the condition system, ignored",
+        "line 4: the condition system, ignored",
+        "line 5: '2026-03-02T08:10:01.500Z|message|M12|change the insert' is not time|item|value, ignored",
+        "line 6: an asset, ignored",
+        "line 9: M1:line is 'UNAVAILABLE', no line number, ignored",
     }
 
 
@@ -183,7 +183,7 @@ def test_names_of_items_are_known_or_given(tmp_path: Path) -> None:
 def test_the_better_known_of_two_items_is_taken_and_the_other_said(tmp_path: Path) -> None:
     run = only(tmp_path, LOG.replace("Program_Runtime_Seconds|5", "Line|999"))
     assert 999 not in run.block.value
-    assert run.notes == ("line 4: Line left out: Block_Number is taken",)
+    assert run.notes == ("line 4: Line ignored: Block_Number is used",)
 
 
 def test_a_day_holds_several_runs_in_bounded_memory(tmp_path: Path) -> None:
@@ -272,7 +272,7 @@ def test_a_clock_that_goes_back_ends_the_run_there(tmp_path: Path) -> None:
     run = only(tmp_path, LOG.replace("T08:10:05", "T07:10:05"))
     assert run.cut_end and run.duration_s is None
     assert values(run.block) == [(-0.1, 1), (0.5, 7), (2.0, 8)]
-    assert run.notes == ("line 12: the clock goes back by 3599.000 s; the run ends there, its rest is left out",)
+    assert run.notes == ("line 12: the clock goes back by 3599.000 s; the run ends there, its rest is ignored",)
 
 
 def test_a_clock_that_goes_back_in_a_log_without_states_makes_two_runs(tmp_path: Path) -> None:
@@ -286,7 +286,7 @@ def test_a_clock_that_goes_back_in_a_log_without_states_makes_two_runs(tmp_path:
 def test_values_that_overtake_each_other_are_sorted(tmp_path: Path) -> None:
     run = only(tmp_path, LOG.replace("08:10:02.0000000Z|Block_Number|8", "08:10:00.4900000Z|Block_Number|8"))
     assert values(run.block) == [(-0.1, 1), (0.49, 8), (0.5, 7), (5.0, 12)]
-    assert run.notes == ("line 8: its time stamp is 0.110 s before that of the line above; sorted",)
+    assert run.notes == ("line 8: its time stamp is 0.110 s before that of the line before; sorted",)
 
 
 def test_a_silence_within_a_run_is_a_gap(tmp_path: Path) -> None:
@@ -311,7 +311,7 @@ def test_a_clock_that_was_set_is_narrowed_by_the_control_s_own_seconds(tmp_path:
 def test_two_block_numbers_at_one_time(tmp_path: Path) -> None:
     run = only(tmp_path, LOG.replace("08:10:02.0000000Z|Block_Number|8", "08:10:00.5000000Z|Block_Number|8"))
     assert values(run.block) == [(-0.1, 1), (0.5, 8), (5.0, 12)]
-    assert "line 8: Block_Number twice at one time: the value before is left out" in run.notes
+    assert "line 8: Block_Number twice at one time: the first value is ignored" in run.notes
 
 
 def test_bad_values_and_time_stamps_are_left_out_with_their_lines(tmp_path: Path) -> None:
@@ -322,11 +322,11 @@ def test_bad_values_and_time_stamps_are_left_out_with_their_lines(tmp_path: Path
     run = only(tmp_path, text)
     assert values(run.block) == [(-0.1, 1), (0.5, 7), (2.0, 8), (5.0, 12)]
     assert run.notes == (
-        "line 13: Block_Number is empty, left out",
-        "line 14: Block_Number is '7.5', no line number, left out",
-        "line 15: Block_Number is '-3', no line number, left out",
-        "2 more like the last one, up to line 17",
-        "line 18: '2026-13-02T08:10:06Z' is no time stamp, the line is left out",
+        "line 13: Block_Number is empty, ignored",
+        "line 14: Block_Number is '7.5', no line number, ignored",
+        "line 15: Block_Number is '-3', no line number, ignored",
+        "2 more of the same kind, up to line 17",
+        "line 18: '2026-13-02T08:10:06Z' is not a time stamp, the line is ignored",
     )
 
 
@@ -334,28 +334,26 @@ def test_no_word_of_a_state_means_one_run_without_duration(tmp_path: Path) -> No
     text = "".join(line for line in LOG.splitlines(keepends=True) if "Program_Status" not in line)
     run = only(tmp_path, text)
     assert run.duration_s is None
-    assert run.notes[0] == "nothing says when the program runs: the whole log is one run"
+    assert run.notes[0] == "no item shows when the program runs: the whole log is one run"
 
 
 def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
     refused(tmp_path, "", "the file is empty")
     refused(tmp_path, b"\x00\x01\x02|ab|c\n", r"a binary file \(byte 0x00 at 0\)")
-    refused(tmp_path, "%\nO0001\nG0X1.\n", "no log of runs: the file begins with b'%")
-    refused(tmp_path, LOG.replace("2026-03-02T", "heute "), r"run.txt:1: 'heute 08:00:00.0000000Z' is no time stamp")
+    refused(tmp_path, "%\nO0001\nG0X1.\n", "not a log of runs: the file begins with b'%")
+    refused(tmp_path, LOG.replace("2026-03-02T", "heute "), r"run.txt:1: 'heute 08:00:00.0000000Z' is not a time stamp")
     refused(
         tmp_path, LOG.replace("Block_Number", "Satzzaehler"),
-        r"run.txt:13: no line numbers of the program: looked for block_number, line_number.*the log has Current_Tool, "
+        r"run.txt:13: no line numbers of the program: searched for block_number, .*the log has Current_Tool, "
         r"Feed_Override, Satzzaehler.*items = \{ block",
     )  # fmt: skip
     refused(
         tmp_path, LOG.replace("ACTIVE", "READY").replace("PROGRAM_COMPLETED", "IDLE"), "no run: Program_Status never"
     )
-    refused(
-        tmp_path, "2026-03-02T08:00:00Z|a|1\n2026-03-02T08:00:01Z|b|1\n", "no item that is of use.*the log has a, b"
-    )
+    refused(tmp_path, "2026-03-02T08:00:00Z|a|1\n2026-03-02T08:00:01Z|b|1\n", "no usable item.*the log has a, b")
     refused(
         tmp_path, LOG + "2026-03-02T08:20:00Z|M2:Program_Status|ACTIVE\n",
-        r"run.txt:15: M2:Program_Status besides Program_Status: the log has more than one control",
+        r"run.txt:15: M2:Program_Status and Program_Status: the log has more than one control",
     )  # fmt: skip
     endless = "2026-03-02T08:10:02Z|@ASSET@|T1|CuttingTool|--multiline--AB12\n"
     refused(
@@ -481,22 +479,20 @@ def test_only_n_words_of_blocks(tmp_path: Path) -> None:
     text = "".join(row for row in streams().splitlines(keepends=True) if "<LineNumber" not in row)
     run = only(tmp_path, text, "streams.xml")
     assert (run.block_counts, values(run.block)) == ("sequence", [(5.0, 120)])
-    assert any("no line numbers: the N words of 1 of 1 blocks are taken" in note for note in run.notes)
+    assert any("no line numbers: the N words of 1 of 1 blocks are used" in note for note in run.notes)
 
 
 def test_streams_that_are_refused(tmp_path: Path) -> None:
     whole = streams()
     cut = whole[: whole.index("<Condition>")]
-    refused(
-        tmp_path, cut, r"a.xml:\d+: the document that begins in line 1 is cut off within <ComponentStream>", "a.xml"
-    )
-    refused(tmp_path, whole + cut, rf"begins in line {whole.count(chr(10)) + 1} is cut off within", "a.xml")
-    refused(tmp_path, whole.replace("</Samples>", "</Sample>", 1), r"a.xml:7: no whole XML: mismatched tag", "a.xml")
+    refused(tmp_path, cut, r"a.xml:\d+: the document begun in line 1 is truncated within <ComponentStream>", "a.xml")
+    refused(tmp_path, whole + cut, rf"begun in line {whole.count(chr(10)) + 1} is truncated within", "a.xml")
+    refused(tmp_path, whole.replace("</Samples>", "</Sample>", 1), r"a.xml:7: incomplete XML: mismatched tag", "a.xml")
     refused(
         tmp_path, whole.replace("MTConnectStreams", "MTConnectDevices"), "the answer to `probe`: needed is", "a.xml"
     )
     bomb = '<?xml version="1.0"?><!DOCTYPE a [<!ENTITY x "y">]><MTConnectStreams/>'
-    refused(tmp_path, bomb, "a.xml:1: an entity is declared", "a.xml")
+    refused(tmp_path, bomb, "a.xml:1: a declared entity", "a.xml")
     refused(tmp_path, "<html><body>401</body></html>", r"no MTConnectStreams document", "a.xml")
 
 
@@ -522,14 +518,14 @@ def test_a_german_table_with_clock_times(tmp_path: Path) -> None:
     assert values(run.block) == [(0.0, 7), (1.5, 8)]
     assert values(run.feed) == [(0.0, 16.93), (1.5, 16.9)]
     assert run.feed_unit is None and run.duration_s is None
-    assert run.notes == ("nothing says when the program runs: the whole log is one run",)
+    assert run.notes == ("no item shows when the program runs: the whole log is one run",)
 
 
 def test_units_of_tables_are_converted_said_or_refused(tmp_path: Path) -> None:
     run = only(tmp_path, "t,line,x [inch],feed [inch/min]\n0,1,1,40\n1,2,2,40\n", "run.csv")
     assert dict(run.position_mm)["x"].value.tolist() == [25.4, 50.8]
     assert run.feed_unit == "inch/min"
-    assert "line 1: t has no unit: its numbers are taken as s" in run.notes
+    assert "line 1: t has no unit: s is assumed" in run.notes
     refused(tmp_path, "t,line,feed [V]\n0,1,1\n", r"run.csv:1: 'feed \[V\]': the unit 'V' is not known", "run.csv")
     refused(
         tmp_path, "t,line,feed [mm]\n0,1,1\n", r"run.csv:1: 'feed \[mm\]' has the unit mm of displacement", "run.csv"
@@ -537,7 +533,9 @@ def test_units_of_tables_are_converted_said_or_refused(tmp_path: Path) -> None:
 
 
 def test_tables_that_are_refused(tmp_path: Path) -> None:
-    refused(tmp_path, "t,force\n0,1\n1,2\n", r"run.csv:1: no header with a time .* has t, force; name them", "run.csv")
+    refused(
+        tmp_path, "t,force\n0,1\n1,2\n", r"run.csv:1: no header with a time .* has t, force; specify them", "run.csv"
+    )
     refused(tmp_path, "t_s,line\n0,5,7\n", r"run.csv:2: 3 cells, the header has 2; decimal commas need", "run.csv")
     refused(tmp_path, "t,line\nmonday,1\n", r"run.csv:2: t is 'monday': must be a number or a time", "run.csv")
 
@@ -546,8 +544,8 @@ def test_a_table_with_bad_rows(tmp_path: Path) -> None:
     run = only(tmp_path, "time_s,line,feed\n0,1,0\n1,,5\nx,3,5\n3,4\n", "run.csv")
     assert values(run.block) == [(0.0, 1), (3.0, 4)]
     assert set(run.notes) >= {
-        "line 3: line is empty, left out",
-        "line 4: time_s is 'x', no time; the row is left out",
+        "line 3: line is empty, ignored",
+        "line 4: time_s is 'x', not a time; the row is ignored",
         "line 5: 2 cells of 3",
     }
 

@@ -154,8 +154,8 @@ logs = []
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        ("", ":1: runs.1: one of log and logs must be given"),
-        ('log = "x"\nlogs = ["y"]', ':4: runs.1.logs = ["y"]: only one of log and logs must be given'),
+        ("", ":1: runs.1: one of log and logs is required"),
+        ('log = "x"\nlogs = ["y"]', ':4: runs.1.logs = ["y"]: specify only one of log and logs'),
         ('log = "logs/a-2.txt"\nfeed_unit = "knots"', ":4: runs.1.feed_unit"),
         ('log = "logs/a-2.txt"\nitems = { blok = "line" }', ":4: runs.1.items"),
     ],
@@ -179,7 +179,7 @@ log = "logs"
 """,
         ':2: runs.1.program = "c.nc": no such file',
         ':3: runs.1.logs = "logs/c-*.txt": matches no file',
-        ':3: runs.1.logs = "logs/a-*.txt": a-2.txt is a log of runs.1 already: each run counts once',
+        ':3: runs.1.logs = "logs/a-*.txt": a-2.txt is already a log of runs.1: each run counts once',
         ':6: runs.2.log = "logs": no such file',
     )
 

@@ -169,7 +169,7 @@ def test_axes_that_tell_nothing(tmp_path: Path) -> None:
     gain = lagging.parameter("position gain")
     assert gain is not None
     assert gain.value is None
-    assert "no lag that determines it" in gain.note
+    assert "no lag remains to determine it" in gain.note
     assert running.note == "never changes its speed"
     assert running.parameters[0].value == pytest.approx(0.1 / 20.0)
     assert resting.note == "did not move"
@@ -197,14 +197,14 @@ def test_machine_file_and_command(tmp_path: Path) -> None:
     machine = sg.Machine.load(out)
     assert machine.controller.position_gain_per_s.x == pytest.approx(35.0, rel=0.01)
     assert machine.controller.feed_forward_ratio.y == pytest.approx(0.5, abs=0.01)
-    assert "measured (log, behind a dead time)" in out.read_text()
+    assert "measured (log, with a dead time)" in out.read_text()
     assert json.loads(report.read_text())["axes"][0]["models"][1]["name"] == "dead time and servo lag"
     assert (tmp_path / "plots" / "servo.png").is_file()
     for options, message in (
         (["--axes", "X=9"], "--axes x=9: must be X, Y or Z and an axis of the log, which has 1 (X1), 4 (Q4)"),
         (["--axes", "Q=1"], "must be X, Y or Z"),
         (["--axes", "1,2"], "must be for example X=1,Y=6,Z=2"),
-        (["--units", "ms,mm"], "--units ms,mm: goes with a CSV"),
+        (["--units", "ms,mm"], "--units ms,mm: is for a CSV"),
     ):
         done = run(tmp_path, "characterize", "--servo", str(file), "-m", "vx500", *options)
         assert done.returncode == 2
@@ -248,7 +248,7 @@ def test_a_command_that_jumps_is_divided_there(tmp_path: Path) -> None:
 def test_of_a_long_log_the_liveliest_windows_are_taken(tmp_path: Path) -> None:
     way = np.concatenate([np.zeros(400_000), moves(6, 200.0, 1500.0), np.full(500_000, moves(6, 200.0, 1500.0)[-1])])
     found = sg.fit_servo(capture(tmp_path / "a.json", {1: (way, simulated(way, 0.006, 40.0, 0.5))}, noise=2e-4))
-    assert found.warnings == ("of 47751 samples those 40000 were taken where an axis changes its speed most",)
+    assert found.warnings == ("of 47751 samples the 40000 with most changes of an axis' speed were used",)
     gain = found.axes[0].parameter("position gain")
     assert gain is not None
     assert gain.value == pytest.approx(40.0, rel=0.02)
@@ -264,5 +264,5 @@ def test_captures_that_cannot_be_fitted(tmp_path: Path) -> None:
         sg.fit_servo(write_edge(tmp_path / "b.json", short))
     holes = way.copy()
     holes[20] = np.nan
-    with pytest.raises(sg.RecordError, match="left out: values are missing"):
+    with pytest.raises(sg.RecordError, match="ignored: values are missing"):
         sg.fit_servo(write_edge(tmp_path / "c.json", edge_document({"DES_POS|1": way, "ENC_POS|1": holes})))

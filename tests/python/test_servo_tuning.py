@@ -106,16 +106,16 @@ BOMB = '<!DOCTYPE a [<!ENTITY b "bbbbbbbbbb"><!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b
 @pytest.mark.parametrize(
     ("how", "why"),
     [
-        ({"axis": "C1"}, "axis C1 turns"),
-        ({"axis": "MSP1"}, "axis MSP1 turns"),
-        ({"axis": "SPINDLE"}, "axis SPINDLE turns"),
-        ({"begin": BOMB}, r"ast.xml:2: a document type is declared"),
-        ({"begin": "<a>" * 100}, "more than 64 elements within each other"),
-        ({"begin": "</a>"}, "no whole XML"),
-        ({"parts": "<a/>"}, "holds no m_pPlant"),
+        ({"axis": "C1"}, "axis C1 is rotary"),
+        ({"axis": "MSP1"}, "axis MSP1 is rotary"),
+        ({"axis": "SPINDLE"}, "axis SPINDLE is rotary"),
+        ({"begin": BOMB}, r"ast.xml:2: a declared document type"),
+        ({"begin": "<a>" * 100}, "more than 64 nested elements"),
+        ({"begin": "</a>"}, "incomplete XML"),
+        ({"parts": "<a/>"}, "contains no m_pPlant"),
         ({"parts": '<FrequencyResponseFunction name="m_pPlant"/>'}, "has no m_FrequencyVector and m_ValueVector"),
         ({"parts": response("m_pPlant", plant()).replace("base85", "hex")}, "has the format 'hex'"),
-        ({"parts": response("m_pPlant", plant()).replace("CDATA[\n", 'CDATA[\n"')}, "is no digit to the base 85"),
+        ({"parts": response("m_pPlant", plant()).replace("CDATA[\n", 'CDATA[\n"')}, "is no base-85 digit"),
         ({"parts": response("m_pPlant", plant()[:-1])}, "800 frequencies and 799 values"),
         ({"parts": response("m_pPlant", plant() * np.nan)}, "value 1 of m_pPlant is not finite"),
         ({"parts": response("m_pPlant", plant() * 1e-300)}, r"value 1 of the response is .*e\+298: must be 0 or from"),
@@ -134,7 +134,7 @@ def test_refused(how: dict[str, Any], why: str, tmp_path: Path) -> None:
 def test_an_axis_that_the_file_names_is_no_other_one(tmp_path: Path) -> None:
     path = write(tmp_path / "ast.xml", "MX1")
     assert sg.identify(path, sg.ReadOptions(axis="x")).axis == "x"
-    with pytest.raises(sg.RecordError, match="holds the X axis, asked for is Y"):
+    with pytest.raises(sg.RecordError, match="contains the X axis, asked for is Y"):
         sg.identify(path, sg.ReadOptions(axis="y"))
 
 
@@ -170,5 +170,5 @@ def test_a_response_without_noise_warns_of_nothing(tmp_path: Path) -> None:
 
 def test_no_record_over_time(tmp_path: Path) -> None:
     path = write(tmp_path / "ast.xml")
-    with pytest.raises(sg.RecordError, match=r"ast\.xml: XML, .* needed is a record over time"):
+    with pytest.raises(sg.RecordError, match=r"ast\.xml: XML can .* needed is a record over time"):
         read_records(path)

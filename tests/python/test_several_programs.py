@@ -55,7 +55,7 @@ def test_addresses_pick_one_program_and_no_other(tmp_path: Path) -> None:
         cut = sum(region.path.programmed_time_s for region in read.regions)
         assert cut == pytest.approx(seconds + (0.6 if address == DONE[0] else 0.0), rel=1e-6), address
     # A line alone between two programs of one number: which is meant must be said.
-    with pytest.raises(sg.ProgramError, match=r"several programs O1: say which, /ONE/O0001, /TWO/O0001"):
+    with pytest.raises(sg.ProgramError, match=r"several programs O1: specify one, /ONE/O0001, /TWO/O0001"):
         sg.Program.read(path, machine, program_number=1)
     for wanted in ("/TWO/O0002", "<OTHER>", "#9"):
         with pytest.raises(sg.ProgramError, match=f"no program {wanted}"):

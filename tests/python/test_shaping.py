@@ -268,9 +268,9 @@ def test_refusals_say_what_there_is() -> None:
         shortest_non_negative(PAPER_MODES, 0.008, max_duration_s=0.09)
     assert str(failed.value) == (
         "no non-negative design within 90 ms on a 8 ms grid for modes 46 Hz (zeta 0.02), 131 Hz (zeta 0.02); "
-        "the shortest polynomial lasts 32 ms with sum|a| 10.34; try another period"
+        "the shortest polynomial takes 32 ms with sum|a| 10.34; try another period"
     )
-    with pytest.raises(DesignError, match="nor is there a polynomial: mode 200 Hz cannot be cancelled on"):
+    with pytest.raises(DesignError, match="nor is there a polynomial design: mode 200 Hz cannot be cancelled on"):
         shortest_non_negative([Mode(200.0, 0.0)], 0.005)
     with pytest.raises(ArgumentError, match="0 given"):
         shortest_non_negative([], 0.005)

@@ -297,15 +297,15 @@ CROSSING = [line((0, 0), (20, 0)), line((20, 0), (20, 10)), line((20, 10), (10, 
 @pytest.mark.parametrize(
     ("keys", "path", "expected"),
     [
-        ({"corner_radius_mm": 3}, corner(), "s.toml:3: allowance.corner_radius_mm = 3.0: tool bigger than the corner: "
+        ({"corner_radius_mm": 3}, corner(), "s.toml:3: allowance.corner_radius_mm = 3.0: tool larger than the corner: "
          "must not be below the tool's radius, 4 mm"),
         ({"corner_radius_mm": 14}, ROUND, "needs 29.6 mm, the pocket is 28 mm wide"),
-        ({"wall": '"left"'}, _core.Path(rectangle(8, 8)), "leaves nothing inside the closed contour"),
+        ({"wall": '"left"'}, _core.Path(rectangle(8, 8)), "the tool removes everything inside the closed contour"),
         ({}, _core.Path([line((0, 0), (50, 0)), *LOOP, line((50, 0), (50, -40))]),
-         "only 8 of 98 mm of a run of cutting moves close upon themselves"),
+         "only 8 of 98 mm of a sequence of cutting moves are closed"),
         ({"wall": '"left"'}, _core.Path(CROSSING), "describe the stock as [polygon]"),
-        ({}, ABOVE, "s.toml:5: allowance.z_mm = [-15.0, 0.0]: no cutting move of the program goes below the top"),
-        ({"lead_in_mm": 60, "lead_out_mm": 60}, LED_CORNER, "no wall is left"),
+        ({}, ABOVE, "s.toml:5: allowance.z_mm = [-15.0, 0.0]: no cutting move of the program is below the top"),
+        ({"lead_in_mm": 60, "lead_out_mm": 60}, LED_CORNER, "no wall remains"),
     ],
 )  # fmt: skip
 def test_a_stock_that_does_not_suit_the_program(keys: dict[str, object], path: _core.Path, expected: str) -> None:
@@ -324,7 +324,7 @@ def test_a_stock_that_does_not_suit_the_program(keys: dict[str, object], path: _
         ),
         (
             "[box]\nx_mm = [0, 1]\ny_mm = [2, 2]\nz_mm = [0, 1]\n",
-            "s.toml:3: box.y_mm = [2.0, 2.0]: the smaller number comes first, and the two must differ",
+            "s.toml:3: box.y_mm = [2.0, 2.0]: the first number must be smaller than the second",
         ),
         (
             "[box]\nx_mm = [0, 1, 2]\ny_mm = [0, 2]\nz_mm = [0, 1]\n",
@@ -362,9 +362,9 @@ def test_a_bad_point_is_the_only_problem_of_its_list() -> None:
 @pytest.mark.parametrize(
     ("points", "holes", "expected"),
     [
-        ("[[0,0],[2,2],[2,0],[0,2]]", "[]", "s.toml:2: polygon.points_mm: must go round an area: Self-intersection"),
-        ("[[0,0],[1,1],[2,2]]", "[]", "s.toml:2: polygon.points_mm: must go round an area"),
-        ("[[0,0],[9,0],[9,9]]", "[[[1,1],[2,2],[2,1],[1,2]]]", "s.toml:3: polygon.holes_mm.1: must go round an area"),
+        ("[[0,0],[2,2],[2,0],[0,2]]", "[]", "s.toml:2: polygon.points_mm: must enclose an area: Self-intersection"),
+        ("[[0,0],[1,1],[2,2]]", "[]", "s.toml:2: polygon.points_mm: must enclose an area"),
+        ("[[0,0],[9,0],[9,9]]", "[[[1,1],[2,2],[2,1],[1,2]]]", "s.toml:3: polygon.holes_mm.1: must enclose an area"),
     ],
 )
 def test_a_polygon_that_is_none(points: str, holes: str, expected: str) -> None:

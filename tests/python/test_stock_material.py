@@ -133,7 +133,7 @@ def test_a_roughing_program_leaves_the_block_less_its_slot(job: Job, machine: Ma
 def test_single_moves_of_the_roughing_program_count(job: Job, machine: Machine) -> None:
     """A pocket as deep as the tool plunges with a rapid that the stock file's owner will have to explain: gone, too."""
     plunge = ROUGH.replace("G01 Z-5. F300.\nX70. F500.", "G00 X30.\nG00 Z-5.")
-    with pytest.raises(StockError, match="holds no cutting moves"):
+    with pytest.raises(StockError, match="has no cutting moves"):
         build_material(job(plunge), [straight(-8)], tool(8), 0.1, machine)
     plunge = ROUGH.replace("X70. F500.", "G00 Z5.\nG00 X30.\nG00 Z-5.")
     material = build_material(job(plunge), [straight(-8)], tool(8), 0.1, machine)
@@ -149,7 +149,7 @@ BACK = "G00 Z5.\nM30"
         ("S2000 M03", "T1 M06\nS2000 M03\nT2", "uses the tools T1, T2: must use one"),
         ("X70. F500.", "G18 G03 X-4. Z1. I3. K3. F500.", "rough.nc:6: an arc that is not in the XY plane (G17)"),
         (BACK, f"G55\nG00 X0 Y0\nG01 Z-6. F100.\nX50.\n{BACK}", "cuts in the work coordinates G54, G55: must cut in"),
-        ("G54 G00 X-10. Y20. Z5.", "G91 G01 X1. F500.", "the position of these moves is not known"),
+        ("G54 G00 X-10. Y20. Z5.", "G91 G01 X1. F500.", "the position of these moves is unknown"),
     ],
     ids=["tools", "plane", "coordinates", "place"],
 )

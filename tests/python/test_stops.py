@@ -49,7 +49,7 @@ def test_a_run_without_rests_is_refused() -> None:
 def test_a_force_has_no_stops() -> None:
     whole = record(0)
     tap = sg.Record("tap", PERIOD_S, whole.response, force_n=np.zeros(len(whole.response)))
-    with pytest.raises(sg.ArgumentError, match="holds a force"):
+    with pytest.raises(sg.ArgumentError, match="contains a force"):
         sg.identify([tap], stops=True)
 
 

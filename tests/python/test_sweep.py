@@ -80,7 +80,7 @@ def test_the_axis_that_moved_most_is_taken_and_said(tmp_path: Path) -> None:
     found = identify(path)
     assert found.axis == "x"
     assert any("the axis is not stated: X moved most" in note for note in found.notes)
-    assert identify(path, ReadOptions(axis="x")).notes[0].startswith("looked at from 10 to 130 Hz")
+    assert identify(path, ReadOptions(axis="x")).notes[0].startswith("searched from 10 to 130 Hz")
 
 
 def test_what_a_sweep_must_hold(tmp_path: Path) -> None:
@@ -116,4 +116,4 @@ def test_what_goes_with_a_decay_is_refused(tmp_path: Path, option: list[str]) ->
     save(tmp_path / "raw_data_y_1.csv", *shaken([(1.0, 48.0, 0.06)]), axis=1)
     done = run(tmp_path, "identify", "raw_data_y_1.csv", "--axis", "y", *option)
     assert (done.returncode, done.stderr) == (2, "")
-    assert f"a sweep without force, in which {option[0]} changes nothing" in done.stdout
+    assert f"a sweep without force, for which {option[0]} has no effect" in done.stdout

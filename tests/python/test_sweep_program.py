@@ -91,13 +91,13 @@ def test_the_planned_acceleration_is_that_of_an_independent_simulation(tmp_path:
 def test_what_a_control_does_not_reach_is_said(tmp_path: Path) -> None:
     file = tmp_path / "x.nc"
     with pytest.raises(
-        ArgumentError, match=r"150 Hz cannot be reached, 86.96 Hz can: a block lasts 5 ms or more, with 15 % to spare"
+        ArgumentError, match=r"150 Hz cannot be reached, 86.96 Hz can: a block lasts 5 ms or more, with 15 % margin"
     ):
         write_sweep(file, VX500, "x", band_hz=(10.0, 150.0))
     slow = VX500.with_values("controller.block_time_s", 0.05)
     with pytest.raises(ArgumentError, match=r"band of 8 to 200 Hz: must ascend by 1.5 times or more; .* 8.696 Hz"):
         write_sweep(file, slow, "x")
-    with pytest.raises(ArgumentError, match=r"at 8 Hz the control commands 5 mm/s² only, less than 20 mm/s²"):
+    with pytest.raises(ArgumentError, match=r"at 8 Hz the control commands only 5 mm/s², less than 20 mm/s²"):
         write_sweep(file, VX500, "x", acceleration_share=0.001)
     coarse = VX500.with_values("controller.least_increment_mm", 0.01)
     assert write_sweep(file, coarse, "x").limit.endswith("less than 40 µm")
@@ -110,7 +110,7 @@ def test_the_command_writes_the_program_and_says_the_band_before(tmp_path: Path)
     answer = run(tmp_path, "sweep", "-m", "vx500", "--axis", "y", "-o", "y.nc", "--seconds", "20")
     assert answer.returncode == 0, answer.stderr
     assert answer.stdout.startswith("Y axis of VX500: 8 to 86")
-    assert "next: run y.nc beside a logger on what the Y axis moves" in answer.stdout
+    assert "next: run y.nc with a logger on what the Y axis moves" in answer.stdout
     assert run(tmp_path, "machine", "show", "vx500", "--for", "y.nc").returncode == 0, "no mark of a shaped program"
     small = run(tmp_path, "sweep", "-m", "vx500", "-o", "x.nc", "--set", "controller.program_memory_bytes=20000")
     assert small.returncode == 0

@@ -119,9 +119,9 @@ def test_a_negative_pulse_and_a_sensor_the_other_way_are_turned() -> None:
     assert GOOD.force_n is not None
     good = one(GOOD)
     negative = one(replace(GOOD, force_n=-GOOD.force_n))
-    assert any("the sign of the force is turned" in text for text in negative.warnings)
+    assert any("the sign of the force is reversed" in text for text in negative.warnings)
     against = one(replace(GOOD, response=-GOOD.response))
-    assert any("against the push of the hammer" in text for text in against.warnings)
+    assert any("opposite to the hammer's force" in text for text in against.warnings)
     for other in (negative, against):
         np.testing.assert_array_equal(other.records[0].response, good.records[0].response)
         assert other.records[0].force_n is not None
@@ -132,7 +132,7 @@ def test_a_negative_pulse_and_a_sensor_the_other_way_are_turned() -> None:
         for _ in range(times):
             response = np.cumsum(response) / RATE
         turned = one(replace(GOOD, response=-response, quantity=quantity))  # type: ignore[arg-type]
-        assert any("against the push" in text for text in turned.warnings)
+        assert any("opposite to the hammer's force" in text for text in turned.warnings)
 
 
 def test_a_double_hit_is_refused_and_ringing_is_not() -> None:
@@ -200,9 +200,9 @@ def test_clipping_is_told_from_coarse_steps() -> None:
 def test_missing_and_weak_force() -> None:
     with pytest.raises(RecordError, match=r"zero force: every sample is 0 N.*--ignore-force"):
         prepare([replace(GOOD, force_n=np.zeros(5000))])
-    with pytest.raises(RecordError, match="no hit stands out: the largest force"):
+    with pytest.raises(RecordError, match="no impact above the noise: the largest force"):
         prepare([tap(half_sine(5000, 200, 12, 500.0), force_noise=100.0)])
-    with pytest.raises(RecordError, match="no hit stands out"):
+    with pytest.raises(RecordError, match="no impact above the noise"):
         prepare([replace(GOOD, force_n=np.random.default_rng(2).normal(size=5000))])
     with pytest.raises(RecordError, match="every sample of the response is 0: is the sensor connected"):
         prepare([replace(GOOD, response=np.zeros(5000))])
@@ -243,7 +243,9 @@ def test_sampling_too_slow_for_the_mode() -> None:
 
 def test_without_pre_trigger() -> None:
     late = one(tap(half_sine(5000, 0, 12, 500.0)))
-    assert any("samples before the hit: noise and offset are measured from 8 or more" in text for text in late.warnings)
+    assert any(
+        "samples before the impact: noise and offset are measured from 8 or more" in text for text in late.warnings
+    )
     assert late.usable[0].response_noise is None
     with pytest.raises(RecordError, match="begins inside the pulse"):
         prepare([tap(half_sine(5000, 200, 12, 500.0)[205:])])
@@ -258,7 +260,7 @@ def test_records_must_belong_together() -> None:
         (replace(good, axis="y"), "axis is x; .*axis is y"),
         (replace(good, quantity="velocity"), "quantity is acceleration; .*quantity is velocity"),
         (replace(good, force_n=None), "kind is tap with force; .*kind is decay"),
-        (replace(good, period_s=1e-4), "must be sampled alike"),
+        (replace(good, period_s=1e-4), "must have the same sampling rate"),
     ):
         with pytest.raises(RecordError, match=message):
             prepare([good, other])

@@ -116,7 +116,7 @@ def test_every_dialect_reads_the_same(name: str, tmp_path: Path) -> None:
 
 def test_a_preamble_is_counted(tmp_path: Path) -> None:
     (note,) = only(read(tmp_path, DIALECTS["logger"])).notes
-    assert note.endswith(".csv: 4 lines before the header in line 5 left out")
+    assert note.endswith(".csv: 4 lines before the header in line 5 ignored")
     assert not only(read(tmp_path, DIALECTS["logger"])).warnings
     assert not only(read(tmp_path, DIALECTS["plain"])).notes
 
@@ -205,9 +205,9 @@ def test_without_units_si_is_taken_and_said(tmp_path: Path) -> None:
     record = only(read(tmp_path, "t,f,a\n" + rows()))
     np.testing.assert_array_equal(record.response, RESPONSE)
     text = " / ".join(record.warnings)
-    assert "'f' has no unit: N is taken" in text
-    assert "'a' has no unit: m/s² is taken" in text
-    assert "time has no unit: s is taken, 2000 samples per second" in text
+    assert "'f' has no unit: N is assumed" in text
+    assert "'a' has no unit: m/s² is assumed" in text
+    assert "time has no unit: s is assumed, 2000 samples per second" in text
 
 
 def test_one_record_per_axis(tmp_path: Path) -> None:
@@ -271,7 +271,7 @@ def test_rounded_times_give_the_mean_period(tmp_path: Path) -> None:
 
 def test_the_rate_must_not_change() -> None:
     steps = np.concatenate((np.full(500, 1.0e-3), np.full(500, 1.3e-3)))
-    with pytest.raises(UnevenTimeError, match="off even spacing"):
+    with pytest.raises(UnevenTimeError, match="from even spacing"):
         even_period(np.cumsum(steps))
     jitter = np.arange(1000) * 1e-3 + np.random.default_rng(1).uniform(-4e-5, 4e-5, 1000)
     period, notes = even_period(jitter)
@@ -302,11 +302,11 @@ BAD: dict[str, tuple[str | bytes, dict[str, Any], str]] = {
     "binary": (b"\x89PNG\r\n\x1a\n\x00\x00", {}, r"a binary file \(byte 0x00 at 8\)"),
     "no header": (rows(), {}, r":1: no header: the first line is '0\.0000,"),
     "no numbers": ("hello\nworld\n", {}, r":1: no rows of numbers.*'hello'"),
-    "wrong delimiter": ("time|force|acc\n" + rows("|"), {}, r"divided by comma, semicolon, tab or blanks"),
+    "wrong delimiter": ("time|force|acc\n" + rows("|"), {}, r"separated by comma, semicolon, tab or blanks"),
     "header otherwise divided": (
         "time;force;acc\n" + rows(),
         {},
-        r":1: cells of the header, divided by comma: 1; of line 2: 3",
+        r":1: header cells, separated by comma: 1; of line 2: 3",
     ),
     "decimal commas and commas": (HEADER + rows(",", ","), {}, r"export with semicolons or decimal points"),
     "text instead of a number": (replaced(9, 2, "over"), {}, r":9: column 2 \(force_N\) 'over' is not a finite number"),
@@ -332,7 +332,7 @@ BAD: dict[str, tuple[str | bytes, dict[str, Any], str]] = {
     "name against unit": (
         "t_s,force [m/s²],a_g\n" + rows(),
         {},
-        r"has the unit m/s² of acceleration, it should be force",
+        r"has the unit m/s² of acceleration, but must be of force",
     ),
     "mixed quantities": (
         "t_s,f_N,acc_x_g,disp_y_mm\n" + rows(columns=4),
@@ -345,7 +345,7 @@ BAD: dict[str, tuple[str | bytes, dict[str, Any], str]] = {
     "milliseconds called seconds": (
         "Sampling rate: 2000 Hz\ntime_s,force_N,acc_g\n" + rows(scale=1000.0),
         {},
-        r"says a sample every 0\.5 s, 0\.0005 s is stated.*unit of the time",
+        r"has a sample every 0\.5 s, 0\.0005 s is stated.*unit of the time",
     ),
     "another period": (HEADER + rows(), {"period_s": 1e-3}, r"every 0\.0005 s, 0\.001 s is stated"),
     "too short": (HEADER + "\n".join(rows().splitlines()[:5]), {}, r"5 rows of numbers: too short; .* at least 16"),
@@ -388,14 +388,12 @@ def test_points_for_thousands(tmp_path: Path) -> None:
 def test_times_of_the_day(tmp_path: Path) -> None:
     lines = [f"10:15:00,{500 * k:06d};{k},0;{k},5" for k in range(COUNT)]
     text = "Zeit;Kraft [N];Beschleunigung Y [m/s²]\n" + "\n".join(lines) + "\n"
-    with pytest.raises(
-        RecordError, match=r":2: column 1 \(Zeit\) '10:15:00,000000' is a time of the day.*--sample-period"
-    ):
+    with pytest.raises(RecordError, match=r":2: column 1 \(Zeit\) '10:15:00,000000' is a time of day.*--sample-period"):
         read(tmp_path, text)
     record = only(read(tmp_path, text, period_s=5e-4))
     assert (record.period_s, record.start_s, record.axis) == (5e-4, 0.0, "y")
     np.testing.assert_array_equal(record.response, np.arange(COUNT) + 0.5)
-    assert any("the stated period of 0.0005 s is taken" in text for text in record.notes)
+    assert any("the stated period of 0.0005 s is used" in text for text in record.notes)
 
 
 @pytest.mark.parametrize("name", BAD)
@@ -559,9 +557,9 @@ def test_units_of_a_universal_file(tmp_path: Path) -> None:
     assert record.force_n is not None
     np.testing.assert_allclose(record.force_n, PULSE * 1000.0, atol=1e-7)
     np.testing.assert_allclose(record.response, RINGING * 9.80665, atol=1e-9)
-    assert any("SI is taken" in text for text in only(universal(tmp_path, sets)).warnings)
+    assert any("SI is assumed" in text for text in only(universal(tmp_path, sets)).warnings)
     contradiction = only(universal(tmp_path, [units(1, 1.0, 1.0), *labels]))
-    assert any("the label is taken" in text for text in contradiction.warnings)
+    assert any("the label is used" in text for text in contradiction.warnings)
 
 
 def test_a_sensor_against_the_axis_is_turned(tmp_path: Path) -> None:
@@ -622,9 +620,13 @@ def frequency_response() -> dict[str, Any]:
 
 
 BAD_UNIVERSAL: dict[str, tuple[Callable[[], list[dict[str, Any]]], dict[str, Any], str]] = {
-    "FRF only": (lambda: [frequency_response()], {}, "no time record: the file holds 1 frequency response functions"),
-    "units only": (lambda: [units(1, 1.0, 1.0)], {}, "no time record: the file holds datasets of type 164"),
-    "unknown": (lambda: [dataset(RINGING, 0)], {}, "cannot tell what it is"),
+    "FRF only": (
+        lambda: [frequency_response()],
+        {},
+        "no time record: the file contains 1 frequency response functions",
+    ),
+    "units only": (lambda: [units(1, 1.0, 1.0)], {}, "no time record: the file contains datasets of type 164"),
+    "unknown": (lambda: [dataset(RINGING, 0)], {}, "unknown quantity"),
     "type against unit": (
         lambda: [dataset(RINGING, 12, ordinate_axis_units_lab="N")],
         {},
@@ -642,7 +644,7 @@ BAD_UNIVERSAL: dict[str, tuple[Callable[[], list[dict[str, Any]]], dict[str, Any
         {},
         "2 responses at node 1 and 1 forces",
     ),
-    "force only": (lambda: [dataset(PULSE, 13)], {}, r"no response; the file holds force along x \(dataset 1\)"),
+    "force only": (lambda: [dataset(PULSE, 13)], {}, r"no response; the file contains force along x \(dataset 1\)"),
     "two quantities": (
         lambda: [dataset(RINGING, 12), dataset(RINGING, 8, rsp_node=2)],
         {},
@@ -652,7 +654,7 @@ BAD_UNIVERSAL: dict[str, tuple[Callable[[], list[dict[str, Any]]], dict[str, Any
     "other axis": (
         lambda: [dataset(RINGING, 12)],
         {"axis": "z"},
-        "no response along z; the file holds acceleration along x",
+        "no response along z; the file contains acceleration along x",
     ),
     "other period": (lambda: [dataset(RINGING, 12)], {"period_s": 1e-3}, "0.001 s is stated"),
 }
@@ -670,10 +672,10 @@ def test_a_cut_universal_file(tmp_path: Path) -> None:
     pyuff.UFF(str(path)).write_sets([dataset(RINGING, 12)], mode="add")
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     path.write_text("".join(lines[:20] + lines[-1:]), encoding="utf-8")
-    with pytest.raises(RecordError, match="values, its header says 200: the file is cut off"):
+    with pytest.raises(RecordError, match="values, but 200 by its header: the file is truncated"):
         read_records(path)
     path.write_text("".join(lines[:20]), encoding="utf-8")
-    with pytest.raises(RecordError, match="no time record: the file holds no whole dataset"):
+    with pytest.raises(RecordError, match="no time record: the file contains no dataset"):
         read_records(path)
     path.write_text("time,acc\n0,1\n", encoding="utf-8")
     with pytest.raises(RecordError, match="not a UFF file: it begins with"):
@@ -724,7 +726,7 @@ def test_a_mono_wav_is_a_decay(tmp_path: Path) -> None:
     wavfile.write(path, 8000, (RINGING * 32000).astype(np.int16))
     record = only(read_records(path))
     assert record.force_n is None
-    assert any("share of full scale" in text for text in record.warnings)
+    assert any("the response is a ratio" in text for text in record.warnings)
 
 
 def test_bad_wav_files(tmp_path: Path) -> None:
@@ -734,7 +736,7 @@ def test_bad_wav_files(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match="a mass needs --force-scale and --response-scale"):
         read_records(path)
     assert only(read_records(path, ReadOptions(ignore_force=True))).force_n is None
-    with pytest.raises(RecordError, match=r"6000 samples per second, a period of 0.001 s is stated"):
+    with pytest.raises(RecordError, match=r"6000 samples per second, but a stated period of 0.001 s"):
         read_records(path, ReadOptions(ignore_force=True, period_s=1e-3))
     path.write_bytes(path.read_bytes()[:30])
     with pytest.raises(RecordError, match="cannot be read"):
@@ -822,7 +824,7 @@ def test_volts_by_the_sensitivity_of_the_sensors(tmp_path: Path) -> None:
         ReadOptions(force_sensitivity="2.25 N/mV")
     with pytest.raises(RecordError, match=r"response_sensitivity '100 mV/N': must be"):
         ReadOptions(response_sensitivity="100 mV/N")
-    with pytest.raises(RecordError, match="state one of both"):
+    with pytest.raises(RecordError, match="specify only one"):
         ReadOptions(force_sensitivity="1mV/N", force_scale=2.0)
     np.savetxt(path, volts, delimiter=",", header="time_s,force_N,ax [V]", comments="")
     with pytest.raises(RecordError, match=r"'force_N' is in N, not in volts"):

@@ -192,7 +192,7 @@ def test_the_programs_raise_nothing(tmp_path: Path, kind: str, capsys: pytest.Ca
         (("taper", "--radial-depth", "0.4:3.9"), "at most 3.8 mm"),
         (("taper", "--length", "5"), "too short for a taper of 2.4 mm"),
         (("taper", "-a", "25"), "the flutes are 20 mm long"),
-        (("taper", "-F", "99999"), "this machine takes 1 to 15000 mm/min"),
+        (("taper", "-F", "99999"), "this machine allows 1 to 15000 mm/min"),
     ],
 )
 def test_what_cannot_be_cut_is_refused(
@@ -478,11 +478,11 @@ def test_where_no_interval_is_followed_none_is_proposed(tmp_path: Path, capsys: 
         ("fx_n,fy_n\n0,1\n1,2\n2,3\n3,4\n", "no column of time, position or radial_depth"),
         ("time_s,fx_n,fy_n\n0,1,1\n1,2,2\n2,3,1\n3,4,1\n4,x,1\n", ":6: column 2 (fx_n) 'x' is not a finite number"),
         ("radial_depth_mm,fx_n,fy_n\n0.4,1,1\n0.5,2,2\n", "2 rows of numbers: too short; needed are at least 4"),
-        ("position_mm,fx_n,fy_n\n1,1,1\n2,1,2\n1.5,3,1\n3,4,1\n4,4,1\n", ":4: the position goes back"),
+        ("position_mm,fx_n,fy_n\n1,1,1\n2,1,2\n1.5,3,1\n3,4,1\n4,4,1\n", ":4: the position decreases"),
         ("radial_depth_mm,fx_n,fy_n\n" + "9,1,1\n" * 9, "must be above 0 and below the diameter"),
         ("time_s,fx_n,fy_n\n" + "\n".join(f"{k},1,1" for k in range(20)), "means over time have no position"),
         ("time_s,fx_n,fy_n\n" + "\n".join(f"{k / 60:.6f},1,1" for k in range(90)), "2.0 samples per revolution"),
-        ("time_s,fx_n,fy_n\n" + "\n".join(f"{k / 600:.6f},1,1" for k in range(2000)), "no cut is seen"),
+        ("time_s,fx_n,fy_n\n" + "\n".join(f"{k / 600:.6f},1,1" for k in range(2000)), "no cut found"),
     ],
 )
 def test_bad_records_are_refused(tmp_path: Path, text: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -503,7 +503,7 @@ def test_bad_arguments_of_the_fit_are_refused(tmp_path: Path, capsys: pytest.Cap
         ([file, f"1={file}", *cut], "pass 1 is given twice"),
         ([file, *cut, "--edge-forces"], "edge forces and chip thickness go with a taper"),
         ([file, *cut, "-o", str(tmp_path / "c.toml")], "describes a corner: -o goes with a taper"),
-        ([file, "--cut", file], "no JSON"),
+        ([file, "--cut", file], "not valid JSON"),
         ([file, *cut, "--json", file], "would overwrite"),
         ([file, *cut], "a table of means: a corner needs"),
     ):

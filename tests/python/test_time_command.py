@@ -355,7 +355,7 @@ def test_short_blocks_that_are_rounded_up_are_named() -> None:
     steps = "".join(f"X{0.02 * k:.2f}\n" for k in range(1, 1001))
     time = timed(f"%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1F1000.\n{steps}M30\n%\n")
     assert time.cycle_time_s == pytest.approx(2.05, abs=1e-9)
-    assert "1.67 times what its feeds say" in time.next_step
+    assert "1.67 times its time by feed" in time.next_step
 
 
 def test_python_entry_and_its_module_do_not_hide_each_other() -> None:

@@ -61,7 +61,7 @@ def test_without_calibrated_data_there_is_no_interval() -> None:
     time = sg.cycle_time(PROGRAM, sg.Machine.load("vx500"), full=False)
     assert (time.total_low_s, time.total_high_s, time.interval_parts, time.narrowed_by) == (None, None, (), None)
     assert "±" not in time.answer
-    with pytest.raises(sg.ArgumentError, match=r"states no times\.scatter"):
+    with pytest.raises(sg.ArgumentError, match=r"has no times\.scatter"):
         sg.cycle_time(PROGRAM, sg.Machine.load("vx500"), full=False, log_next=[PROGRAM])
 
 

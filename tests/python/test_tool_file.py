@@ -157,7 +157,7 @@ def test_a_file_is_read_from_disk_and_named_in_messages(tmp_path: Path) -> None:
             "[cutting]",
             "[feed]\nmax_feed_mm_per_min = 800\nspindle_rev_per_min = 1000\n[limits]\n"
             "feed_per_tooth_min_mm = 0.2\n[cutting]",
-            "t.toml:13: limits.feed_per_tooth_min_mm = 0.2: asks for a feed of 1200 mm/min, "
+            "t.toml:13: limits.feed_per_tooth_min_mm = 0.2: needs a feed of 1200 mm/min, but "
             "feed.max_feed_mm_per_min is 800.0",
         ),
     ],

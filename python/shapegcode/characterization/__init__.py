@@ -1,1 +1,1 @@
-"""Measures what a controller does with blocks: writes test programs, and fits the machine file to their results."""
+"""Identifies a controller's parameters: writes test programs, and fits the machine file to their results."""

@@ -1,6 +1,6 @@
-"""The tests: parts of equal moves in the air, the tests for a machine and a box, and their duration.
+"""Characterization tests: parts of equal moves in the air, the tests of a machine and box, and their duration.
 
-A test is one program. The fit needs only these facts, which ``RESULTS.toml`` repeats.
+A test is one program. The fit needs only these data, which ``RESULTS.toml`` repeats.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 AXES = ("X", "Y", "Z")
-BlockEnd = Literal["ceil", "carry"]  # what becomes of the rest of a period at the end of a block
+BlockEnd = Literal["ceil", "carry"]  # rounding of a block's end to the interpolation period
 Kind = Literal["stopwatch", "log"]
 Pattern = Literal["pause", "continuous", "dwell", "exact", "rapid", "feed_steps"]
 _LARGEST_BOX_MM = 10_000.0
@@ -41,7 +41,7 @@ class AirBox:
         for axis, low, high in zip(AXES, values[::2], values[1::2], strict=True):
             if not low <= 0.0 <= high or low == high:
                 span = f"{axis} from {low:g} to {high:g} mm"
-                raise ArgumentError(f"--box {text}: {span} does not hold the start point, which is 0")
+                raise ArgumentError(f"--box {text}: {span} does not contain the start point, 0")
             if max(-low, high) > _LARGEST_BOX_MM:
                 raise ArgumentError(f"--box {text}: {axis} reaches {max(-low, high):g} mm, the limit is 10000")
         return cls(tuple(values[::2]), tuple(values[1::2]))  # type: ignore[arg-type]
@@ -58,7 +58,7 @@ class AirBox:
 
 @dataclass(frozen=True)
 class Part:
-    """A number of equal moves on one axis."""
+    """Equal moves of one axis."""
 
     # `continuous`: cutting moves that overlap; `dwell`: a dwell after each; `exact`: exact stop (G61) after each;
     # `rapid`: G00; `feed_steps`: cutting moves, alternately at the feed and at half of it; `pause`: one dwell, no
@@ -67,8 +67,8 @@ class Part:
     axis: str = "X"
     count: int = 1
     length_mm: float = 0.0  # negative if the first goes in the negative direction
-    feed_mm_per_min: float = 0.0  # cutting feed; the rapid rate at 100 % for a rapid, as the machine file has it
-    stride: int = 1  # moves in one direction before the direction turns
+    feed_mm_per_min: float = 0.0  # cutting feed; for a rapid the rate at 100 % in the machine file
+    stride: int = 1  # moves in one direction before the reversal
     dwell_s: float = 0.0  # dwell after each move (`dwell`), or the pause
 
     @property
@@ -81,22 +81,22 @@ class Part:
 class AirTest:
     """One run of one program."""
 
-    name: str  # of the test, as in `RESULTS.toml`
+    name: str  # name of the test, as in `RESULTS.toml`
     number: int  # O number of its program
     kind: Kind  # `stopwatch`: timed from start to end; `log`: recorded by the control
-    purpose: str  # what it is for, in one line
+    purpose: str  # its purpose, in one line
     parts: tuple[Part, ...]
     override_percent: int = 100
 
     @property
     def program(self) -> str:
-        """Name of the program's file."""
+        """Name of the program file."""
         return f"O{self.number:04d}.nc"
 
 
 @dataclass(frozen=True)
 class Step:
-    """One block of a part: a move, or a dwell where ``length_mm`` is 0."""
+    """One block of a part: a move, or a dwell if ``length_mm`` is 0."""
 
     length_mm: float
     feed_mm_per_min: float  # its feed; 0 for a rapid and for a dwell
@@ -118,7 +118,7 @@ def steps(part: Part) -> Iterator[Step]:
 
 
 def check(test: AirTest, box: AirBox) -> None:
-    """Make sure that a test stays inside the box and ends where it began."""
+    """Check that a test stays within the box and ends at its start."""
     at = dict.fromkeys(AXES, 0.0)
     for part in test.parts:
         index = AXES.index(part.axis)
@@ -129,12 +129,12 @@ def check(test: AirTest, box: AirBox) -> None:
                 goes = f"{part.axis} would go to {at[part.axis]:.3f} mm"
                 raise ArgumentError(f"test {test.name}: {goes}, the box is {low:g} to {high:g} mm")
     if not all(math.isclose(position, 0.0, abs_tol=1e-6) for position in at.values()):
-        raise ArgumentError(f"test {test.name} would not end where it began: {at}")
+        raise ArgumentError(f"test {test.name} would not end at its start: {at}")
 
 
 _FEEDS = (3000.0, 1200.0, 600.0, 300.0, 120.0, 60.0)  # mm/min: in each, 1 µm is a small and exact part of a period
 _FIRST_NUMBER = 7001  # 8000 and 9000 are often locked
-_STOP_S, _STOP_DWELL_S = 0.032, 0.008  # a whole multiple of every usual interpolation period
+_STOP_S, _STOP_DWELL_S = 0.032, 0.008  # multiples of every usual interpolation period
 _LOG_STOP_S, _LOG_DWELL_S, _LOG_PAUSE_S = 0.160, 0.096, 0.5
 _STEPS_WAY_S = 0.8  # at full feed: longer than the ramps at both ends
 _LOG_RATIOS = (1.0, 0.5, 0.25, 0.1, 0.05)
@@ -162,11 +162,11 @@ class _Maker:
         length, travel = round(increments * self._step, 9), self._box.travel_mm(axis)
         if not 0.0 < length <= abs(travel) + 1e-9:
             needed = max(length, self._step)
-            raise ArgumentError(f"--box {self._box}: {axis} has {abs(travel):g} mm, a test needs {needed:.3f} mm")
+            raise ArgumentError(f"--box {self._box}: {axis} has {abs(travel):g} mm, but a test needs {needed:.3f} mm")
         return math.copysign(length, travel)
 
     def _length(self, axis: str, duration_s: float, feed: float, side: int) -> float:
-        """Signed length for a duration; *side* -1 and +1: just below and just above it, whatever the increment."""
+        """Signed length for a duration; *side* -1 and +1: just below or just above it, for any increment."""
         exact = duration_s * feed / _PER_MINUTE
         margin = max(self._step, 0.0005 * exact) if side else 0.0
         increments = round((exact + side * margin) / self._step)
@@ -181,7 +181,7 @@ class _Maker:
         return Part(pattern, axis, count, length, self.feed / slower, dwell_s=dwell if pattern == "dwell" else 0.0)
 
     def run(self, axis: str, count: int, duration_s: float, side: int = 0) -> Part:
-        """Continuous moves, there and back over as much of the box as they fill evenly."""
+        """Continuous moves back and forth, over as much of the box as they fill evenly."""
         length = self._length(axis, duration_s, self.feed, side)
         stride = min(int((abs(self._box.travel_mm(axis)) + 1e-9) / abs(length)), count // 2)
         turns = max(1, round(count / (2 * stride)))
@@ -192,11 +192,11 @@ class _Maker:
         return Part("rapid", axis, count, self._signed(axis, increments), self.rapid[axis])
 
     def rate_is_reached(self, axis: str) -> bool:
-        """Whether rapids over the box reach their rate; else each gives a bracket only, so there are more of them."""
+        """Whether rapids over the box reach their rate; otherwise each gives only bounds, so more are used."""
         return abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / _PER_MINUTE
 
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:
-        """Pieces of one length, alternately fast and slow, and back; none where they have no room."""
+        """Moves of one length, alternately fast and slow, and back; none if the box is too small."""
         room = int((abs(self._box.travel_mm(axis)) + 1e-9) / length_mm)
         wanted = max(8, 2 * math.ceil(_STEPS_WAY_S * self.feed / _PER_MINUTE / (2.0 * length_mm)))
         stride = min(wanted, room - room % 2)
@@ -207,7 +207,7 @@ class _Maker:
 
 
 def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
-    """The tests for a machine: those for a stopwatch first, then the shorter ones for a servo log."""
+    """Make the tests of a machine: those for a stopwatch first, then the shorter ones for a servo log."""
     make = _Maker(machine, box)
     tests: list[AirTest] = []
 
@@ -259,9 +259,9 @@ def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
     return tests
 
 
-# --- how long they last: paper 004 in docs/evidence/references.md, equations 2 to 16 ----------------------------------
+# --- duration of the tests: paper 004 in docs/evidence/references.md, equations 2 to 16 -------------------------------
 
-NO_PERIOD_S = 1e-6  # so short that nothing is rounded
+NO_PERIOD_S = 1e-6  # too short to round anything
 _ROUND_OFF = 1e-6  # periods
 
 
@@ -271,16 +271,16 @@ class ControllerTiming:
 
     period_s: float
     block_end: BlockEnd
-    block_time_s: float  # shortest time in which a block is taken in
+    block_time_s: float  # shortest time to read a block
     cutting_s: float  # from the end of a cutting command to rest: time constant and bell time
     rapid_s: Mapping[str, float] = field(default_factory=dict)  # time constant of a rapid, by axis
     rapid_bell_s: Mapping[str, float] = field(default_factory=dict)  # bell time of a rapid, by axis
     in_position_s: Mapping[str, float] = field(default_factory=dict)  # wait after a rapid or an exact stop, by axis
-    overhead_s: float = 0.0  # what the stopwatch sees besides the program
+    overhead_s: float = 0.0  # stopwatch time in addition to the program
 
     @classmethod
     def of(cls, machine: Machine) -> ControllerTiming:
-        """What a machine file says."""
+        """Timing of a machine file."""
         control = machine.controller
 
         def by_axis(value: object) -> dict[str, float]:
@@ -294,7 +294,7 @@ class ControllerTiming:
 
 
 def whole_periods(duration_s: float, period_s: float) -> float:
-    """A duration rounded up to whole interpolation periods, in s."""
+    """Round a duration up to whole interpolation periods, in s."""
     return math.ceil(duration_s / period_s - _ROUND_OFF) * period_s
 
 

@@ -1,4 +1,4 @@
-"""From the results of the tests to facts of the controller, and from them to a machine file."""
+"""Fits controller parameters to the results of the tests, and writes them to a machine file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ORDER = (
     *(f"{what} {axis}" for what in _OF_AXES for axis in "XYZ"),
 )
 _SHAPES = {"bell": "linear", "linear or bell": "linear"}  # in the machine file
-_SAME = "straight moves between stops look the same with and without look-ahead: a setting, not a finding"
+_SAME = "straight moves between stops are the same with and without look-ahead: a setting, not a finding"
 _NOT_SEEN = ControllerFact("motion", None, None, None, "", "", "", _SAME)
 
 
@@ -34,26 +34,26 @@ def characterize(
     units: str | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Characterisation:
-    """Fit a controller to what was measured with the programs of `write_characterization_tests`.
+    """Fit controller parameters to results of the programs of `write_characterization_tests`.
 
     Args:
-        results: a filled-in RESULTS.toml, the folder that holds it and the logs, or one log beside it.
-        machine: whose file gets the values.
+        results: a filled-in RESULTS.toml, the folder with it and the logs, or one log in that folder.
+        machine: machine that gets the values.
         units: of time and length in the logs, for example "ms,um"; None: from their headers.
-        on_progress: called with the share of the work done, 0 to 1.
+        on_progress: called with the completed fraction, 0 to 1.
 
     Returns:
-        What is known, with 95 % intervals, and the machine with it.
+        Known parameters with 95 % intervals, and the machine with them.
 
     Raises:
         ArgumentError, FileError: bad input, with file, line, value and limit.
-        MachineError: the values do not go with others of the machine file; the message names both.
+        MachineError: the values contradict others of the machine file; the message names both.
         OSError: a file cannot be read.
     """
     sheet = _sheet(Path(results))
     if not sheet.times_s and not sheet.logs:
         raise ArgumentError(
-            f"{sheet.file}: nothing was measured: no times_s, no log (a log beside the file is found by the name of "
+            f"{sheet.file}: nothing was measured: no times_s, no log (a log next to the file is found by the name of "
             "its test, such as log_cutting.csv)"
         )
     factors, logs = parse_units(units) if units is not None else None, {}
@@ -80,7 +80,7 @@ def characterize(
 
 
 def _sheet(source: Path) -> FilledSheet:
-    """The results named by a RESULTS.toml, by the folder that holds it, or by a log in that folder."""
+    """Read results, given RESULTS.toml, its folder, or a log in that folder."""
     if source.is_dir():
         return read_sheet(source / SHEET)
     if source.suffix.lower() == ".toml":
@@ -97,7 +97,7 @@ def _sheet(source: Path) -> FilledSheet:
 
 
 def _assumed(machine: Machine, key: str) -> float | str | None:
-    """What the machine file has for a key; None where it has none."""
+    """Value of a key in the machine file; None if not set."""
     held: Any = machine
     for name in key.split("."):
         inner = getattr(held, name, None)
@@ -108,7 +108,7 @@ def _assumed(machine: Machine, key: str) -> float | str | None:
 
 
 def _fitted(machine: Machine, facts: Sequence[ControllerFact]) -> tuple[Machine, dict[str, str]]:
-    """The machine with everything that is known, and a remark for each key that was set."""
+    """The machine with all known parameters, and a remark for each key set."""
     values: dict[str, object] = {}
     remarks: dict[str, str] = {}
     for_all: dict[str, list[ControllerFact]] = defaultdict(list)
@@ -124,7 +124,7 @@ def _fitted(machine: Machine, facts: Sequence[ControllerFact]) -> tuple[Machine,
         value = fact.value
         values[fact.key] = round(value, 7) if isinstance(value, float) else _SHAPES.get(value, value)
         if fact.quantity == CUTTING_SUM and isinstance(value, float):
-            # The sum of both times leaves the file its bell time where that fits.
+            # From the sum of both times the file keeps its bell time if that fits.
             bell = machine.controller.bell_time_s if machine.controller.bell_time_s < value else 0.0
             values |= {"controller.bell_time_s": bell, fact.key: round(value - bell, 7)}
         key, text = (head, f"{last} ") if of_axis else (fact.key, "")

@@ -1,4 +1,4 @@
-"""What servo logs of the test programs say about a controller: period, time constants, waits, blocks, position loop."""
+"""Fits controller parameters to servo logs of the tests: period, time constants, waits, blocks, position loop."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FOLLOWED, _RUN_SETTLE_S, _STEPS_SETTLE_S = 0.9, 0.45, 0.3
 
 
 def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list[ControllerFact]:
-    """Fit everything that the logs hold."""
+    """Fit all parameters that the logs determine."""
     bend = moves.bend_samples(list(logs.values()))
     parts = {name: moves.parts_of(log, tests[name], bend) for name, log in logs.items()}
     facts = LogFacts()
@@ -57,7 +57,7 @@ def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list
 def _period(
     facts: LogFacts, logs: Mapping[str, ServoLog], stops: list[moves.PartLog], run: list[moves.PartLog], bend: int
 ) -> None:
-    """Interpolation period: from a held command, else from moves just below and just above whole periods."""
+    """Interpolation period: from a command held constant, else from moves just below and just above whole periods."""
     name, key = "interpolation period", "controller.interpolation_period_s"
     count, sampling = min((moves.held_samples(log)[0], log.sampling_s) for log in logs.values())
     facts.sampling = sampling
@@ -81,7 +81,7 @@ def _period(
 
 
 def _period_of_stops(stops: list[moves.PartLog]) -> tuple[float, float, str] | None:
-    """The usual period that explains the difference of two rounded durations; its half-width and a note."""
+    """Usual period that explains the difference of two rounded durations; with half-width and a note."""
     if len(stops) < 2:
         return None
     (below, half_b), (above, half_a) = stops[0].pitch_s(), stops[1].pitch_s()
@@ -95,7 +95,7 @@ def _period_of_stops(stops: list[moves.PartLog]) -> tuple[float, float, str] | N
 
 
 def _period_of_run(run: list[moves.PartLog], sampling: float) -> tuple[float, float, str] | None:
-    """Of the usual periods the one to which the blocks of a run are rounded; its half-width and a note."""
+    """Usual period to which the blocks of a run are rounded; with half-width and a note."""
     steady = moves.line_slope(run[0], _RUN_SETTLE_S) if run else None
     if steady is None:
         return None
@@ -105,12 +105,12 @@ def _period_of_run(run: list[moves.PartLog], sampling: float) -> tuple[float, fl
     fits = [t for t in PERIODS_S if abs(whole_periods(part.duration_s, t) - lasts) <= slack and t <= 1.01 * sampling]
     if lasts - part.duration_s <= 2.0 * slack or len(fits) != 1:
         return None
-    note = f"blocks of {part.duration_s * 1e3:.2f} ms last {lasts * 1e3:.2f} ms, and no longer period shows"
+    note = f"blocks of {part.duration_s * 1e3:.2f} ms take {lasts * 1e3:.2f} ms, and no longer period fits"
     return fits[0], slack, note
 
 
 def _dwells(facts: LogFacts, part: moves.PartLog) -> float:
-    """Whether the control waits for in-position before a dwell; returns the pitch of the moves without the dwell."""
+    """Find the in-position wait before a dwell; returns the pitch of the moves without the dwell."""
     pitch, half = part.pitch_s()
     moving = pitch - whole_periods(part.part.dwell_s, facts.tick)
     if facts.stop_s is not None:
@@ -151,17 +151,17 @@ def _waits(facts: LogFacts, stops: dict[str, _Interval], rapids: dict[str, list[
                 value, half = mean([value, stop[0]], [half, stop[1]])
                 note = "after rapids and exact stops"
         if value < -half:
-            facts.add_unknown(name, f"{value * 1e3:.1f} ms: the next move begins too early")
+            facts.add_unknown(name, f"{value * 1e3:.1f} ms: the next move starts too early")
         else:
             facts.add(name, max(value, 0.0), half, key, note)
 
 
 def _block_end(facts: LogFacts, run: moves.PartLog, settle: float) -> str | None:
-    """Ceil or carry from the mean time of long blocks."""
+    """Find ceil or carry from the mean time of long blocks."""
     part, nominal = run.part, run.part.duration_s
     speed, half = moves.line_slope(run, settle) or (abs(part.length_mm) / nominal, math.inf)
     lasts = abs(part.length_mm) / speed
-    note = f"blocks of {nominal * 1e3:.2f} ms last {lasts * 1e3:.2f} ms"
+    note = f"blocks of {nominal * 1e3:.2f} ms take {lasts * 1e3:.2f} ms"
     full = whole_periods(nominal, facts.period) - nominal if facts.period else None
     slack = lasts * half / speed + 1e-5
     end = None
@@ -170,7 +170,7 @@ def _block_end(facts: LogFacts, run: moves.PartLog, settle: float) -> str | None
     elif full is not None and abs(lasts - nominal) < 0.3 * full and slack < 0.3 * full:
         end = "carry"
     if end is None:
-        facts.add_unknown("block end", note + ": neither fits, or the period is not known", "")
+        facts.add_unknown("block end", note + ": neither fits, or the period is unknown", "")
     else:
         facts.add_word("block end", end, "controller.block_end", note)
     return end
@@ -181,7 +181,7 @@ def _block_time(facts: LogFacts, blocks: moves.PartLog, settle: float, end: str 
     lasting = f"blocks of {part.duration_s * 1e3:.2f} ms"
     steady = moves.line_slope(blocks, settle)
     if steady is None:
-        facts.add_unknown(name, f"{lasting} are over before the speed is steady: it is short")
+        facts.add_unknown(name, f"{lasting} end before the speed is steady: it is short")
         return
     speed, half = steady
     lasts = abs(part.length_mm) / speed
@@ -190,16 +190,16 @@ def _block_time(facts: LogFacts, blocks: moves.PartLog, settle: float, end: str 
     if facts.period and end != "carry":
         floor = whole_periods(part.duration_s, facts.period)
     if lasts <= 1.02 * floor + slack:
-        why = f"{lasting} last {lasts * 1e3:.2f} ms: it hides behind the period"
+        why = f"{lasting} take {lasts * 1e3:.2f} ms: it is hidden by the period"
         facts.add_unknown(name, why, high=lasts + slack)
         return
     if facts.exponential:
-        slack += 0.005 * lasts  # the tail of the start
-    facts.add(name, lasts, slack, "controller.block_time_s", f"{lasting} last so long")
+        slack += 0.005 * lasts  # tail of the start
+    facts.add(name, lasts, slack, "controller.block_time_s", f"{lasting} take this time")
 
 
 def _feed_steps(facts: LogFacts, parts: list[moves.PartLog]) -> None:
-    """The shortest distance over which the speed follows a step of the feed between F and F/2 by 90 %."""
+    """Shortest distance over which the speed reaches 90 % of a feed step between F and F/2."""
     if not parts:
         facts.add_unknown("feed-control interval", "needs log_feed_steps", "mm")
         return
@@ -208,7 +208,7 @@ def _feed_steps(facts: LogFacts, parts: list[moves.PartLog]) -> None:
     followed = [d for d in depths if all(depths[e] >= _FOLLOWED for e in depths if e >= d)]
     shown = ", ".join(f"{d:g} mm {max(0.0, min(1.0, depths[d])) * 100:.0f} %" for d in sorted(depths))
     if not followed:
-        facts.add_unknown(name, f"no distance that fits into the box is followed: {shown}", "mm")
+        facts.add_unknown(name, f"none of the distances in the box is followed: {shown}", "mm")
         return
     best = min(followed)
     below = max((d for d in depths if d < best), default=0.0)
@@ -216,9 +216,9 @@ def _feed_steps(facts: LogFacts, parts: list[moves.PartLog]) -> None:
 
 
 def _followed_share(log: moves.PartLog) -> float | None:
-    """Share of the speed step that is followed; None where no part of the move has a constant speed."""
+    """Ratio of the speed step that is reached; None if no part of the move has a constant speed."""
     part = log.part
-    top = int(np.argmax(log.travel_mm))  # the turn, which smoothing cuts short
+    top = int(np.argmax(log.travel_mm))  # the reversal, which smoothing shortens
     begin = log.times_s[int(np.argmax(log.travel_mm > max(0.02, 5 * log.noise_mm)))]
     settle = min(_STEPS_SETTLE_S, 0.25 * (log.times_s[top] - begin))
     inside = (log.times_s > begin + settle) & (log.times_s < log.times_s[top] - settle)
@@ -235,40 +235,40 @@ def _followed_share(log: moves.PartLog) -> float | None:
 
 # --- time constants from the shape of single moves --------------------------------------------------------------------
 
-_ODD_SHAPE = 0.002  # of the travel: a fit that leaves more is no fit
-_BELL_GAIN = 0.8  # a second moving average must lower the variance below this share
+_ODD_SHAPE = 0.002  # largest residual of a fit, relative to the travel
+_BELL_GAIN = 0.8  # a second moving average must reduce the variance below this ratio
 _FINE = 1.7  # periods
 _FINE_BENT = 1.0
-_NO_BELL = "no second moving average shows"
+_NO_BELL = "no second moving average was found"
 _SHAPE_NOTES = {"linear": "linear", "bell": "the longer of two moving averages", "exponential": "exponential"}
 
 
 @dataclass
 class LogFacts(Facts):
-    """What is known from the logs so far; times in s."""
+    """Parameters found from the logs so far; times in s."""
 
     source: str = "log"
-    period: float | None = None  # interpolation period; None: not known
-    held: bool = False  # whether the command is held over a period
-    bent: bool = False  # whether it is interpolated between periods
-    sampling: float = 0.001  # of the logs
-    cutting: float | None = None  # time constant and bell time of cutting moves together; None: not known
+    period: float | None = None  # interpolation period; None: unknown
+    held: bool = False  # the command is constant over a period
+    bent: bool = False  # the command is interpolated between periods
+    sampling: float = 0.001  # sampling time of the logs
+    cutting: float | None = None  # time constant and bell time of cutting moves together; None: unknown
     cutting_half: float = 0.0  # half-width of its interval
-    exponential: bool = False  # whether cutting moves have the shape of an exponential
+    exponential: bool = False  # cutting moves are exponential
 
     @property
     def tick(self) -> float:
-        """The period, or one so short that nothing is rounded."""
+        """The period, or one too short to round anything."""
         return self.period or 1e-6
 
     @property
     def stop_s(self) -> float | None:
-        """What a stop adds to a cutting move; None: not known, or an exponential, which has no end."""
+        """Time that a stop adds to a cutting move; None: unknown, or an exponential without end."""
         return None if self.exponential else self.cutting
 
     @property
     def fine_s(self) -> float:
-        """A second moving average up to this length may be interpolation between unseen periods."""
+        """Length up to which a second moving average may be interpolation between unknown periods."""
         if self.bent and self.period:
             return _FINE_BENT * self.period
         return 0.0 if self.held else _FINE * max(self.period or 0.0, 2.0 * self.sampling)
@@ -287,11 +287,11 @@ def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
     if best == "linear" and rms["bell"] ** 2 < _BELL_GAIN * rms["linear"] ** 2 and min(bell) > facts.fine_s:
         best = "bell"
     if rms[best] > _ODD_SHAPE * abs(stops[0].part.length_mm) + 3.0 * stops[0].noise_mm:
-        why = f"no moving average and no exponential: the best fit ({best}) leaves {rms[best] * 1e3:.1f} µm; "
+        why = f"no moving average or exponential: the best fit ({best}) has a residual of {rms[best] * 1e3:.1f} µm; "
         for name in names:
             facts.add_unknown(name, f"{why}was a look-ahead mode on?")
         return
-    # Of each fit the longest time first.
+    # Longest time of each fit first.
     pairs_of = [zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True) for fit in fits[best]]
     times = [sorted(pairs, reverse=True) for pairs in pairs_of]
     value, half = mean(*zip(*(pairs[0] for pairs in times), strict=True))
@@ -307,12 +307,12 @@ def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
     elif best == "linear":
         facts.add_interval(names[1], 0.0, 0.0, max(facts.fine_s, 0.002), bell_key, _NO_BELL)
     if not facts.exponential:
-        # What a stopwatch sees.
+        # The sum, as from a stopwatch.
         facts.add(CUTTING_SUM, facts.cutting, facts.cutting_half)
 
 
 def _cutting_fits(facts: LogFacts, stops: list[moves.PartLog]) -> dict[str, list[moves.ShapeFit]]:
-    """Each part with each shape: its nominal duration and one or two times are fitted."""
+    """Fit nominal duration and one or two times of each part, with each shape."""
     fits: dict[str, list[moves.ShapeFit]] = {"linear": [], "bell": [], "exponential": []}
     for part in stops:
         nominal = part.part.duration_s
@@ -332,7 +332,7 @@ def _cutting_fits(facts: LogFacts, stops: list[moves.PartLog]) -> dict[str, list
 class _Rapid:
     """Fit of one part of rapids; values with their half-widths, s."""
 
-    long: bool  # whether the rate is reached
+    long: bool  # the rate is reached
     ramp: _Interval
     bell: _Interval | None
     wait: _Interval
@@ -371,12 +371,12 @@ def _rapid(part: moves.PartLog, facts: LogFacts) -> _Rapid:
 
 
 def fit_rapids(facts: LogFacts, axis: str, parts: list[moves.PartLog]) -> list[_Interval]:
-    """Time constants of an axis' rapids; returns the in-position times that they show, with their half-widths."""
+    """Fit time constants of an axis' rapids; returns their in-position times with half-widths."""
     name, bell_name = f"rapid time constant {axis}", f"rapid bell time {axis}"
     every = [_rapid(part, facts) for part in parts]
     fits = [fit for fit, part in zip(every, parts, strict=True) if fit.rms_mm < _ODD_SHAPE * abs(part.part.length_mm)]
     if not fits:
-        why = f"the rapids are no constant acceleration: the best fit leaves {every[0].rms_mm * 1e3:.1f} µm"
+        why = f"rapids have no constant acceleration: the best fit has a residual of {every[0].rms_mm * 1e3:.1f} µm"
         facts.add_unknown(name, why)
         facts.add_unknown(bell_name, why)
         return []
@@ -403,7 +403,7 @@ def fit_rapids(facts: LogFacts, axis: str, parts: list[moves.PartLog]) -> list[_
 
 
 def _short_ramp(facts: LogFacts, fits: list[_Rapid]) -> tuple[float, float]:
-    """Between which time constants rapids lie that do not reach the rate: eq. 16 of paper 004, for half of a rapid."""
+    """Bounds of the time constant from rapids below the rate: eq. 16 of paper 004, for half of a rapid."""
     period = facts.tick
     halves = [(whole_periods(fit.ramp[0] - 0.3 * period, period), fit) for fit in fits]
     sure = [(half, fit) for half, fit in halves if abs(half - fit.ramp[0]) + fit.ramp[1] < 0.3 * period]
@@ -418,7 +418,7 @@ _SERVO_SLACK = 0.02
 
 
 def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
-    """Position gain K and feed-forward f: e = −K ∫e dt + (1 − f) x + c, fitted to following error e and command x."""
+    """Fit position gain K and feed-forward f to following error e and command x: e = −K ∫e dt + (1 − f) x + c."""
     by_axis = {axis: [_servo_rows(log, index) for log in logs.values()] for index, axis in enumerate(AXES)}
     if not any(record for records in by_axis.values() for record in records):
         facts.add_unknown("position gain", "no actual positions in the logs", "1/s")
@@ -428,10 +428,10 @@ def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
         name = f"position gain {axis}"
         gain, rest = _lag_of(records)
         if rest < 0.02 or not 2.0 * GAINS[0] < gain < 0.5 * GAINS[1]:
-            facts.add_unknown(name, "the actual position follows the command without a lag that determines it", "1/s")
+            facts.add_unknown(name, "the actual position follows the command without measurable lag", "1/s")
             continue
         spread = np.std(np.array([_lag_of([record]) for record in records]), axis=0) / math.sqrt(len(records))
-        # Command and actual position may be sampled up to half a sample apart, which looks like lag.
+        # Command and actual position may be sampled up to half a sample apart, which appears as lag.
         apart = 0.5 * min(log.sampling_s for log in logs.values()) * gain
         half = float(spread[0]) + (_SERVO_SLACK + apart / rest) * gain
         facts.add(name, gain, half, f"controller.position_gain_per_s.{axis.lower()}", unit="1/s")
@@ -441,7 +441,7 @@ def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
 
 
 def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, float] | None:
-    """Command, following error and time step, one row for each held command so that its stairs are no error."""
+    """Command, following error and time step, one row for each constant command, to ignore its stairs."""
     if log.actual_mm is None or np.isnan(log.actual_mm[0, index]) or np.isnan(log.command_mm[0, index]):
         return None
     count, first = moves.held_samples(log)
@@ -459,7 +459,7 @@ def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, floa
 
 
 def _lag_of(records: list[tuple[FloatArray, FloatArray, float]]) -> tuple[float, float]:
-    """Position gain in 1/s and what feed-forward leaves (1 − f), from all records: least squares of the error."""
+    """Fit position gain (1/s) and remaining lag ratio (1 − f) to all records by least squares."""
     from scipy.optimize import minimize_scalar
 
     def solve(gain: float) -> tuple[float, float]:

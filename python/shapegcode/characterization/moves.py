@@ -1,4 +1,4 @@
-"""Single moves in a servo log: when the command changes, where the moves are, what shape they have.
+"""Single moves in a servo log: steps of the command, times and shapes of the moves.
 
 A move between rests is a smoothed rectangle of speed, in closed form; time constants are fitted to all moves of a part.
 """
@@ -21,7 +21,7 @@ _HOLD_SHARE, _BEND_SHARE, _LONGEST_HOLD = 0.9, 0.85, 64
 
 
 def held_samples(log: ServoLog) -> tuple[int, int]:
-    """Over how many samples the command is held, and the index of a first sample; 1 if it is not held."""
+    """Number of samples with constant command, and the index of a first one; 1 if it is not held constant."""
     command = np.nan_to_num(log.command_mm)
     increments = np.diff(command, axis=0)
     noise = np.maximum(command[: max(3, round(0.1 / log.sampling_s))].std(axis=0), 5e-4)
@@ -38,12 +38,12 @@ def held_samples(log: ServoLog) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class _Bends:
-    """How much of the bending of a command lies at every count-th sample and its successor."""
+    """Fraction of a command's curvature at every count-th sample and its successor."""
 
-    share: float  # of all bending
-    first: int  # index of such a sample
-    fraction: float  # of the bend between the two samples, 0 to 1
-    energy: float  # all bending above the noise
+    share: float  # fraction of all curvature
+    first: int  # index of the first such sample
+    fraction: float  # position of the bend between the two samples, 0 to 1
+    energy: float  # total curvature above the noise
 
 
 def _bends(log: ServoLog, count: int) -> _Bends:
@@ -59,19 +59,19 @@ def _bends(log: ServoLog, count: int) -> _Bends:
 
 
 def bend_samples(logs: Sequence[ServoLog]) -> int:
-    """After how many samples the speed of an interpolated command changes, 3 or more; 1: not seen."""
+    """Number of samples between speed changes of an interpolated command, 3 or more; 1: none found."""
     best = 1
     for count in range(3, _LONGEST_HOLD // 2):
         every = [_bends(log, count) for log in logs]
         total = sum(each.energy for each in every)
-        # A divisor of the true count shows all bends too: the largest counts.
+        # A divisor of the true count also contains all bends: use the largest.
         if total > 0.0 and sum(each.share * each.energy for each in every) > _BEND_SHARE * total:
             best = count
     return best
 
 
 def ticks(log: ServoLog, bend: int) -> tuple[FloatArray, FloatArray]:
-    """Times and positions, one for each interpolation period where that shows."""
+    """Times and positions, one for each interpolation period if it is visible."""
     count, first = held_samples(log)
     if count == 1 and bend > 1:
         found = _bends(log, bend)
@@ -79,7 +79,7 @@ def ticks(log: ServoLog, bend: int) -> tuple[FloatArray, FloatArray]:
         before = before[before > 0]
         times = log.times_s[before] + found.fraction * log.sampling_s
         x = log.command_mm
-        # The straight pieces on both sides meet at the bend.
+        # The straight lines on both sides meet at the bend.
         left = x[before] + found.fraction * (x[before] - x[before - 1])
         right = x[before + 1] - (1.0 - found.fraction) * (x[before + 2] - x[before + 1])
         return times, (left + right) / 2.0
@@ -91,7 +91,7 @@ def ticks(log: ServoLog, bend: int) -> tuple[FloatArray, FloatArray]:
     return times, held.mean(axis=1)
 
 
-_PAUSE_S = 0.3  # a rest of a part is shorter, the pause between two parts is 0.5 s
+_PAUSE_S = 0.3  # rests within a part are shorter, the pause between two parts is 0.5 s
 _SHORTEST_BOX_S, _STAMP, _MAX_SAMPLES = 2e-5, 0.03, 1500
 
 
@@ -105,10 +105,10 @@ class PartLog:
     noise_mm: float  # standard deviation of a sample at rest
 
     def middles_s(self) -> FloatArray:
-        """The times at which a there-and-back part passes the middle of its travel, (n,)."""
+        """Times at which a back-and-forth part passes the middle of its travel, (n,)."""
         length = abs(self.part.length_mm) * self.part.stride
         u = self.travel_mm / length - 0.5
-        # hysteresis, so that noise at the middle does not count twice
+        # hysteresis, so that noise at the middle is not counted twice
         state = np.where(u > 0.2, 1, np.where(u < -0.2, -1, 0))
         known = np.flatnonzero(state)
         turns = np.flatnonzero(np.diff(state[known])) if len(known) else np.array([], dtype=int)
@@ -129,7 +129,7 @@ class PartLog:
 
 
 def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
-    """Cut a log into the parts of its test."""
+    """Split a log into the parts of its test."""
     wanted = [part for part in test.parts if part.pattern != "pause"]
     for part in wanted:
         if np.isnan(log.command_mm[0, AXES.index(part.axis)]):
@@ -143,12 +143,12 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
     moved = np.abs(points[reach:] - points[:-reach]).max(axis=1) > max(9.0 * float(noise.max()), 0.004)
     rows = np.flatnonzero(moved)
     if not len(rows):
-        raise ArgumentError(f"{log.file}: nothing moves, so this is no log of test {test.name}")
+        raise ArgumentError(f"{log.file}: no motion, so this is not a log of test {test.name}")
     cuts = np.flatnonzero(np.diff(times[rows]) > _PAUSE_S)
     bounds = [(int(rows[a]), int(rows[b])) for a, b in zip([0, *(cuts + 1)], [*cuts, len(rows) - 1], strict=True)]
     if len(bounds) != len(wanted):
         raise ArgumentError(
-            f"{log.file}: {len(bounds)} stretches of motion with rests of {_PAUSE_S:g} s between them; test "
+            f"{log.file}: {len(bounds)} motions with rests of {_PAUSE_S:g} s between them; test "
             f"{test.name} has {len(wanted)}"
         )
     out = []
@@ -161,7 +161,7 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
         spread = float(noise[used.index(axis)])
         out.append(PartLog(part, times[low:high], travel, spread))
         moved, expected = travel.max() - travel.min(), abs(part.length_mm) * part.stride
-        # A turn without a stop is cut short by the smoothing.
+        # Smoothing shortens a reversal without stop.
         least = 0.98 if part.pattern in ("dwell", "exact", "rapid") else 0.5
         if not least * expected < moved < 1.02 * expected + 10.0 * spread:
             raise ArgumentError(
@@ -172,7 +172,7 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
 
 
 def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> FloatArray:
-    """Share of the travel at the times after the start, for a rectangle and moving averages of these lengths in s."""
+    """Fraction of the travel at times after the start, for a rectangle and moving averages of these lengths, s."""
     used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
     power, out = len(used), np.zeros_like(times)
     if not power:
@@ -184,7 +184,7 @@ def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> Fl
 
 
 def lagged_share(times: FloatArray, values: FloatArray) -> FloatArray:
-    """The same for a rectangle and an exponential: duration and time constant in s."""
+    """Fraction of the travel for a rectangle and an exponential with duration and time constant, s."""
     rectangle_s, lag_s = values
 
     def ramp(t: FloatArray) -> FloatArray:
@@ -200,7 +200,7 @@ class ShapeFit:
 
     values: FloatArray  # the fitted parameters, without the start
     half: FloatArray  # half-widths of their 95 % intervals
-    rms_mm: float  # what the fit leaves
+    rms_mm: float  # RMS residual
 
 
 def fit_shape(
@@ -210,7 +210,7 @@ def fit_shape(
     low: Sequence[float],
     high: Sequence[float],
 ) -> ShapeFit:
-    """Fit one curve to all moves of a there-and-back part, laid over each other at their middles."""
+    """Fit one curve to all moves of a back-and-forth part, superimposed at their middles."""
     from scipy.optimize import least_squares
 
     middles = log.middles_s()
@@ -238,14 +238,14 @@ def fit_shape(
     variance = float(found.fun @ found.fun) / max(1, len(t) - len(begin))
     jacobian = np.asarray(found.jac)
     covariance = variance * np.linalg.pinv(jacobian.T @ jacobian)
-    # Time stamps are no better than a part of the sampling time, however many samples agree.
+    # Time stamps are accurate to a fraction of the sampling time, however many samples agree.
     stamp = _STAMP * float(np.median(np.diff(log.times_s)))
     half = np.hypot(1.96 * np.sqrt(np.maximum(np.diag(covariance)[:n], 0.0)), stamp)
     return ShapeFit(found.x[:n], half, math.sqrt(variance))
 
 
 def line_slope(log: PartLog, settle_s: float) -> tuple[float, float] | None:
-    """Mean speed in mm/s of the outward travel, and its 95 % half-width; None if too little of it is steady."""
+    """Mean speed in mm/s of the outward travel, and its 95 % half-width; None if too little is steady."""
     top = int(np.argmax(log.travel_mm))
     begin = int(np.argmax(log.travel_mm > max(8.0 * log.noise_mm, 0.003)))
     first, last = log.times_s[begin] + settle_s, log.times_s[top] - settle_s
@@ -256,6 +256,6 @@ def line_slope(log: PartLog, settle_s: float) -> tuple[float, float] | None:
     y = log.travel_mm[inside]
     slope = float(x @ (y - y.mean()) / (x @ x))
     rest = y - y.mean() - slope * x
-    # The ripple of the blocks is not white: it may tilt the line by its own height over the length of the line.
+    # Block ripple is not white: it may tilt the line by its own height over the line's length.
     sigma = math.sqrt(float(rest @ rest) / max(1, len(x) - 2) / float(x @ x))
     return slope, 1.96 * sigma + float(rest.std()) / float(np.ptp(x)) * 0.5

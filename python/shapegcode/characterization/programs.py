@@ -1,4 +1,4 @@
-"""The tests as FANUC programs, what the operator needs, and ``RESULTS.toml``: written here, read for the fit."""
+"""The tests as FANUC programs, instructions for the operator, and ``RESULTS.toml``: written, and read for the fit."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ _HEADER = "G21 G17 G91 G94 G64"
 def write_characterization_tests(
     folder: str | Path, machine: Machine, box: str | air_tests.AirBox = "0:100,0:100,0:20"
 ) -> CharacterisationTests:
-    """Write test programs that show what a controller does with blocks, and what the operator needs for them.
+    """Write test programs that identify a controller's parameters, and instructions for the operator.
 
-    Into the folder go every program, ``RESULTS.toml`` to fill in, and ``README.txt``. All moves are in the air.
+    The folder gets the programs, ``RESULTS.toml`` to fill in, and ``README.txt``. All moves are in the air.
 
     Args:
-        folder: into which; it is made where it is missing.
-        machine: gives the least increment, the largest feeds and the rapid rates.
-        box: where the tests may move, mm from the point at which they are started, "X0:X1,Y0:Y1,Z0:Z1".
+        folder: output folder, created if missing.
+        machine: source of least increment, largest feeds and rapid rates.
+        box: range of the tests, mm from their start point, "X0:X1,Y0:Y1,Z0:Z1".
 
     Returns:
-        The tests with the time that each is expected to last, in the order in which they are written.
+        The tests with their expected durations, in the order written.
 
     Raises:
-        ArgumentError: the box or the feeds are too small; the folder holds a RESULTS.toml, which may be filled in.
+        ArgumentError: the box or the feeds are too small; the folder contains a RESULTS.toml, which may be filled in.
         OSError: the folder or a file cannot be written.
     """
     box = air_tests.AirBox.parse(box) if isinstance(box, str) else box
     out = Path(folder)
     tests = air_tests.make_tests(machine, box)
     if (out / SHEET).exists():
-        raise ArgumentError(f"{out / SHEET} exists and may hold results: name another folder")
+        raise ArgumentError(f"{out / SHEET} exists and may contain results: specify another folder")
     out.mkdir(parents=True, exist_ok=True)
     for test in {test.number: test for test in reversed(tests)}.values():
         write_text(out / test.program, program_text(test, box, machine))
@@ -63,7 +63,7 @@ def write_characterization_tests(
 
 
 def program_text(test: air_tests.AirTest, box: air_tests.AirBox, machine: Machine) -> str:
-    """The program of a test: incremental, no spindle, no reference point, no tool change, written out."""
+    """Program of a test: incremental, no spindle, no reference point, no tool change, without loops."""
     decimals = max(1, round(-math.log10(machine.controller.least_increment_mm)))
     shared = test.name.startswith("override")  # one program, run at several overrides
     title = "OVERRIDE" if shared else test.name.upper().replace("_", "-")
@@ -92,7 +92,7 @@ def program_text(test: air_tests.AirTest, box: air_tests.AirBox, machine: Machin
 
 
 def _word(address: str, value: float, decimals: int) -> str:
-    """A word with a decimal point and no zero before it."""
+    """Format a word with a decimal point and no zero before it."""
     text = f"{value:.{decimals}f}".rstrip("0")
     text = text.replace("-0.", "-.") if text.startswith("-0.") and text != "-0." else text.removeprefix("0")
     return f"{address}{text}"
@@ -119,7 +119,7 @@ def readme_text(tests: Sequence[air_tests.AirTest], machine: Machine, box: air_t
     )  # fmt: skip
 
 
-SHEET = "RESULTS.toml"  # Name of the file
+SHEET = "RESULTS.toml"  # file name
 
 _Whole = Annotated[Count, Field(ge=1, le=1_000_000)]
 _Length = Annotated[Float, Field(ge=-1e5, le=1e5)]
@@ -130,35 +130,35 @@ _PROGRAM = r"^O(\d{1,8})\.nc$"
 
 
 class _PartTable(InlineTable):
-    """What a part does, as `plan.Part`."""
+    """A part, as `air_tests.Part`."""
 
     pattern: air_tests.Pattern = key("kind of move")
-    axis: Literal["X", "Y", "Z"] = key("of the moves", default="X")
+    axis: Literal["X", "Y", "Z"] = key("axis of the moves", default="X")
     count: _Whole = key("number of moves", default=1)
-    length_mm: _Length = key("of a move", default=0.0)
+    length_mm: _Length = key("length of a move", default=0.0)
     feed_mm_per_min: _Feed = key("cutting feed, or the rapid rate", default=0.0)
     stride: _Whole = key("moves in one direction", default=1)
-    dwell_s: _Dwell = key("after each move, or the pause", default=0.0)
+    dwell_s: _Dwell = key("dwell after each move, or the pause", default=0.0)
 
     @model_validator(mode="after")
     def _moves(self) -> _PartTable:
         for name in ("length_mm", "feed_mm_per_min"):
             if self.pattern != "pause" and getattr(self, name) == 0.0:
-                raise KeyProblem(name, 0.0, "must not be 0 where something moves")
+                raise KeyProblem(name, 0.0, "must not be 0 with motion")
         return self
 
 
 class _TestTable(TomlTable):
-    program: Annotated[Text, Field(pattern=_PROGRAM)] = key("name of its file, such as O7001.nc")
+    program: Annotated[Text, Field(pattern=_PROGRAM)] = key("file name, such as O7001.nc")
     override_percent: Annotated[Count, Field(ge=1, le=254)] = key("feed override", default=100)
     times_s: tuple[_Time, ...] = key("stopwatch times", default=())
     log: Text | None = key("file of the servo log", default=None)
-    parts: Annotated[tuple[_PartTable, ...], Field(min_length=1)] = key("what the program does")
+    parts: Annotated[tuple[_PartTable, ...], Field(min_length=1)] = key("parts of the program")
 
 
 class _SheetTable(TomlTable):
     resolution_s: Annotated[Float, Field(ge=1e-6, le=10)] = key("step of the stopwatch", default=0.1)
-    reaction_s: Annotated[Float, Field(ge=0, le=10)] = key("scatter of start and stop", default=0.1)
+    reaction_s: Annotated[Float, Field(ge=0, le=10)] = key("standard deviation of start and stop by hand", default=0.1)
     tests: Annotated[dict[str, _TestTable], Field(min_length=1)] = key(
         "as `shapegcode characterize --write` wrote them"
     )
@@ -166,11 +166,11 @@ class _SheetTable(TomlTable):
 
 @dataclass(frozen=True)
 class FilledSheet:
-    """What was measured."""
+    """Results of the tests."""
 
-    file: str  # where it was read
+    file: str  # path
     tests: dict[str, air_tests.AirTest]  # every test of the file
-    times_s: dict[str, tuple[float, ...]]  # stopwatch times by test; a test without times is left out
+    times_s: dict[str, tuple[float, ...]]  # stopwatch times by test; tests without times are omitted
     logs: dict[str, Path]  # servo log by test
     resolution_s: float  # step of the stopwatch
     reaction_s: float  # standard deviation of the operator's start and stop together
@@ -178,7 +178,7 @@ class FilledSheet:
 
 
 def read_sheet(path: Path) -> FilledSheet:
-    """Read ``RESULTS.toml``; a log test without a name takes ``<test>.csv`` beside the file, if it is there."""
+    """Read ``RESULTS.toml``; a log test without a name uses ``<test>.csv`` next to the file, if present."""
     text = read_text(path, FileError)
     sheet = validated(_SheetTable, parsed(text, str(path), FileError), str(path), text, FileError)
     logs: dict[str, Path] = {}
@@ -201,12 +201,12 @@ def read_sheet(path: Path) -> FilledSheet:
 
 
 def sheet_text(tests: Sequence[air_tests.AirTest], machine: Machine, box: air_tests.AirBox) -> str:
-    """The file to fill in."""
+    """Text of the file to fill in."""
     timing = air_tests.ControllerTiming.of(machine)
     lines = [
         f"# Results of the characterization tests of {machine.name}; box from the start point, mm: {box}",
         "# Fill in times_s (one or more times in s, from cycle start to the end of the program), or put the servo log",
-        "# of a log test beside this file and name it. Tests that were not run stay empty. Leave parts as they are.",
+        "# of a log test next to this file and name it. Leave tests empty that were not run. Do not change parts.",
         "",
         "resolution_s = 0.1  # step of the stopwatch",
         "reaction_s = 0.1  # scatter (standard deviation) of starting and stopping by hand; 0 if read off the control",

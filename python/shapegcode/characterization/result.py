@@ -1,4 +1,4 @@
-"""Parameters of a controller with their intervals, its tests, and what follows from their results."""
+"""Parameters of a controller with intervals, its tests, and results."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from shapegcode.results.json import hidden
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
-CUTTING_SUM = "cutting time constant + bell time"  # What a stopwatch sees of the acceleration after interpolation
-#: Interpolation periods that controls are built with, s.
+CUTTING_SUM = "cutting time constant + bell time"  # acceleration after interpolation, as from a stopwatch
+#: Usual interpolation periods of controls, s.
 PERIODS_S = tuple(ms / 1000.0 for ms in (0.125, 0.25, 0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16))
 
 
@@ -22,25 +22,25 @@ PERIODS_S = tuple(ms / 1000.0 for ms in (0.125, 0.25, 0.5, 1, 1.5, 2, 2.5, 3, 4,
 class ControllerFact:
     """One quantity."""
 
-    quantity: str  # its name, the same whatever it is found from
-    value: float | str | None  # a number, a word, or None if it is not known
-    low: float | None  # lower end of the 95 % interval; None for a word, and where nothing bounds it
+    quantity: str  # its name, the same for every source
+    value: float | str | None  # a number, a word, or None if unknown
+    low: float | None  # lower end of the 95 % interval; None for a word, or without a bound
     high: float | None  # upper end
     unit: str  # of value, low and high
-    key: str  # dotted key of the machine file that it goes into; empty: none
-    source: str  # how it was measured, "log" or "stopwatch"; empty: not at all
-    note: str = ""  # its basis; for an unknown value, why it is not known
-    assumed: float | str | None = None  # what the machine file had; None where it has no such key
+    key: str  # dotted key in the machine file; empty: none
+    source: str  # how it was measured, "log" or "stopwatch"; empty: not measured
+    note: str = ""  # its basis; for an unknown value, the reason
+    assumed: float | str | None = None  # former value in the machine file; None: no such key
 
     @property
     def width(self) -> float:
-        """Of the interval: infinite where the value is not known, 0 for a word."""
+        """Width of the interval: infinite for an unknown value, 0 for a word."""
         if self.value is None:
             return math.inf
         return 0.0 if self.low is None or self.high is None else self.high - self.low
 
     def contradicts(self, other: ControllerFact) -> bool:
-        """Whether both are numbers whose intervals do not overlap, or texts that differ."""
+        """Whether both are numbers whose intervals do not overlap, or different texts."""
         if self.value is None or other.value is None:
             return False
         if isinstance(self.value, str) or isinstance(other.value, str):
@@ -53,19 +53,19 @@ class ControllerFact:
 
 @dataclass
 class Facts:
-    """Collects the facts that one source gives."""
+    """Collects the facts of one source."""
 
     source: str  # "log" or "stopwatch"
-    found: list[ControllerFact] = field(default_factory=list)  # one for each quantity, known or not
+    found: list[ControllerFact] = field(default_factory=list)  # one for each quantity, including unknown ones
 
     def add(self, quantity: str, value: float, half: float, key: str = "", note: str = "", unit: str = "s") -> None:
-        """A number with a symmetric interval of half-width *half*, cut off at 0."""
+        """Add a number with a symmetric interval of half-width *half*, limited to 0 or above."""
         self.add_interval(quantity, value, max(0.0, value - half), value + half, key, note, unit)
 
     def add_interval(
         self, quantity: str, value: float, low: float, high: float, key: str = "", note: str = "", unit: str = "s"
     ) -> None:
-        """A number with its interval."""
+        """Add a number with its interval."""
         self.found.append(ControllerFact(quantity, value, low, high, unit, key, self.source, note))
 
     def add_word(self, quantity: str, word: str, key: str = "", note: str = "") -> None:
@@ -73,12 +73,12 @@ class Facts:
         self.found.append(ControllerFact(quantity, word, None, None, "", key, self.source, note))
 
     def add_unknown(self, quantity: str, why: str, unit: str = "s", high: float | None = None) -> None:
-        """A quantity that the data do not determine; *high* is a limit that they do give."""
+        """Add a quantity that the data do not determine; *high*: an upper limit, if known."""
         self.found.append(ControllerFact(quantity, None, None, high, unit, "", self.source, why))
 
 
 def mean(values: Sequence[float], halves: Sequence[float]) -> tuple[float, float]:
-    """Weighted mean of values with 95 % half-widths, and its half-width; wider where the values disagree."""
+    """Weighted mean of values with 95 % half-widths, and its half-width; wider if the values disagree."""
     weights = [1.0 / max(half, 1e-9) ** 2 for half in halves]
     total = sum(weights)
     centre = sum(w * v for w, v in zip(weights, values, strict=True)) / total
@@ -90,7 +90,7 @@ def mean(values: Sequence[float], halves: Sequence[float]) -> tuple[float, float
 
 
 def combine(first: Sequence[ControllerFact], second: Sequence[ControllerFact]) -> list[ControllerFact]:
-    """For each quantity the better of two facts, known and narrow; the note says where they contradict each other."""
+    """For each quantity the better known of two facts; the note reports a contradiction."""
     other = {each.quantity: each for each in second}
     out: list[ControllerFact] = []
     for each in first:
@@ -111,22 +111,22 @@ def combine(first: Sequence[ControllerFact], second: Sequence[ControllerFact]) -
 class WrittenTest:
     """One run of one program."""
 
-    name: str  # of the test, as in ``RESULTS.toml``
-    program: str  # name of its file
+    name: str  # name of the test, as in ``RESULTS.toml``
+    program: str  # program file name
     kind: Kind  # "stopwatch": timed from start to end; "log": recorded by the control
-    override_percent: int  # feed override at which it is run
-    expected_s: float  # how long it lasts on a controller as the machine file says
-    purpose: str  # what it is for
+    override_percent: int  # feed override of this run
+    expected_s: float  # expected duration by the machine file
+    purpose: str  # its purpose
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class CharacterisationTests(Result):
-    """The test programs that were written.
+    """Written test programs.
 
     Attributes:
         machine: name of the machine.
-        folder: where they are, with ``README.txt`` and ``RESULTS.toml``.
-        box: where they move, mm from the start point, "X0:X1,Y0:Y1,Z0:Z1".
+        folder: folder of the programs, with ``README.txt`` and ``RESULTS.toml``.
+        box: range of the moves, mm from the start point, "X0:X1,Y0:Y1,Z0:Z1".
         tests: in the order of the folder; several may share a program.
         warnings: none.
     """
@@ -139,12 +139,12 @@ class CharacterisationTests(Result):
 
     @property
     def ok(self) -> bool:
-        """They are written."""
+        """Always true: the tests are written."""
         return True
 
     @property
     def answer(self) -> str:
-        """How many, and where."""
+        """Number of tests, folder, duration."""
         watch, log = (sum(test.expected_s for test in self.tests if test.kind == kind) for kind in ("stopwatch", "log"))
         return (
             f"{len(self.tests)} tests of {self.machine} in {self.folder}: {watch / 60.0:.0f} min with a stopwatch, "
@@ -153,11 +153,11 @@ class CharacterisationTests(Result):
 
     @property
     def next_step(self) -> str:
-        """To run them."""
+        """Run the tests."""
         return f"read {self.folder}/README.txt, run the tests, fill in {self.folder}/RESULTS.toml"
 
     def tables(self) -> list[Table]:
-        """One row for each test."""
+        """Table with one row for each test."""
         columns = (
             Column("program", text=True),
             Column("test", value="name", text=True),
@@ -170,15 +170,15 @@ class CharacterisationTests(Result):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Characterisation(Result):
-    """What a controller does with blocks, as the results of its tests say.
+    """Controller parameters from the results of the tests.
 
     Attributes:
-        machine: name of the machine whose file the facts are compared with.
-        findings: one for each quantity, known or not.
-        files: what was read.
-        fitted: the machine with everything that is known.
-        remarks: for each key of the machine file that was set, by its dotted name: interval and source.
-        warnings: contradictions: results that do not go with the others, with their place.
+        machine: name of the machine with which the facts are compared.
+        findings: one for each quantity, including unknown ones.
+        files: files read.
+        fitted: the machine with all known parameters.
+        remarks: interval and source of each machine-file key set, by dotted name.
+        warnings: contradictions: results that do not agree with the others, with their location.
     """
 
     published: ClassVar[tuple[str, ...]] = ("block overlap",)
@@ -191,12 +191,12 @@ class Characterisation(Result):
 
     @property
     def ok(self) -> bool:
-        """No result contradicts the others."""
+        """True if no result contradicts the others."""
         return not self.warnings
 
     @property
     def answer(self) -> str:
-        """Number of quantities that are known, and of keys that were measured."""
+        """Numbers of known quantities and measured keys."""
         known = sum(each.value is not None for each in self.findings)
         sentence = (
             f"{known} of {len(self.findings)} quantities of {self.machine} are known, {len(self.remarks)} keys measured"
@@ -205,16 +205,16 @@ class Characterisation(Result):
 
     @property
     def next_step(self) -> str:
-        """To repeat what contradicts, else to use the machine file."""
+        """Repeat contradicting tests, or use the machine file."""
         if not self.ok:
             return "repeat the tests that contradict the others"
         return "shapegcode machine show explains the machine file with these values, which -o FILE writes"
 
     def next_step_after(self, file: str) -> str:
-        """The same where the machine file was written.
+        """Next step after the machine file was written.
 
         Args:
-            file: name of it.
+            file: name of the machine file.
 
         Returns:
             One sentence.
@@ -222,11 +222,11 @@ class Characterisation(Result):
         return f"shapegcode machine show {file} explains it" if self.ok else self.next_step
 
     def to_toml(self) -> str:
-        """The machine file with everything that is known, and a remark at each measured key."""
+        """Text of the machine file with all known parameters, and a remark at each measured key."""
         return self.fitted.to_toml(self.remarks)
 
     def tables(self) -> list[Table]:
-        """One row for each quantity: value, interval, what the machine file has; times in ms."""
+        """Table with one row for each quantity: value, interval, value in the machine file; times in ms."""
         columns = (
             Column("quantity", text=True),
             Column("value", value=lambda fact: "unknown" if fact.value is None else _shown(fact, fact.value, True)),

@@ -1,7 +1,7 @@
-"""What stopwatch times of the test programs say about a controller; method: this project.
+"""Fits controller parameters to stopwatch times of the test programs; method: this project.
 
-Each time is one equation. For every usual period and both rules of the block's end the others are least squares; a
-period or rule counts as known only where the alternatives fit clearly worse. Rapids follow, for every time constant.
+Each time is one equation. For every usual period and both block-end rules the others are fitted by least squares; a
+period or rule is known only if the alternatives fit clearly worse. Rapids are fitted last, for every time constant.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from shapegcode.characterization.programs import FilledSheet
 from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, Facts
 from shapegcode.io.units import FloatArray
 
-_CLEARLY = 9.0  # chi² by which an alternative must fit worse
-_WIDE = 0.5  # of the value: an interval of so much either way determines nothing
+_CLEARLY = 9.0  # chi² difference of a clearly worse alternative
+_WIDE = 0.5  # ratio to the value: a wider half interval determines nothing
 _CONTRADICTS = 4.0  # standard deviations
 _SHAPE_KEY = "controller.after_interpolation_shape"
 _SLOW = ("stop_slow", "stop_slower")
@@ -29,13 +29,13 @@ _NAMES = ("overhead", "cutting", "X", "Y", "Z", "block")
 
 @dataclass
 class WatchFacts(Facts):
-    """What the times have shown so far."""
+    """Parameters found from the times so far."""
 
     source: str = "stopwatch"
-    contradictions: list[str] = field(default_factory=list)  # times that do not go with the others, in words
+    contradictions: list[str] = field(default_factory=list)  # times that do not agree with the others, in words
 
     def add_if_narrow(self, name: str, value: float, half: float, key: str, needs: str, note: str) -> None:
-        """A time in s, unknown where its interval is too wide or below 0."""
+        """Add a time in s, unknown if its interval is too wide or below 0."""
         if half > _WIDE * max(abs(value), 0.002):
             self.add_unknown(name, f"needs {needs}; the interval would be ±{half * 1e3:.1f} ms", high=value + half)
         elif value < -half:
@@ -60,7 +60,7 @@ class _Fit:
 
 
 def fit_stopwatch(results: FilledSheet) -> WatchFacts:
-    """Fit everything that the stopwatch times hold."""
+    """Fit all parameters that the stopwatch times determine."""
     rows = _rows(results)
     facts = WatchFacts()
     exponential = _shape(rows, facts)
@@ -77,8 +77,8 @@ def fit_stopwatch(results: FilledSheet) -> WatchFacts:
         expected = program_time_s(row.test, _timing(best.values, best.period, best.end))
         if abs(expected - row.time_s) > _CONTRADICTS * row.sigma_s + 0.001 * row.time_s:
             facts.contradictions.append(
-                f"{results.file}:{results.lines[row.test.name]}: {row.test.name}: {row.time_s:.2f} s; what fits all "
-                f"tests best gives {expected:.2f} s"
+                f"{results.file}:{results.lines[row.test.name]}: {row.test.name}: {row.time_s:.2f} s; the best fit to "
+                f"all tests gives {expected:.2f} s"
             )
     for axis in AXES:
         mine = [row for row in rows.values() if row.test.parts[0].pattern == "rapid" and row.test.parts[0].axis == axis]
@@ -88,12 +88,12 @@ def fit_stopwatch(results: FilledSheet) -> WatchFacts:
 
 
 def _rows(results: FilledSheet) -> dict[str, TimedTest]:
-    """The mean time of each test that was timed, and its standard deviation."""
+    """Mean time of each timed test, and its standard deviation."""
     rounding = results.resolution_s / math.sqrt(12.0)
     single = math.hypot(rounding, results.reaction_s)
     out = {}
     for name, times in results.times_s.items():
-        # The rounding of one reading is not averaged out by the next: a machine repeats itself.
+        # Rounding errors of readings do not average out, as a machine repeats exactly.
         sigma = math.hypot(rounding, results.reaction_s / math.sqrt(len(times)))
         spread = float(np.std(times, ddof=1)) if len(times) > 2 else 0.0
         if spread > 2.0 * single:
@@ -103,12 +103,12 @@ def _rows(results: FilledSheet) -> dict[str, TimedTest]:
 
 
 def _used(rows: dict[str, TimedTest], exponential: float) -> list[TimedTest]:
-    """What the least squares are of: no rapids, no overrides, and no stops that say the same again."""
+    """Tests for the least squares: no rapids, no overrides, no redundant stops."""
     left_out = {*_SLOW, "stop_above"} if exponential else {"stop_slow" if "stop_slower" in rows else ""}
     used = []
     for name, row in rows.items():
         pattern = row.test.parts[0].pattern
-        # The tail of a run is not that of a stop: its last speed and its length are others.
+        # The tail of a run differs from that of a stop: other last speed and length.
         sigma_s = math.hypot(row.sigma_s, 1.5 * exponential) if pattern == "continuous" else row.sigma_s
         if name not in left_out and pattern != "rapid" and not name.startswith("override"):
             used.append(replace(row, sigma_s=sigma_s))
@@ -122,7 +122,7 @@ def _timing(values: FloatArray, period: float, end: air_tests.BlockEnd) -> Contr
 
 
 def _least_squares(rows: Sequence[TimedTest], period: float, end: air_tests.BlockEnd) -> _Fit:
-    """All unknowns but the rapids', for one period and rule."""
+    """All unknowns except those of rapids, for one period and rule."""
     from scipy.optimize import least_squares
 
     tiny = next((row for row in rows if row.test.name == "blocks_tiny"), None)
@@ -141,7 +141,7 @@ def _least_squares(rows: Sequence[TimedTest], period: float, end: air_tests.Bloc
 
 
 def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
-    """Time constant of an exponential, whose deceleration lasts longer from a higher feed; 0 if it does not."""
+    """Time constant of an exponential, whose deceleration takes longer from a higher feed; 0 if it does not."""
     fast = rows.get("stop_below")
     slow = [rows[name] for name in _SLOW if name in rows]
     name = "cutting acceleration shape"
@@ -160,11 +160,11 @@ def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
     slope = float(weight @ ((x - centre) * y)) / spread
     half = 1.96 / math.sqrt(spread)
     if slope <= half + 0.002:
-        note = "a stop takes equally long from every feed; linear or bell cannot be distinguished"
+        note = "a stop takes the same time from every feed; linear or bell cannot be distinguished"
         facts.add_word(name, "linear or bell", _SHAPE_KEY, note)
         return 0.0
-    facts.add_word(name, "exponential", "", "stops from a higher feed last longer")
-    # Each stop ends on a period that is not known well: half of the longest usual one, evenly spread.
+    facts.add_word(name, "exponential", "", "stops from a higher feed take longer")
+    # Each stop ends on a poorly known period: half of the longest usual one, uniformly distributed.
     away = float(((x - centre) ** 2).sum())
     slack = 1.96 * 0.008 / math.sqrt(12.0) * math.sqrt(away) / away
     key, note = "controller.time_constant_s", "from stops at several feeds"
@@ -173,7 +173,7 @@ def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
 
 
 def _discrete(fits: Sequence[_Fit], facts: WatchFacts) -> tuple[_Fit, float | None]:
-    """The best fit, and the period if it is known; says whether period and rule are."""
+    """The best fit, and the period if known; adds period and rule to the facts."""
     best = min(fits, key=lambda fit: fit.chi2)
     close = [fit for fit in fits if fit.chi2 < best.chi2 + _CLEARLY]
     periods = sorted({fit.period for fit in close})
@@ -196,10 +196,10 @@ def _discrete(fits: Sequence[_Fit], facts: WatchFacts) -> tuple[_Fit, float | No
 def _cutting(best: _Fit, exponential: bool, facts: WatchFacts) -> None:
     """Time constants of cutting moves, and the waits after exact stops."""
     if not exponential:
-        note = "a stopwatch sees only the sum"
+        note = "a stopwatch measures only the sum"
         key = "controller.time_constant_s"
         facts.add_if_narrow(CUTTING_SUM, *best.get("cutting"), key, "stop_below, overhead", note)
-        facts.add_unknown("cutting bell time", "a stopwatch sees only the sum of both times")
+        facts.add_unknown("cutting bell time", "a stopwatch measures only the sum of both times")
     note = "after exact stops, if a dwell does not wait for in-position"
     for axis in AXES:
         key, needs = f"controller.in_position_s.{axis.lower()}", f"exact_{axis.lower()}, stop_below"
@@ -215,7 +215,7 @@ def _block_time(best: _Fit, tiny: TimedTest | None, facts: WatchFacts) -> None:
     floor = air_tests.part_time_s(replace(part, count=1), ControllerTiming(best.period, best.end, 0.0, 0.0))
     if value <= 1.02 * floor + half or half > _WIDE * value:
         lasts = max(value, floor) * 1e3
-        why = f"blocks of {part.duration_s * 1e3:.2f} ms last {lasts:.2f} ms: it hides behind the period"
+        why = f"blocks of {part.duration_s * 1e3:.2f} ms take {lasts:.2f} ms: it is hidden by the period"
         facts.add_unknown("block time", why, high=floor + 2.0 * tiny.sigma_s / part.count)
         return
     facts.add("block time", value, half, "controller.block_time_s")
@@ -224,12 +224,12 @@ def _block_time(best: _Fit, tiny: TimedTest | None, facts: WatchFacts) -> None:
 def _override(best: _Fit, rows: dict[str, TimedTest], facts: WatchFacts) -> None:
     for row in [row for name, row in rows.items() if name.startswith("override")]:
         part = row.test.parts[0]
-        # without block overlap there is one ramp, whatever the override
+        # without block overlap there is one ramp at any override
         moving = max(row.time_s - best.get("overhead")[0] - best.get("cutting")[0], 1e-3)
         seen = 100.0 * part.count * part.duration_s / moving
         half = 1.96 * seen * row.sigma_s / moving
         right = abs(seen - row.test.override_percent) <= half + 1.0
-        note = "time goes with 1 / override" if right else "the feed does not follow the override"
+        note = "time is proportional to 1 / override" if right else "the feed does not follow the override"
         facts.add(f"feed at override {row.test.override_percent} %", seen, half, "", note, "%")
 
 
@@ -240,15 +240,15 @@ _WAIT_UNKNOWN_S = 0.1
 
 @dataclass(frozen=True)
 class TimedTest:
-    """A test that was timed."""
+    """A timed test."""
 
-    test: air_tests.AirTest  # what it does
+    test: air_tests.AirTest  # the test
     time_s: float  # mean of the readings
     sigma_s: float  # its standard deviation
 
 
 def _fit_rapids(facts: WatchFacts, axis: str, timed: list[TimedTest], period: float | None, best: _Fit) -> None:
-    """Time constant and bell time of an axis' rapids."""
+    """Fit time constant and bell time of an axis' rapids."""
     overhead, wait = best.get("overhead"), best.get(axis)
     names = (f"rapid time constant {axis}", f"rapid bell time {axis}")
     if len(timed) < 2:
@@ -262,7 +262,7 @@ def _fit_rapids(facts: WatchFacts, axis: str, timed: list[TimedTest], period: fl
         sigma = np.hypot(sigma, 0.002)
     weight = 1.0 / sigma**2
     seen = (np.array([each.time_s for each in timed]) - overhead[0]) / count
-    # After a rapid comes at least the in-position wait, if that is known.
+    # A rapid is followed at least by the in-position wait, if known.
     least = max(0.0, wait[0] - wait[1]) if wait[1] < _WAIT_UNKNOWN_S else 0.0
     chi2, after = np.empty(len(_RAMPS_S)), np.empty(len(_RAMPS_S))
     singles, zero = [replace(part, count=1) for part in parts], {axis: 0.0}
@@ -291,7 +291,7 @@ def _fit_rapids(facts: WatchFacts, axis: str, timed: list[TimedTest], period: fl
 
 
 def _ramp(facts: Facts, axis: str, ramps: FloatArray, likely: FloatArray) -> None:
-    """The time constant: mean and ends of those that fit."""
+    """Add the time constant: mean and range of those that fit."""
     name = f"rapid time constant {axis}"
     step = float(_RAMPS_S[1] - _RAMPS_S[0])
     low, high = float(ramps.min()) - step, float(ramps.max()) + step
@@ -306,18 +306,18 @@ def _ramp(facts: Facts, axis: str, ramps: FloatArray, likely: FloatArray) -> Non
 def _bell(
     facts: Facts, axis: str, total: float, wait: tuple[float, float], ends: tuple[float, float], slack: float
 ) -> None:
-    """The bell time is what comes after the motion, without the wait for in-position."""
+    """Add the bell time: the time after the motion, without the in-position wait."""
     name, key = f"rapid bell time {axis}", f"controller.rapid_bell_time_s.{axis.lower()}"
     low, high = ends
     bell = total - wait[0]
     if wait[1] > _WAIT_UNKNOWN_S:
-        why = f"needs exact_{axis.lower()}: rapids alone show bell and in-position time together, {total * 1e3:.1f} ms"
+        why = f"needs exact_{axis.lower()}: rapids show only bell plus in-position time, {total * 1e3:.1f} ms"
         facts.add_unknown(name, why, high=total)
     elif low <= 0.0 and high > 2.0 * slack + 0.02:
-        facts.add_unknown(name, f"anything up to {high * 1e3:.0f} ms fits", high=high)
+        facts.add_unknown(name, f"any value up to {high * 1e3:.0f} ms fits", high=high)
     elif low <= 0.0:
         facts.add_interval(name, 0.0, 0.0, max(high, 0.0), key, "none, or below the upper end")
     elif high - low > 2.0 * _WIDE * bell:
         facts.add_unknown(name, f"from {low * 1e3:.0f} to {high * 1e3:.0f} ms all fit", high=high)
     else:
-        facts.add_interval(name, bell, low, high, key, "if rapids and exact stops wait equally long for in-position")
+        facts.add_interval(name, bell, low, high, key, "if rapids and exact stops have equal in-position waits")

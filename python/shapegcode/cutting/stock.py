@@ -1,4 +1,4 @@
-"""The stock file: the material that is there before the first block of a program runs, in the program's coordinates."""
+"""The stock file: the material before the first block of a program, in program coordinates."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Upright(TomlTable):
         for name in ("x_mm", "y_mm", "z_mm"):
             low, high = getattr(self, name, (0.0, 1.0))
             if low >= high:
-                raise KeyProblem(name, (low, high), "the smaller number comes first, and the two must differ")
+                raise KeyProblem(name, (low, high), "the first number must be smaller than the second")
         return self
 
 
@@ -45,11 +45,11 @@ class Polygon(Upright):
 
 
 class Allowance(Upright):
-    """What roughing left on the walls that this program finishes."""
+    """Layer left by roughing on the walls finished by this program."""
 
-    allowance_mm: Positive = key("thickness that is left on the walls")
+    allowance_mm: Positive = key("thickness of the layer on the walls")
     corner_radius_mm: NonNegative = key(
-        "radius that roughing left in inside corners: that of the roughing tool, or of its path there; wider corners "
+        "radius left by roughing in inside corners: that of the roughing tool, or of its path there; wider corners "
         "keep their own. Not below the radius of the finishing tool"
     )
     wall: Literal["left", "right"] = key(
@@ -58,19 +58,19 @@ class Allowance(Upright):
     )
     z_mm: Range = key("bottom and top")
     width_mm: Positive = key(
-        "how deep behind the finished wall the material is taken into account: more than the tool could gouge",
+        "depth of material considered behind the finished wall: more than the tool could gouge",
         default=5.0,
     )
     lead_in_mm: NonNegative = key(
-        "length of the travel before the wall begins, in each run of cutting moves that does not close upon itself "
-        "(where one does, what leads to the closed contour is left out by itself)",
+        "length of the travel before the wall begins, in each sequence of cutting moves that is not closed "
+        "(for a closed one the lead-in is found automatically)",
         default=0.0,
     )
-    lead_out_mm: NonNegative = key("length of the travel behind the wall's end, likewise", default=0.0)
+    lead_out_mm: NonNegative = key("length of the travel after the wall's end, likewise", default=0.0)
 
 
 class Solid(TomlTable):
-    """A plain shape: one of the two."""
+    """A shape: one of the two."""
 
     box: Box | None = key("a block", default=None)
     polygon: Polygon | None = key("a prism over a polygon", default=None)
@@ -82,11 +82,11 @@ class Solid(TomlTable):
 
 
 class Rough(TomlTable):
-    """What a program that ran before has left."""
+    """Stock left by a program that ran before."""
 
     file: Text = key("the program that ran before; the name is relative to the folder of the stock file")
-    tool: Text = key("tool file of the tool that it ran with, likewise")
-    on: Solid = key("what was there before that program: [program.on.box] or [program.on.polygon]")
+    tool: Text = key("file of its tool, likewise")
+    on: Solid = key("stock before that program: [program.on.box] or [program.on.polygon]")
 
 
 class Stock(TomlTable):
@@ -95,13 +95,13 @@ class Stock(TomlTable):
     box: Box | None = key("a block", default=None)
     polygon: Polygon | None = key("a prism over a polygon", default=None)
     allowance: Allowance | None = key(
-        "what roughing left on the walls that this program finishes: a layer of even thickness, and more in the inside "
-        "corners. Material on the other side of the tool is taken as gone",
+        "layer left by roughing on the walls finished by this program: even thickness, and more in the inside "
+        "corners. Material on the other side of the tool is assumed gone",
         default=None,
     )
-    program: Rough | None = key("what a program that ran before has left", default=None)
+    program: Rough | None = key("stock left by a program that ran before", default=None)
 
-    # Where the file stands, so that names in it can be resolved; its name and text, for messages
+    # Folder of the file, to resolve names in it; its name and text, for messages
     _folder: Path = PrivateAttr(default=Path())
     _source: str = PrivateAttr(default="<text>")
     _text: str = PrivateAttr(default="")
@@ -116,7 +116,7 @@ class Stock(TomlTable):
         """Read a stock file.
 
         Args:
-            path: the file; names of files in it are relative to its folder.
+            path: the file; file names in it are relative to its folder.
 
         Returns:
             The stock.
@@ -133,8 +133,8 @@ class Stock(TomlTable):
 
         Args:
             text: the text.
-            source: name of it in messages.
-            folder: what the names of files in it are relative to.
+            source: its name in messages.
+            folder: folder to which file names in it are relative.
 
         Returns:
             The stock.
@@ -148,14 +148,14 @@ class Stock(TomlTable):
 
     @property
     def kind(self) -> Literal["box", "polygon", "allowance", "program"]:
-        """Which of the four tables the file has."""
+        """The table that the file has, of the four kinds."""
         return next(name for name in ("box", "polygon", "allowance", "program") if getattr(self, name) is not None)
 
     def beside(self, name: str) -> Path:
-        """The path of a file that this one names.
+        """Path of a file named in this one.
 
         Args:
-            name: as it stands in the file.
+            name: name in the file.
 
         Returns:
             The path, relative to the folder of this file.
@@ -163,12 +163,12 @@ class Stock(TomlTable):
         return self._folder / name
 
     def error(self, key: str, value: str, limit: str) -> StockError:
-        """A key of this file that does not suit the program: its dotted name, its value as TOML, what is wrong.
+        """Error for a key of this file that does not suit the program.
 
         Args:
             key: dotted name.
             value: its value as TOML.
-            limit: what is wrong.
+            limit: the requirement.
 
         Returns:
             The error, to be raised, with the line of the key.

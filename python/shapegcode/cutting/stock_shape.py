@@ -1,4 +1,4 @@
-"""What a stock file describes: its polygons, offset where roughing left something, and the material of the core."""
+"""Shapes of a stock file: its polygons, the layer left by roughing, and the core's material."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 Points = NDArray[np.float64]
-_SAME_MM = 2e-3  # points of a program nearer than this are the same
-_CLOSED_RATIO = 0.5  # of a run's length closes upon itself: it is a closed contour with its lead-in and lead-out
-_SAGITTA_MM = 4e-5  # by less than this chords leave the arcs that they stand for
-_SNAP = 2e-3  # GEOS takes corners nearer than this, relative to the distance, for one; so far may they be off
+_SAME_MM = 2e-3  # points of a program nearer than this coincide
+_CLOSED_RATIO = 0.5  # least closed fraction of a sequence's length to be a closed contour with lead-in and lead-out
+_SAGITTA_MM = 4e-5  # largest deviation of chords from their arcs
+_SNAP = 2e-3  # GEOS merges corners nearer than this, relative to the distance; tolerance of corners
 _ROUNDS = 3
 _TURN_RAD = 0.1  # a corner, not two chords of an arc
 _RAMP_STEP_RATIO = 0.1  # of the tool's diameter: height of the layers on ramps and helices
@@ -39,12 +39,12 @@ class StockPiece:
 
     # corners, (n, 2), mm, first not repeated: the outline, counter-clockwise, then holes, clockwise
     rings: tuple[Points, ...]
-    bottom_mm: float  # its lower end
-    top_mm: float  # its upper end
+    bottom_mm: float  # lower end
+    top_mm: float  # upper end
 
 
 def stock_polygons(stock: Stock, paths: Sequence[_core.Path], tool_radius_mm: float) -> list[StockPiece]:
-    """The stock as prisms over polygons; of the kind `program`: what was there before that program."""
+    """The stock as prisms over polygons; for the kind `program` that before the roughing program."""
     if stock.allowance is not None:
         return _pieces(_Allowance(stock, stock.allowance, tool_radius_mm).area(paths), stock.allowance.z_mm)
     solid: Solid | Stock = stock if stock.program is None else stock.program.on
@@ -52,7 +52,7 @@ def stock_polygons(stock: Stock, paths: Sequence[_core.Path], tool_radius_mm: fl
         (left, right), (front, back) = solid.box.x_mm, solid.box.y_mm
         outline = np.array([(left, front), (right, front), (right, back), (left, back)])
         return [StockPiece((outline,), *solid.box.z_mm)]
-    assert solid.polygon is not None, "one of the two is there"
+    assert solid.polygon is not None, "the solid has one of the two"
     return _polygon(stock, solid.polygon, "polygon" if stock.program is None else "program.on.polygon")
 
 
@@ -63,10 +63,10 @@ def _polygon(stock: Stock, polygon: Polygon, key: str) -> list[StockPiece]:
     outline, *holes = areas = [shapely.Polygon(ring) for ring in (polygon.points_mm, *polygon.holes_mm)]
     for name, area in zip(names, areas, strict=True):
         if not area.is_valid or area.area == 0:
-            raise stock.error(f"{key}.{name}", "", f"must go round an area: {shapely.is_valid_reason(area)}")
+            raise stock.error(f"{key}.{name}", "", f"must enclose an area: {shapely.is_valid_reason(area)}")
     pieces = _pieces(outline.difference(shapely.union_all(holes)), polygon.z_mm)
     if not pieces:
-        raise stock.error(f"{key}.holes_mm", "", "must leave something of the polygon")
+        raise stock.error(f"{key}.holes_mm", "", "must not remove the whole polygon")
     return pieces
 
 
@@ -76,7 +76,7 @@ def _pieces(area: Area | MultiPolygon, z_mm: tuple[float, float]) -> list[StockP
     pieces = []
     for part in shapely.get_parts(area):
         if part.geom_type != "Polygon" or part.area < _SAME_MM * _SAME_MM:
-            continue  # where two shapes touch, up to rounding
+            continue  # contact of two shapes, apart from rounding
         ordered = shapely.orient_polygons(part)
         rings = (ordered.exterior, *ordered.interiors)
         pieces.append(StockPiece(tuple(np.asarray(ring.coords)[:-1] for ring in rings), *z_mm))
@@ -84,13 +84,13 @@ def _pieces(area: Area | MultiPolygon, z_mm: tuple[float, float]) -> list[StockP
 
 
 class _Allowance:
-    """Builds the area that roughing left (Kim and Ko, 2001, paper 001): the part thickened, with roughing's corners."""
+    """Builds the area left by roughing (Kim and Ko, 2001, paper 001): the part thickened, with roughing's corners."""
 
     def __init__(self, stock: Stock, allowance: Allowance, radius_mm: float) -> None:
         self._stock, self._keys, self._radius = stock, allowance, radius_mm
         corner = allowance.corner_radius_mm
         if corner < radius_mm * (1 - 1e-9):
-            why = f"tool bigger than the corner: must not be below the tool's radius, {radius_mm:g} mm"
+            why = f"tool larger than the corner: must not be below the tool's radius, {radius_mm:g} mm"
             raise self._error("corner_radius_mm", why)
         self._reach = radius_mm + allowance.width_mm
         self._rough = allowance.allowance_mm + corner
@@ -104,17 +104,17 @@ class _Allowance:
             loops, rest = _loops(_with_touched(points))
             closed, whole = sum(_length(np.vstack([loop, loop[:1]])) for loop in loops), _length(points)
             if loops and closed < _CLOSED_RATIO * whole:
-                why = f"only {closed:.4g} of {whole:.4g} mm of a run of cutting moves close upon themselves"
+                why = f"only {closed:.4g} of {whole:.4g} mm of a sequence of cutting moves are closed"
                 raise self._error("wall", f"{why}: is that the wall? Describe the stock as [polygon]")
             for wall, gone in map(self._closed, loops) if loops else [self._open(rest)]:
                 walls.append(wall)
                 swept.append(gone)
         if not walls:
-            raise self._error("z_mm", "no cutting move of the program goes below the top")
+            raise self._error("z_mm", "no cutting move of the program is below the top")
         part = shapely.union_all(walls).difference(shapely.union_all(swept))
         if part.is_empty:
-            raise self._error("wall", "the tool's sweep leaves nothing behind the walls: wrong side?")
-        # What roughing with corner_radius_mm leaves of the layer: its path keeps allowance and radius off the part.
+            raise self._error("wall", "the tool removes everything behind the walls: wrong side?")
+        # Layer left by roughing with corner_radius_mm, whose path is offset by allowance plus radius from the part.
         return grown(grown(part, self._rough), -keys.corner_radius_mm)
 
     def _error(self, key: str, limit: str) -> StockError:
@@ -138,7 +138,7 @@ class _Allowance:
         return chord_angle_rad(radius + self._reach + self._rough)
 
     def _closed(self, loop: Points) -> tuple[Area, Area]:
-        """The part behind the wall of a closed contour, and what is gone in front of it."""
+        """The part behind the wall of a closed contour, and the removed area in front of it."""
         import shapely
 
         ring = shapely.Polygon(loop)
@@ -150,28 +150,28 @@ class _Allowance:
         if is_inside:
             part = ring.difference(sweep)
             if part.is_empty:
-                raise self._error("wall", "the tool's sweep leaves nothing inside the closed contour: wrong side?")
+                raise self._error("wall", "the tool removes everything inside the closed contour: wrong side?")
             return part.difference(grown(part, -self._keys.width_mm)), sweep
         pocket = ring.union(sweep)
-        # The offset of GEOS, off by some micrometres, is good enough for this question and quick.
+        # GEOS' fast offset, with errors of some micrometres, is sufficient here.
         if pocket.buffer(-self._rough).is_empty:
             room = 2 * shapely.maximum_inscribed_circle(pocket, tolerance=1e-3).length
-            why = "roughing tool bigger than the pocket: with allowance_mm on both sides it needs "
+            why = "roughing tool larger than the pocket: with allowance_mm on both sides it needs "
             raise self._error("corner_radius_mm", f"{why}{2 * self._rough:g} mm, the pocket is {room:.4g} mm wide")
         return grown(pocket, self._keys.width_mm), pocket
 
     def _open(self, points: Points) -> tuple[Area | MultiPolygon, Area]:
-        """The part behind the wall of a contour that does not close, and what the tool takes."""
+        """The part behind the wall of an open contour, and the area removed by the tool."""
         import shapely
         from shapely.ops import substring
 
         wall = shapely.LineString(points)
         start, end = self._keys.lead_in_mm, wall.length - self._keys.lead_out_mm
         if end - start <= _SAME_MM:
-            why = f"no wall is left between lead-in and lead-out of a run {wall.length:g} mm long"
+            why = f"no wall remains between lead-in and lead-out of a sequence {wall.length:g} mm long"
             raise self._error("lead_in_mm", why)
         points = np.asarray(substring(wall, start, end).coords)
-        # Beyond its ends the wall goes on straight, as far as the tool reaches there.
+        # Extend the wall straight beyond its ends, as far as the tool reaches.
         beyond = 2 * self._radius + self._rough
         straight = _extended(points, beyond)
         line = shapely.LineString(straight)
@@ -195,7 +195,7 @@ class _Allowance:
         for face in faces:
             at_wall, at_free = (shapely.contains_xy(face, middle + side * 1e-4 * to_wall).any() for side in (1, -1))
             if at_wall and at_free:
-                raise self._error("wall", "both sides of the path are one: describe the stock as [polygon]")
+                raise self._error("wall", "both sides of the path are connected: describe the stock as [polygon]")
             if at_wall:
                 behind.append(face)
         return behind
@@ -218,7 +218,7 @@ def _extended(points: Points, length_mm: float) -> Points:
 
 
 def _with_touched(points: Points) -> Points:
-    """A line with those of its points inserted that it passes through: where it runs over its beginning once more."""
+    """Insert points of a line at which it passes through itself, where it overlaps its start."""
     import shapely
 
     pieces = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
@@ -234,7 +234,7 @@ def _with_touched(points: Points) -> Points:
 
 
 def _loops(points: Points) -> tuple[list[Points], Points]:
-    """Closed contours in a line, each with an area, and what is left of the line without them."""
+    """Closed contours in a line, each with an area, and the rest of the line."""
     loops: list[Points] = []
     line: list[int] = []
     seen: dict[tuple[int, int], int] = {}
@@ -246,7 +246,7 @@ def _loops(points: Points) -> tuple[list[Points], Points]:
         column, row = cell(point)
         near = [seen.get((column + i, row + j), -1) for i in (-1, 0, 1) for j in (-1, 0, 1)]
         found = [at for at in near if at >= 0 and np.hypot(*(points[line[at]] - point)) < _SAME_MM]
-        # Neighbours on the line may be close without closing anything.
+        # Neighbours on the line may be close without closing a contour.
         closing = min(found, default=-1)
         if closing >= 0 and len(line) - closing >= 3:
             loop = points[line[closing:]]
@@ -262,19 +262,19 @@ def _loops(points: Points) -> tuple[list[Points], Points]:
 
 
 def chord_angle_rad(radius_mm: float) -> float:
-    """Angle of a chord that leaves its arc by 0.04 µm; at most some 80 degrees."""
+    """Angle of a chord that deviates from its arc by 0.04 µm; at most about 80 degrees."""
     return 2 * math.acos(1 - _SAGITTA_MM / max(radius_mm, 4 * _SAGITTA_MM))
 
 
 def grown(area: Geometry, distance_mm: float) -> Geometry:
-    """An area with all points within a distance of it; below 0: without those that near to its boundary."""
+    """Offset an area outwards by a distance; below 0: inwards."""
     if distance_mm == 0:
         return area
     return _placed(area.buffer(distance_mm, quad_segs=_quarter(distance_mm)), area.boundary, abs(distance_mm))
 
 
 def swept(points: Points, distance_mm: float, *, round_ends: bool = True) -> Geometry:
-    """All points within a distance of a line; without round ends only those beside it."""
+    """All points within a distance of a line; without round ends only perpendicular to it."""
     import shapely
 
     line = shapely.LineString(points)
@@ -287,7 +287,7 @@ def _quarter(distance_mm: float) -> int:
 
 
 def _placed(shape: Geometry, source: Geometry, distance_mm: float) -> Geometry:
-    """An offset shape whose corners are moved to the exact distance from the original line."""
+    """Move the corners of an offset shape to the exact distance from the original line."""
     import shapely
 
     if shape.is_empty:
@@ -304,7 +304,7 @@ def _placed(shape: Geometry, source: Geometry, distance_mm: float) -> Geometry:
         foot = shapely.get_coordinates(shapely.shortest_line(pieces[nearest], points[at]))[::2]
         away = corners[restless[at]] - foot
         length = np.hypot(*away.T)
-        # What is nearer than that is a flat end; what is in place already may stay.
+        # Nearer points are of a flat end; exact points need no move.
         error = np.abs(length - distance_mm)
         is_off = (error < _SNAP * distance_mm) & (error > 1e-9)
         restless = restless[at[is_off]]
@@ -318,7 +318,7 @@ def _placed(shape: Geometry, source: Geometry, distance_mm: float) -> Geometry:
 
 
 def _turns(shape: Geometry, corners: Points) -> NDArray[np.intp]:
-    """Where the outline of a shape, with these corners, really turns: not between two chords of an arc."""
+    """Indices of real turns of an outline with these corners, not between two chords of an arc."""
     import shapely
 
     begin, turns = 0, []
@@ -330,14 +330,14 @@ def _turns(shape: Geometry, corners: Points) -> NDArray[np.intp]:
         cross = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
         angle = np.abs(np.arctan2(cross, np.sum(before * along, axis=1)))
         found = begin + np.flatnonzero(angle > _TURN_RAD)
-        # The first corner of a ring stands at its end once more.
+        # The first corner of a ring is repeated at its end.
         turns += [found, found[found == begin] + count - 1]
         begin += count
     return np.concatenate(turns)
 
 
 def _meeting(corner: Points, pieces: NDArray[np.object_], tree: STRtree, distance_mm: float) -> Points:
-    """A corner moved to the distance from both lines that it lies between; as it was where there is only one."""
+    """Move a corner to the distance from both adjacent lines; unchanged with only one line."""
     import shapely
 
     moved = corner
@@ -367,7 +367,7 @@ def build_material(
     *,
     others: Sequence[_core.Path] = (),
 ) -> _core.Material:
-    """The material before the first block of a program; what a roughing program leaves: swept by its tool."""
+    """Build the material before the first block of a program; for the kind `program` swept by the roughing tool."""
     pieces = stock_polygons(stock, paths, tool.radius_mm)
     rough = stock.program
     diameter_mm = 0.0 if rough is None else Tool.load(stock.beside(rough.tool)).tool.diameter_mm
@@ -381,7 +381,7 @@ def build_material(
 
 
 def _fewer(borders_mm: Sequence[float]) -> list[float]:
-    """At most so many heights: those that lie closest together become one, as in a surface that is milled in 3-D."""
+    """Limit the number of heights by merging the closest ones, as in a surface milled in 3-D."""
     borders = list(borders_mm)
     least_mm = (borders[-1] - borders[0]) / (4.0 * _MAX_LAYERS)
     while len(borders) > _MAX_LAYERS + 1:
@@ -404,7 +404,7 @@ def _moves(stock: Stock, rough: Rough, machine: Machine) -> list[_core.Path]:
     tools = sorted({tool for _, tool, _ in program.core.functions if tool > 0})
     if len(tools) > 1:
         names = ", ".join(f"T{tool}" for tool in tools)
-        raise refusal(f"uses the tools {names}: must use one, as program.tool says")
+        raise refusal(f"uses the tools {names}: must use one, that of program.tool")
     systems = {(region.exit.coordinate_system, region.exit.coordinate_number) for region in program.regions}
     if len(systems) > 1:
         names = ", ".join(f"G{system}" for system, _ in sorted(systems))
@@ -414,7 +414,7 @@ def _moves(stock: Stock, rough: Rough, machine: Machine) -> list[_core.Path]:
         if kind == _core.StepKind.region:
             region = program.regions[index]
             if region.incremental:
-                raise refusal("the position of these moves is not known", line)
+                raise refusal("the position of these moves is unknown", line)
             paths.append(region.path)
         elif kind == _core.StepKind.move:
             segment, dwell_s = moves[index]
@@ -425,5 +425,5 @@ def _moves(stock: Stock, rough: Rough, machine: Machine) -> list[_core.Path]:
             if path[index].kind == _core.SegmentKind.arc and path[index].normal != 2:
                 raise refusal("an arc that is not in the XY plane (G17)", path[index].line_number)
     if not program.regions:
-        raise refusal("holds no cutting moves")
+        raise refusal("has no cutting moves")
     return paths

@@ -1,4 +1,4 @@
-"""The tool file: an end mill, the forces that it needs, the limits that it must keep and how its feed may be set."""
+"""The tool file: an end mill, its cutting forces, limits and feed settings."""
 
 from __future__ import annotations
 
@@ -22,37 +22,37 @@ COEFFICIENTS = (
     *("specific_n_per_mm2", "specific_exponent", "ratio", "ratio_exponent"),
     *("tangential_edge_n_per_mm", "radial_edge_n_per_mm"),
 )
-"""Names of the numbers of a force law."""
+"""Names of the parameters of a force law."""
 
 Exponent = Annotated[Float, Field(gt=-1, lt=1)]
 Name = Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[!-$&-'*-~]([ !-$&-'*-~]*[!-$&-'*-~])?$")]
 
 
 class WorkMaterial(TomlTable):
-    """A work material with the forces that one cutter was measured to need in it."""
+    """A work material with the cutting forces measured with one cutter."""
 
     name: Annotated[str, Strict(), Field(pattern=r"^[a-z0-9][a-z0-9-]*$")] = key(
-        "name by which a tool file chooses it: small letters, digits and hyphens"
+        "name in a tool file: lower-case letters, digits and hyphens"
     )
     description: Text = key("material, its state and hardness")
     specific_n_per_mm2: Positive = key("specific cutting force k1 at a chip 1 mm thick")
     specific_exponent: Exponent = key("exponent of the chip thickness in k1")
     ratio: NonNegative = key("ratio k2 of radial to tangential force at a chip 1 mm thick", unit="1")
     ratio_exponent: Exponent = key("exponent of the chip thickness in k2")
-    tangential_edge_n_per_mm: NonNegative = key("tangential force of the edge per length of it")
-    radial_edge_n_per_mm: NonNegative = key("radial force of the edge per length of it")
-    chip_thickness: Literal["mean", "local"] = key("which chip thickness the exponents belong to")
+    tangential_edge_n_per_mm: NonNegative = key("tangential edge force per edge length")
+    radial_edge_n_per_mm: NonNegative = key("radial edge force per edge length")
+    chip_thickness: Literal["mean", "local"] = key("chip thickness of the exponents")
     chip_mm: tuple[Positive, Positive] | None = key(
-        "chip thickness from ... to for which this holds; left out: the source does not say", default=None
+        "range of valid chip thickness; left out: not in the source", default=None
     )
-    cutter: Text = key("what cut it")
-    source: Text = key("where the values come from")
-    assumed: Text = key("values that the source does not give and that are assumed here; empty: none")
+    cutter: Text = key("cutter of the measurement")
+    source: Text = key("source of the values")
+    assumed: Text = key("assumed values that are not in the source; empty: none")
 
     @model_validator(mode="after")
     def _range_ascends(self) -> WorkMaterial:
         if self.chip_mm is not None and self.chip_mm[0] >= self.chip_mm[1]:
-            raise KeyProblem("chip_mm", self.chip_mm, "the lower end comes first")
+            raise KeyProblem("chip_mm", self.chip_mm, "the first number must be smaller than the second")
         return self
 
 
@@ -64,13 +64,13 @@ class _Library(TomlTable):
         names = [material.name for material in self.material]
         for name in names:
             if names.count(name) > 1:
-                raise ValueError(f"the name {name} stands {names.count(name)} times")
+                raise ValueError(f"the name {name} occurs {names.count(name)} times")
         return self
 
 
 @cache
 def materials() -> dict[str, WorkMaterial]:
-    """The materials that come with shapegcode, by name, in the order of their file."""
+    """Materials of shapegcode's library by name, in file order."""
     text = (resources.files("shapegcode") / "data" / "milling" / _LIBRARY).read_text(encoding="utf-8")
     library = validated(_Library, parsed(text, _LIBRARY, FileError), _LIBRARY, text, FileError)
     return {material.name: material for material in library.material}
@@ -80,7 +80,7 @@ class Cutting(TomlTable):
     """The cutting force: a material of the library, values of your own, or a material with some of them changed."""
 
     material: Text | None = key(
-        "name in the library of materials; keys given beside it take the place of its values. Left out: "
+        "name in the library of materials; keys given with it replace its values. Left out: "
         "specific_n_per_mm2 and ratio are needed",
         default=None,
     )
@@ -97,13 +97,13 @@ class Cutting(TomlTable):
         "exponent of the chip thickness in k2. Left out without a material: 0", default=None
     )
     tangential_edge_n_per_mm: NonNegative | None = key(
-        "tangential force of the edge per length of it (K_te). Left out without a material: 0", default=None
+        "tangential edge force per edge length (K_te). Left out without a material: 0", default=None
     )
     radial_edge_n_per_mm: NonNegative | None = key(
-        "radial force of the edge per length of it (K_re). Left out without a material: 0", default=None
+        "radial edge force per edge length (K_re). Left out without a material: 0", default=None
     )
     chip_thickness: Literal["mean", "local"] | None = key(
-        'which chip thickness the exponents belong to: "mean" of the whole engagement or "local" at each point of an '
+        'chip thickness of the exponents: "mean" of the whole engagement or "local" at each point of an '
         'edge. Left out without a material: "mean"',
         default=None,
     )
@@ -127,16 +127,16 @@ class Cutting(TomlTable):
         if exponent <= -1:
             raise ValueError(
                 f"specific_exponent + ratio_exponent = {toml(exponent)}: must be greater than -1, or the radial force "
-                "would not grow with the chip"
+                "would not increase with the chip"
             )
         return self
 
     def library_entry(self) -> WorkMaterial | None:
-        """The material of the library, None without one."""
+        """Material of the library, None without one."""
         return None if self.material is None else materials()[self.material]
 
     def coefficients(self) -> _core.CuttingCoefficients:
-        """The cutting force as the core takes it."""
+        """Coefficients of the core."""
         entry = self.library_entry()
         thickness = self.chip_thickness or ("mean" if entry is None else entry.chip_thickness)
         values = {name: self._value(name) for name in COEFFICIENTS}
@@ -152,8 +152,7 @@ class Cutter(TomlTable):
 
     name: Name = key("short name, in plain ASCII because it goes into comments of programs")
     number: Annotated[int, Strict(), Field(ge=0, le=99_999_999)] | None = key(
-        "T number; blocks that run with another tool are left as they are. Left out: the file speaks of every tool "
-        "of the program",
+        "T number; blocks with another tool are left unchanged. Left out: the file is for every tool of the program",
         default=None,
     )
     diameter_mm: Positive = key("diameter of the fluted part")
@@ -162,30 +161,28 @@ class Cutter(TomlTable):
         "helix angle of a right-hand helix on a right-hand cutter; 0: straight flutes"
     )
     flute_length_mm: Positive = key("length of the fluted part from the tip")
-    overhang_mm: Positive = key(
-        "effective length: from the tip to where the tool may be taken as clamped in its holder"
-    )
+    overhang_mm: Positive = key("effective length: from the tip to where the tool counts as clamped in its holder")
     shank_diameter_mm: Positive | None = key(
         "diameter of the shank above the flutes; left out: diameter_mm", default=None
     )
     effective_diameter_ratio: Annotated[Positive, Field(le=1)] = key(
-        "diameter of the solid cylinder that bends as the fluted part does, as a share of diameter_mm",
+        "diameter of a solid cylinder with the bending stiffness of the fluted part, relative to diameter_mm",
         assumed=0.8,
     )
     youngs_modulus_gpa: Positive = key(
         "Young's modulus: about 600 for cemented carbide, 210 for high-speed steel", assumed=600.0
     )
     holder_stiffness_n_per_um: Positive | None = key(
-        "stiffness of holder and spindle against a force across the axis where the tool is clamped; left out: rigid",
+        "radial stiffness of holder and spindle where the tool is clamped; left out: rigid",
         default=None,
     )
     runout_um: tuple[Float, ...] | None = key(
-        "radial runout: radius of each flute less the mean radius, one number per flute in the order in which they "
-        "cut; left out: none",
+        "radial runout: radius of each flute minus the mean radius, one number per flute in cutting order; "
+        "left out: none",
         default=None,
     )
     spindle: Literal["clockwise", "counter_clockwise"] | None = key(
-        'sense in which the spindle turns, "clockwise" (M03) or "counter_clockwise" (M04); left out: as programmed '
+        'sense of rotation of the spindle, "clockwise" (M03) or "counter_clockwise" (M04); left out: as programmed '
         "(M03, M04), else clockwise",
         default=None,
     )
@@ -205,17 +202,17 @@ class Cutter(TomlTable):
 
 
 class Limits(TomlTable):
-    """What must not be exceeded; a limit that is left out does not act."""
+    """Limits of the cut; a limit that is left out is not applied."""
 
     resultant_n: Positive | None = key("resultant of the force in the XY plane", default=None)
     resultant: Literal["peak", "mean"] = key(
-        'what resultant_n limits: the "peak" of the resultant over one revolution or its "mean"', default="peak"
+        'resultant limited by resultant_n: the "peak" over one revolution or the "mean"', default="peak"
     )
     deflection_um: Positive | None = key("peak deflection of the tool at its tip", default=None)
     torque_nm: Positive | None = key("peak torque about the axis of the tool", default=None)
     power_w: Positive | None = key("mean power of the cut", default=None)
     feed_per_tooth_min_mm: Positive | None = key(
-        "least feed per tooth: below it the edge rubs. Left out: no feed goes below a tenth of the programmed one",
+        "least feed per tooth: below it the edge rubs. Left out: no feed is below a tenth of the programmed one",
         default=None,
     )
     feed_per_tooth_max_mm: Positive | None = key("largest feed per tooth", default=None)
@@ -229,19 +226,15 @@ class Limits(TomlTable):
 
 
 class Feed(TomlTable):
-    """How the feed may be set."""
+    """Range of the feed."""
 
-    air_feed_mm_per_min: Positive | None = key(
-        "feed where the tool meets no material; left out: as programmed", default=None
-    )
-    approach_mm: NonNegative = key(
-        "distance before the tool meets material at which the feed is that of the cut again", assumed=1.0
-    )
+    air_feed_mm_per_min: Positive | None = key("feed in air; left out: as programmed", default=None)
+    approach_mm: NonNegative = key("distance before material at which the feed is that of the cut again", assumed=1.0)
     max_feed_mm_per_min: Positive | None = key(
-        "largest feed that is written, in material and in air; left out: as the machine allows", default=None
+        "largest feed written, in material and in air; left out: the machine's", default=None
     )
     spindle_rev_per_min: Positive | None = key(
-        "speed of the spindle where the program gives none (S); left out: the program must", unit="1/min", default=None
+        "spindle speed if the program has none (S); left out: the program must have one", unit="1/min", default=None
     )
 
     @model_validator(mode="after")
@@ -253,7 +246,7 @@ class Feed(TomlTable):
 
 
 class Tool(TomlTable):
-    """An end mill with its cutting force, its limits and its feed, as a tool file describes them."""
+    """An end mill with its cutting force, its limits and its feed, from a tool file."""
 
     tool: Cutter = key("the end mill: flat end, cylindrical")
     cutting: Cutting = key(
@@ -261,8 +254,8 @@ class Tool(TomlTable):
         "With the chip thickness t in mm, the tangential force per mm of edge is k1 t + K_te and the radial one "
         "k2 k1 t + K_re, where k1 = specific * t^specific_exponent and k2 = ratio * t^ratio_exponent"
     )
-    limits: Limits = key("what must not be exceeded; a limit that is left out does not act", default={})
-    feed: Feed = key("how the feed may be set", default={})
+    limits: Limits = key("limits of the cut; a limit that is left out is not applied", default={})
+    feed: Feed = key("range of the feed", default={})
 
     @model_validator(mode="after")
     def _least_chip_can_be_reached(self) -> Tool:
@@ -271,7 +264,7 @@ class Tool(TomlTable):
         if least is not None and most is not None and speed is not None:
             needed = least * self.tool.flutes * speed
             if needed > most:
-                limit = f"asks for a feed of {needed:g} mm/min, feed.max_feed_mm_per_min is {toml(most)}"
+                limit = f"needs a feed of {needed:g} mm/min, but feed.max_feed_mm_per_min is {toml(most)}"
                 raise KeyProblem("limits.feed_per_tooth_min_mm", least, limit)
         return self
 
@@ -283,7 +276,7 @@ class Tool(TomlTable):
             path: the file.
 
         Returns:
-            The tool, its defaults filled in.
+            The tool, with defaults.
 
         Raises:
             ToolError: not TOML, or wrong keys or values; every problem is listed.
@@ -300,7 +293,7 @@ class Tool(TomlTable):
             source: its name in messages.
 
         Returns:
-            The tool, its defaults filled in.
+            The tool, with defaults.
 
         Raises:
             ToolError: not TOML, or wrong keys or values; every problem is listed.
@@ -313,38 +306,38 @@ class Tool(TomlTable):
         return 0.5 * self.tool.diameter_mm
 
     def end_mill(self) -> _core.EndMill:
-        """The tool as the core takes it."""
+        """End mill of the core."""
         runout = [0.001 * value for value in self.tool.runout_um or ()]
         return _core.EndMill(self.tool.diameter_mm, self.tool.flutes, math.radians(self.tool.helix_deg), runout)
 
     def sense(self, programmed: _core.SpindleSense | None = None) -> _core.SpindleSense:
-        """Sense of the spindle: as the file says, else as *programmed*, else clockwise.
+        """Sense of rotation: from the file, else as *programmed*, else clockwise.
 
         Args:
-            programmed: by M03 or M04; None: not known.
+            programmed: by M03 or M04; None: unknown.
 
         Returns:
-            The sense in which the tool turns.
+            The sense of rotation.
         """
         if self.tool.spindle is not None:
             return _core.SpindleSense.__members__[self.tool.spindle]
         return _core.SpindleSense.clockwise if programmed is None else programmed
 
     def coefficients(self) -> _core.CuttingCoefficients:
-        """The cutting force as the core takes it: the file's values, then those of its material."""
+        """Coefficients of the core: the file's values, then those of its material."""
         return self.cutting.coefficients()
 
     def force(
         self, spindle_rev_per_min: float, sense: _core.SpindleSense = _core.SpindleSense.clockwise
     ) -> _core.MillingForce:
-        """The model of its cutting force.
+        """Model of the tool's cutting force.
 
         Args:
             spindle_rev_per_min: speed of the spindle, 1/min.
-            sense: in which it turns.
+            sense: sense of rotation.
 
         Returns:
-            The model, which gives the force in N from the engagement.
+            The model, which computes the force in N from the engagement.
 
         Raises:
             ArgumentError: a speed that is not positive.
@@ -352,7 +345,7 @@ class Tool(TomlTable):
         return _core.MillingForce(self.end_mill(), self.coefficients(), spindle_rev_per_min, sense)
 
     def beam(self) -> _core.ToolBeam:
-        """The tool as the beam that bends: shank and fluted part, clamped at the overhang."""
+        """Beam model of the tool: shank and fluted part, clamped at the overhang."""
         cutter = self.tool
         return _core.ToolBeam(
             overhang_mm=cutter.overhang_mm,

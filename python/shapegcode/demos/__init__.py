@@ -1,1 +1,1 @@
-"""The papers' figures, repeated: one file each."""
+"""Reproductions of papers' figures: one file each."""

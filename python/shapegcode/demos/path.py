@@ -1,4 +1,4 @@
-"""Line, quarter arc, line at two feeds and two reductions: the model's figures beside the published ones.
+"""Line, quarter arc, line at two feeds and two reductions: the model's figures compared with the published ones.
 
 Ko, Lim and Hong, 2023 (paper 000 in docs/evidence/references.md): table 2 and the text on time.
 """
@@ -31,29 +31,29 @@ _LONGEST_IDEAL_S = 0.05
 _FINE_PERIOD_S = 1e-5  # the ideal command is continuous; at this period its figures no longer change
 _SHIFTED = "shifted arc, see below"
 _REMARK = (
-    "The paper's 1 % rows are .0319 (100 mm/s) and .0638 (200 mm/s) above the model. Likely cause: there the "
-    "stretch of constant speed before the arc lasts 125.25 (25.25) ms, off a 0.1 ms simulation grid; losing "
-    "50 us shifts the arc, and a path shifted so gives .1050 and .3544. Nothing here is tuned to the paper."
+    "The paper's 1 % rows are 0.0319 (100 mm/s) and 0.0638 (200 mm/s) above the model. Likely cause: the "
+    "constant-speed part before the arc takes 125.25 (25.25) ms, not a multiple of a 0.1 ms grid; losing "
+    "50 us shifts the arc, and a path shifted so gives 0.1050 and 0.3544. Nothing is tuned to the paper."
 )
 
 Agreement = Literal["agrees", "differs", "explained"]
-"""Of a statement: it holds here; it does not; it does not, and why is known (a slip of the paper, other conditions)."""
+"""Agreement of a statement: agrees; differs; differs for a known reason (a slip of the paper, other conditions)."""
 
 _AGREEMENT: dict[Agreement, str] = {"agrees": "yes", "differs": "NO", "explained": "explained"}
 
 
 @dataclass(frozen=True)
 class Statement:
-    """What a paper states, beside what comes out here."""
+    """A paper's statement, compared with our result."""
 
-    place: str  # where in the paper: figure, table, section or equation
-    what: str  # is stated
-    published: str  # as the paper has it, with its unit
-    ours: str  # as it comes out here, with its unit
-    agreement: Agreement  # whether both are the same: agrees, differs, or explained (differs for a known reason)
-    # ours over the published figure, in % of the latter; null where it is no figure
+    place: str  # location in the paper: figure, table, section or equation
+    what: str  # what is stated
+    published: str  # the paper's value, with unit
+    ours: str  # our value, with unit
+    agreement: Agreement  # agrees, differs, or explained (differs for a known reason)
+    # difference of ours from the published figure, %; null if not a figure
     difference_percent: float | None = None
-    note: str = ""  # why they differ, or under which conditions ours holds; empty: nothing to add
+    note: str = ""  # reason of a difference, or conditions of ours; may be empty
 
 
 @dataclass(frozen=True)
@@ -61,35 +61,35 @@ class PathRun:
     """One command for the path: unshaped or shaped."""
 
     time_s: float  # for the path
-    time_increase_percent: float  # of it, over the unshaped
+    time_increase_percent: float  # increase over the unshaped time
     orbit_error_percent: float  # area between command and arc, in % of the area of the sector; 0 unshaped
-    residual_vibration_um: Xyz[float]  # what is left of the vibration at rest, by axis
+    residual_vibration_um: Xyz[float]  # vibration after the stop, by axis
 
 
 @dataclass(frozen=True)
 class PathCondition:
-    """One feed and reduction."""
+    """One feed with one reduction on the arc."""
 
     feed_mm_per_s: int  # programmed
     reduction_percent: int  # of the feed on the arc
     unshaped: PathRun  # as programmed
     ideal: PathRun  # the paper's shaper in continuous time
-    emitted: PathRun  # the program that `convert` writes
+    emitted: PathRun  # the program of `convert`
     blocks: int  # of the emitted program
-    ok: bool  # whether `convert` says so of the emitted program
+    ok: bool  # verdict of `convert` on the emitted program
     published_orbit_error_percent: float  # table 2 of the paper
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class PathDemo(Result):
-    """Line, quarter arc, line: ideal command, emitted program and the paper.
+    """Line, quarter arc, line: comparison of ideal command, emitted program and paper.
 
     Attributes:
-        paper: authors, year, and under which name docs/evidence/references.md has it in full.
-        title: what is repeated.
-        rows: the paper's statements beside ours.
+        paper: authors, year, and its name in docs/evidence/references.md.
+        title: what is reproduced.
+        rows: the paper's statements compared with ours.
         remark: how to read the differences.
-        warnings: none as a rule.
+        warnings: usually none.
         machine: name of the machine.
         conditions: both feeds at both reductions.
     """
@@ -110,7 +110,7 @@ class PathDemo(Result):
 
     @property
     def answer(self) -> str:
-        """How many statements of the paper agree."""
+        """Number of statements of the paper that agree."""
         agreements = [row.agreement for row in self.rows]
         first = f"{self.title}: {agreements.count('agrees')} of {len(self.rows)} statements of {self.paper} agree"
         others = {"differs": "DIFFER", "explained": "differ for a known reason"}
@@ -119,11 +119,11 @@ class PathDemo(Result):
 
     @property
     def next_step(self) -> str:
-        """The one thing to do next."""
+        """Next command."""
         return "shapegcode convert YOUR.NC -m vx500 -o SHAPED.NC --plots plots"
 
     def tables(self) -> list[Table]:
-        """The statements; time and residual vibration for each command."""
+        """Tables of the statements, and of time and residual vibration for each command."""
         statements = (
             Column("place", left=True),
             Column("what", text=True),
@@ -151,14 +151,14 @@ class PathDemo(Result):
 
 
 def path_program(feed_mm_per_s: float, machine: Machine) -> Program:
-    """The paper's line, quarter arc, line, framed as in its listing, at a feed."""
+    """The paper's line, quarter arc, line, with its listing's first and last lines, at a feed."""
     text = (resources.files("shapegcode") / "data" / "paper_path.nc").read_text(encoding="ascii")
     text = text.replace("F12000.", f"F{feed_mm_per_s * 60:.0f}.")
     return Program.from_text(text, machine, source="paper_path.nc")
 
 
 def ideal_command(path: _core.Path, machine: Machine, arc_feed_ratio: float) -> tuple[Any, _core.SimulationFigures]:
-    """The paper's method: its minimal shaper in continuous time; set-points in mm every 10 us, and their figures."""
+    """The paper's method, a minimal shaper in continuous time: set-points in mm every 10 us, and figures."""
     modes = [mode for axis in machine.axes.as_tuple() for mode in axis.modes]
     first, second = (_core.Mode(mode.frequency_hz, mode.damping_ratio) for mode in modes)
     designs = _core.minimal_two_mode(first, second, _LONGEST_IDEAL_S)
@@ -172,15 +172,15 @@ def ideal_command(path: _core.Path, machine: Machine, arc_feed_ratio: float) -> 
 
 
 def path_demo(on_progress: Callable[[float], None] = lambda _: None) -> PathDemo:
-    """The path at both feeds and both reductions: ideal command, emitted program, and the paper's figures.
+    """Compare ideal command, emitted program and the paper's figures, at both feeds and both reductions.
 
     Args:
-        on_progress: called with the share of the work done, 0 to 1.
+        on_progress: called with the completed fraction, 0 to 1.
 
     Source: Ko, Lim and Hong, 2023 (paper 000), table 2.
 
     Returns:
-        The figures of each condition, each statement of the paper beside ours.
+        Figures of each condition, and each statement of the paper compared with ours.
     """
     machine = Machine.load("vx500")
     conditions = []
@@ -223,7 +223,7 @@ def _condition(feed: int, reduction: int, machine: Machine) -> PathCondition:
 
 
 def statements(each: PathCondition) -> list[Statement]:
-    """What the paper states of a condition, beside the ideal command."""
+    """The paper's statements on a condition, compared with the ideal command."""
     name = f"{each.feed_mm_per_s} mm/s, arc −{each.reduction_percent} %"
     published, ours = each.published_orbit_error_percent, each.ideal.orbit_error_percent
     agrees = abs(ours - published) <= _ORBIT_WITHIN_PERCENT

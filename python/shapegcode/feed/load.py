@@ -1,4 +1,4 @@
-"""Load along a path at the feed that the machine really runs, and the curves that pictures draw of it."""
+"""Load along a path at the feed that the machine really reaches, and the curves for pictures."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from shapegcode.feed.survey import Survey, SurveyedMove, SurveyedRegion
 from shapegcode.machine import Machine
 from shapegcode.results.outcome import Pair
 
-_SLACK = 1e-3  # of a limit: what its own search and the rounding of a figure may be off by
-LOADS = {  # columns of Load, named as their limits in the core: name, unit and decimals for people
+_SLACK = 1e-3  # relative tolerance of a limit, for its search and rounding
+LOADS = {  # columns of Load, named like their limits in the core: display name, unit and decimals
     "peak_resultant_n": ("peak resultant", "N", 1),
     "mean_resultant_n": ("mean resultant", "N", 1),
     "peak_deflection_um": ("deflection", "µm", 1),
@@ -29,10 +29,10 @@ _ROWS = 31
 
 @dataclass(frozen=True)
 class Load:
-    """Load along a path, one value per station, (n,); the feed is what the machine really runs."""
+    """Load along a path, one value per station, (n,); the feed is the one the machine really reaches."""
 
-    feed_mm_per_min: Vector  # largest on the stretch before the station
-    time_s: Vector  # on that stretch
+    feed_mm_per_min: Vector  # largest on the interval before the station
+    time_s: Vector  # on that interval
     mean_resultant_n: Vector  # mean of the XY resultant over one revolution
     peak_resultant_n: Vector  # largest
     peak_torque_nm: Vector  # largest torque
@@ -41,7 +41,7 @@ class Load:
 
     @classmethod
     def in_a_row(cls, loads: Sequence[Load]) -> Load:
-        """One behind the other."""
+        """Concatenate loads."""
         names = [field.name for field in fields(cls)]
         return cls(**{name: np.concatenate([getattr(load, name) for load in loads]) for name in names})
 
@@ -56,7 +56,7 @@ class PathLoad(Pair[Load]):
 def region_load(
     part: SurveyedRegion, plan: FeedPlan | None, written: _core.Path, *, before: Mover, after: Mover
 ) -> PathLoad | None:
-    """Load along a cut for the original and the emitted program; None where engagement or spindle speed is not
+    """Load along a cut for the original and the emitted program; None if engagement or spindle speed is not
     known."""
     if part.track is None or part.tool is None or not part.spindle_rev_per_min > 0.0 or len(part.track) == 0:
         return None
@@ -81,7 +81,7 @@ def move_load(move: SurveyedMove) -> PathLoad | None:
 def load_of(part: SurveyedRegion | SurveyedMove, travelled: Travelled) -> Load:
     """Load along a region, or along a move outside of them."""
     assert part.tool is not None and part.track is not None
-    # What a station meets is met with the feed of the stretch before it and of the one behind it.
+    # The engagement at a station applies with the feeds of the intervals before and after it.
     feeds = travelled.feed_mm_per_min.copy()
     feeds[:-1] = np.where(goes_on(part.track), np.maximum(feeds[:-1], feeds[1:]), feeds[:-1])
     force = part.tool.force(part.spindle_rev_per_min, part.sense)
@@ -90,7 +90,7 @@ def load_of(part: SurveyedRegion | SurveyedMove, travelled: Travelled) -> Load:
 
 
 def exceeded(tool: Tool, load: Load, machine: Machine) -> Iterator[tuple[str, str, str, float]]:
-    """Column, name, unit and limit of what a load exceeds."""
+    """Yield column, name, unit and limit of exceeded limits."""
     limits = limits_of(tool, machine, 0.0)
     for column, (words, unit, _) in LOADS.items():
         limit = getattr(limits, column)
@@ -103,16 +103,16 @@ class FeedTraces:
     """A schedule along the cutting path, all cuts in sequence; each value applies to the interval before its
     station."""
 
-    distance_mm: Vector  # where each stretch ends, (n,)
-    length_mm: Vector  # of each stretch, (n,)
-    xy_mm: Vector  # place of each station, (n, 2)
+    distance_mm: Vector  # end of each interval, (n,)
+    length_mm: Vector  # of each interval, (n,)
+    xy_mm: Vector  # position of each station, (n, 2)
     begins: npt.NDArray[np.intp]  # index of the first station of each region
-    radial_depth_mm: Vector  # what the tool meets, (n,)
-    section_mm2: Vector  # area of the cut, in the plane across the feed, (n,)
+    radial_depth_mm: Vector  # radial depth, (n,)
+    section_mm2: Vector  # area of the cut, perpendicular to the feed, (n,)
     programmed_mm_per_min: Vector  # F words of the original, (n,)
-    written_mm_per_min: Vector  # the new ones, (n,)
-    load: Pair[Load]  # with the original feeds and with the new ones, as the machine runs them
-    limit: Mapping[str, Vector]  # of tool and machine by the name of the load (`LOADS`), (n,); inf where there is none
+    written_mm_per_min: Vector  # new F words, (n,)
+    load: Pair[Load]  # with the original and the new feeds, as the machine reaches them
+    limit: Mapping[str, Vector]  # of tool and machine by the name of the load (`LOADS`), (n,); inf: no limit
 
     def __len__(self) -> int:
         return len(self.distance_mm)
@@ -121,7 +121,7 @@ class FeedTraces:
 def feed_traces(
     survey: Survey, plans: Sequence[FeedPlan | None], loads: Sequence[PathLoad | None], machine: Machine
 ) -> FeedTraces | None:
-    """The curves of all regions whose load is known; None: there is none."""
+    """Curves of all regions with known load; None: no such region."""
     parts = [
         (part, part.track, plan, load)
         for part, plan, load in zip(survey.regions, plans, loads, strict=True)
@@ -158,14 +158,14 @@ def feed_traces(
 
 def _written(plan: FeedPlan, load: PathLoad) -> Vector:
     ends = np.array([stretch.end_mm for stretch in plan.stretches])
-    # The middle of a stretch: its end may be the place where the feed changes.
+    # Use the middle of an interval, as the feed may change at its end.
     middles = load.s_mm - 0.5 * np.diff(load.s_mm, prepend=0.0)
     inside = np.minimum(np.searchsorted(ends, middles), len(ends) - 1)
     return np.array([stretch.feed_mm_per_min for stretch in plan.stretches])[inside]
 
 
 def groups(distance_mm: Vector, most: int) -> npt.NDArray[np.intp]:
-    """First stations of at most *most* runs of about equal length; every station is in one."""
+    """First stations of at most *most* groups of about equal length, which contain every station."""
     if len(distance_mm) <= most:
         return np.arange(len(distance_mm))
     edges = np.linspace(0.0, float(distance_mm[-1]), most + 1)[:-1]
@@ -173,25 +173,25 @@ def groups(distance_mm: Vector, most: int) -> npt.NDArray[np.intp]:
 
 
 def envelope(values: Vector, starts: npt.NDArray[np.intp]) -> tuple[Vector, Vector]:
-    """Least and largest value of each run of stations."""
+    """Minimum and maximum of each group of stations."""
     return np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
 
 
 @dataclass(frozen=True)
 class WallMaps:
-    """Form error of the wall over distance and height, µm: + is left standing; of a slot the wall right of the feed."""
+    """Form error of the wall over distance and height, µm (+: material remains); in a slot: right wall."""
 
     edges_mm: Vector  # of the columns, along the cutting path, (m + 1,)
     height_mm: Vector  # above the tip, (h,)
-    error_um: Pair[Vector]  # with the original feeds and with the new ones, (m, h) each; NaN: no wall is made there
+    error_um: Pair[Vector]  # with the original and the new feeds, (m, h) each; NaN: no wall there
 
 
 def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTraces) -> WallMaps | None:
-    """The walls along the cutting path; None: none are made.
+    """Walls along the cutting path; None: no walls.
 
-    A column speaks for a stretch of the path, taken where the peak resultant was largest before.
+    A column represents an interval of the path, at its largest original peak resultant.
 
-    Source: the error of a wall is that of Kim and Ko, 2001 (paper 001), section 2.3; its map is of this project.
+    Source: the error of a wall is from Kim and Ko, 2001 (paper 001), section 2.3; its map is this project's.
     """
     starts = groups(traces.distance_mm, _COLUMNS)
     ends = np.append(starts[1:], len(traces))
@@ -224,7 +224,7 @@ def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTrac
 
 
 def _wall(force: _core.MillingForce, beam: _core.ToolBeam, arcs: Vector, feed: float, height: Vector) -> Vector:
-    """Error of the wall to the right of the feed, or of that to the left where only that is made."""
+    """Error of the wall to the right of the feed, or to the left if only that is made."""
     for side in (_core.WallSide.right, _core.WallSide.left):
         error = np.asarray(_core.wall_error_um(force, beam, arcs, feed, side, height))
         if np.isfinite(error).any():

@@ -1,4 +1,4 @@
-"""Feeds of one region: the highest that keep every limit, as the machine will really run them."""
+"""Feeds of one region: the highest within every limit, as the machine will really reach them."""
 
 from __future__ import annotations
 
@@ -17,55 +17,55 @@ from shapegcode.model.machine_model import MachineModel
 
 Vector = npt.NDArray[np.float64]
 _ATTEMPTS = 12
-_LONGEST_REACH = 2.0  # of the lag, beyond which waiting longer changes nothing
-_LOWERING = 3  # attempts that only slow down earlier, before feeds are lowered too
-_SAME_DIRECTION = 0.95  # cosine of a turn after which the load is still that of before
-_MIN_SHARE = 0.9  # of a feed that is lowered once
+_LONGEST_REACH = 2.0  # multiple of the lag beyond which more reach has no effect
+_LOWERING = 3  # attempts that only slow down earlier, before feeds are reduced too
+_SAME_DIRECTION = 0.95  # cosine of a turn that does not change the load
+_MIN_SHARE = 0.9  # least ratio of one reduction of a feed
 _TOO_FAST = 1e-4  # relative: rounding of the travel, far below the margin
-_DEEPER_PLUNGE = 0.01  # of the tool's end in material: a ramp cuts with its end
+_DEEPER_PLUNGE = 0.01  # plunge depth of the tool's end in material, as a ramp cuts with the end
 _AIR_MM2 = 1e-9
-_STEEPEST_AIR = 0.7  # share of the travel in XY from which on a move in air is no plunge
-_MIN_PROGRAMMED = 0.1  # of the programmed feed, where the tool file states no least chip
-_STEP = 0.005  # feeds that differ by less are one: a border for less gains nothing
+_STEEPEST_AIR = 0.7  # least ratio of travel in XY for a move in air that is no plunge
+_MIN_PROGRAMMED = 0.1  # ratio to the programmed feed, without a least chip in the tool file
+_STEP = 0.005  # smaller feed steps are not written, as they gain nothing
 _LIMIT_NAMES = np.array(
     [name for _, name in sorted((limit.value, name) for name, limit in _core.FeedLimit.__members__.items())],
     dtype="<U16",
 )
 PROGRAMMED, MAX_FEED, AIR, KEPT, MINIMUM = "programmed", "max_feed", "air", "kept", "minimum"
-"""What holds a feed where no limit does: the program, the largest feed, no material, a block left alone, the least."""
+"""Reasons for a feed other than limits: program, largest feed, no material, unchanged block, lowest feed."""
 
 
 @dataclass(frozen=True)
 class Travelled:
     """Travel along a path, one value per station."""
 
-    feed_mm_per_min: Vector  # largest feed per tooth on the stretch before the station, as a feed
-    time_s: Vector  # time on that stretch
+    feed_mm_per_min: Vector  # largest feed per tooth on the interval before the station, as a feed
+    time_s: Vector  # time on that interval
 
     @classmethod
     def of(cls, travel: _core.Travel) -> Travelled:
-        """What the core found."""
+        """Convert from the core."""
         return cls(np.asarray(travel.highest_mm_per_s) * 60.0, np.asarray(travel.time_s))
 
 
 class Mover:
-    """What makes a motion of the blocks of a region."""
+    """Motion model of the blocks of a region."""
 
     def __init__(self, period_s: float, filters: Sequence[_core.Fir]) -> None:
         self.period_s, self.filters = period_s, filters
 
     @property
     def reach_s(self) -> float:
-        """Time by which the travel lags behind a change of the commanded feed: half of what its filters last."""
+        """Lag of the travel after a change of the commanded feed, s: half the duration of its filters."""
         return 0.5 * self.period_s * sum(filter_.duration_samples for filter_ in self.filters)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
-        """Travel of a path made of `along`, to whose length the stations ascend; feeds are over the window."""
+        """Travel of a path made of `along`, with stations along its length; feeds are averaged over the window."""
         raise NotImplementedError
 
 
 class OrdinaryMotion(Mover):
-    """The controller's own motion, as it simulates an ordinary program."""
+    """The controller's own motion, as for an ordinary program."""
 
     def __init__(self, machine: Machine) -> None:
         self._controller = MachineModel(machine).ordinary
@@ -79,7 +79,7 @@ class OrdinaryMotion(Mover):
 def travel_emitted(
     blocks: _core.Path, path: _core.Path, machine: Machine, stations_mm: Vector, window_s: float
 ) -> Travelled:
-    """Travel of shaped blocks as the controller simulates them, along the programmed path; else as `Mover.travel`."""
+    """Travel of simulated shaped blocks along the programmed path; else as `Mover.travel`."""
     model = MachineModel(machine)
     return Travelled.of(
         _core.travel_blocks(blocks, path, model.own_rule, stations_mm, model.period_s, model.shaped.filters, window_s)
@@ -90,17 +90,17 @@ def travel_emitted(
 class FeedPlan:
     """Feeds of a region."""
 
-    surveyed: SurveyedRegion  # the region, and what the tool meets on it
-    limit_mm_per_min: Vector  # largest feed allowed on the stretch before each station, (n,)
-    holds: npt.NDArray[np.str_]  # what holds it there, (n,) of names
-    kept: tuple[str, ...]  # per segment why its feed stays, empty where it may change
-    stretches: tuple[_core.FeedStretch, ...]  # the feeds, as they are written
-    # stations at which the least feed per tooth is more than the limits allow, (n,) of bool
+    surveyed: SurveyedRegion  # the region with its engagement
+    limit_mm_per_min: Vector  # largest feed allowed on the interval before each station, (n,)
+    holds: npt.NDArray[np.str_]  # reason of that feed, (n,) names
+    kept: tuple[str, ...]  # why each segment's feed stays; empty if it may change
+    stretches: tuple[_core.FeedStretch, ...]  # the feeds to write
+    # stations where the least feed per tooth exceeds the limits, (n,) of bool
     held_at_minimum: npt.NDArray[np.bool_]
 
 
 def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:
-    """The limits of tool and machine together."""
+    """Combine the limits of tool and machine."""
     room = 1.0 - margin
 
     def least(*values: float | None) -> float:
@@ -123,26 +123,26 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
                 feed_unit_mm_per_min: float) -> FeedPlan:  # fmt: skip
     """Choose the feeds of a region whose feeds may change.
 
-    Source: this project; that a feed must stand for a least length is of Kim and Ko, 2001 (paper 001).
+    Source: this project; the least length of a feed is from Kim and Ko, 2001 (paper 001).
     """
     tool, track, path, control = surveyed.tool, surveyed.track, surveyed.region.path, machine.feed_control
     assert tool is not None and track is not None
     segment, stations_mm, window_s = np.asarray(track.segment), np.asarray(track.s_mm), surveyed.window_s
     programmed = path.segment_feeds_mm_per_s * 60.0
-    # Without a least chip nobody wants the tool to rub for hours to keep a limit that cannot be kept.
+    # Without a least chip, avoid rubbing for hours to keep an impossible limit.
     chip_mm = tool.limits.feed_per_tooth_min_mm or 0.0
     share = 0.0 if chip_mm else _MIN_PROGRAMMED
     teeth_per_min = tool.tool.flutes * surveyed.spindle_rev_per_min
     least = max(chip_mm * teeth_per_min, machine.controller.minimum_feed_mm_per_min)
     kept = _kept_segments(surveyed, programmed, least)
     slowest = np.maximum(least, share * programmed)
-    lowest = (feed_unit_mm_per_min * np.ceil(slowest / feed_unit_mm_per_min - 1e-9))[segment]  # what F can say
+    lowest = (feed_unit_mm_per_min * np.ceil(slowest / feed_unit_mm_per_min - 1e-9))[segment]  # resolution of F
     limit, holds, load = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
     frozen = np.array([bool(reason) for reason in kept])
     at_minimum = (holds == MINIMUM) & ~frozen[segment]
     limit = np.where(frozen[segment], programmed[segment], limit)
     holds[frozen[segment]] = KEPT
-    # Planned, travelled, and slowed down earlier or more where the travel is still too fast.
+    # Plan, simulate the travel, and slow down earlier or more where it is still too fast.
     most_change = math.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min
     floor = np.minimum(limit, lowest)
     planned = np.maximum(_stepped(limit, programmed[segment]), floor)
@@ -177,7 +177,7 @@ def _kept_segments(surveyed: SurveyedRegion, programmed: Vector, lowest: float) 
     for index in np.unique(np.asarray(track.segment)[plunged]):
         reasons[index] = "plunges into material"
     for index in np.flatnonzero(programmed < lowest * (1.0 - 1e-9)):
-        reasons[index] = f"its feed, {programmed[index]:g} mm/min, is already below the least one, {lowest:g} mm/min"
+        reasons[index] = f"its feed, {programmed[index]:g} mm/min, is already below the lowest one, {lowest:g} mm/min"
     return tuple(reasons)
 
 
@@ -196,12 +196,12 @@ def _limits_along(
             f"controller.minimum_feed_mm_per_min = {least:g}"
         )
     fastest = min(axes.x.max_feed_mm_per_min, axes.y.max_feed_mm_per_min, most or math.inf)
-    # Without a largest chip no more than the programmed feed is wanted in material.
+    # Without a largest chip the programmed feed is the limit in material.
     raised = tool.limits.feed_per_tooth_max_mm is not None or most is not None
     ceiling = np.full(len(programmed), fastest) if raised else np.minimum(programmed, fastest)
     force = tool.force(surveyed.spindle_rev_per_min, surveyed.sense)
     highest = max(fastest, float(ceiling.max()))
-    # Searched to far below the least feed: what needs less than that is distinguished from what just reaches it.
+    # Search far below the lowest feed, to separate stations that need less from those that just reach it.
     bound, limit, _ = _core.largest_feeds(
         force, track, limits_of(tool, machine, margin), 1e-3 * float(lowest.min()), highest
     )
@@ -216,13 +216,13 @@ def _limits_along(
     feeds[air] = np.minimum(programmed, fastest)[air]
     load[air] = np.inf
     holds[air] = AIR
-    # A station speaks for the stretch before it, on which the load changes from what the last one met.
+    # A station represents the interval before it, on which the load changes from the last station's.
     passed = goes_on(track) & ~air[:-1]
     before = np.where(passed & (feeds[:-1] < feeds[1:]), np.arange(len(feeds) - 1), np.arange(1, len(feeds)))
     feeds[1:], holds[1:] = feeds[before], holds[before]
     load[1:] = np.where(passed, np.minimum(load[1:], load[:-1]), load[1:])
     if tool.feed.air_feed_mm_per_min is not None:
-        level = np.asarray(track.horizontal) > _STEEPEST_AIR  # a tool must not come down faster than programmed
+        level = np.asarray(track.horizontal) > _STEEPEST_AIR  # a tool must not plunge faster than programmed
         certain = air if surveyed.clear is None else air & surveyed.clear
         near = _near_material(np.asarray(track.s_mm), certain, tool.feed.approach_mm)
         clear = certain & (holds == AIR) & level & ~near
@@ -231,7 +231,7 @@ def _limits_along(
 
 
 def goes_on(track: _core.EngagementTrack) -> npt.NDArray[np.bool_]:
-    """Per station but the last, (n - 1,): whether the tool goes on in much the same direction, and its load with it."""
+    """Per station but the last, (n - 1,): whether direction and so load continue nearly unchanged."""
     turn = np.diff(np.asarray(track.direction_rad))
     level = np.asarray(track.horizontal)
     return np.asarray((np.cos(turn) > _SAME_DIRECTION) & (level[1:] > 0.0) & (level[:-1] > 0.0))
@@ -245,6 +245,6 @@ def _stepped(limit: Vector, programmed: Vector) -> Vector:
 
 
 def _near_material(s_mm: Vector, air: npt.NDArray[np.bool_], approach_mm: float) -> npt.NDArray[np.bool_]:
-    contact = np.where(air, np.inf, np.concatenate(([0.0], s_mm[:-1])))  # where the stretch of a station begins
+    contact = np.where(air, np.inf, np.concatenate(([0.0], s_mm[:-1])))  # start of a station's interval
     following = np.minimum.accumulate(contact[::-1])[::-1]
     return np.asarray(following - s_mm <= approach_mm)

@@ -29,18 +29,18 @@ _LIMIT = "#000000"
 _BEYOND = plot.COLOURS[0]
 _BANDS = 1500
 _PIECES = 20000
-_LOGARITHMIC = 8.0  # ratio of the largest feed to the least in material from which on the axis is logarithmic
-_MINOR = "235"  # first digits of the numbers that a logarithmic axis shows between powers of ten
+_LOGARITHMIC = 8.0  # ratio of largest to lowest feed in material from which the axis is logarithmic
+_MINOR = "235"  # first digits of labels between powers of ten on a logarithmic axis
 _AIR_MM2 = 1e-9
-_STACKED = 1.9  # width over height of the part from which on the two paths stand below each other
+_STACKED = 1.9  # width over height of the part from which the two paths are stacked
 _MARGIN = 0.03  # around the part, of its longer side
-_GROUND = 300  # cells of the ground along the longer side
+_GROUND = 300  # cells of the background along the longer side
 _ALWAYS = ("peak_resultant_n", "mean_resultant_n")
 _NO_WALL = "#c9c9c9"
 
 
 def plots_of(schedule: FeedSchedule) -> dict[str, Plot]:
-    """Its pictures by name; none where no cutting force is known."""
+    """Pictures by name; none without a known cutting force."""
     if schedule.traces is None:
         return {}
     found: dict[str, Plot] = {
@@ -52,7 +52,7 @@ def plots_of(schedule: FeedSchedule) -> dict[str, Plot]:
 
 def _traces(schedule: FeedSchedule) -> FeedTraces:
     if schedule.traces is None:
-        raise _core.ArgumentError("no region whose cutting force is known: there is nothing to draw")
+        raise _core.ArgumentError("no region with a known cutting force: nothing to draw")
     return schedule.traces
 
 
@@ -66,12 +66,12 @@ def _summary(schedule: FeedSchedule) -> str:
 
 
 def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
-    """Engagement, feed and load of the tool along the path, before and after.
+    """Plot engagement, feed and load of the tool along the path, before and after.
 
-    Long programs are drawn as bands between the least and the largest value of each stretch, so that no peak is lost.
+    Long programs are drawn as bands between minimum and maximum of each interval, so that no peak is lost.
 
     Args:
-        schedule: what was scheduled.
+        schedule: the schedule.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -92,7 +92,7 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
     panels[0].set_ylabel("radial depth\nin mm")
     panels[1].set_ylabel("section of the\ncut in mm²")
     along.draw(panels[2], traces.programmed_mm_per_min, plot.GREY, "programmed")
-    along.draw(panels[2], traces.load.emitted.feed_mm_per_min, _AFTER, "really run", width=2.2)
+    along.draw(panels[2], traces.load.emitted.feed_mm_per_min, _AFTER, "reached", width=2.2)
     along.draw(panels[2], traces.written_mm_per_min, plot.COLOURS[4], "written")
     _feed_axis(panels[2], np.concatenate([traces.programmed_mm_per_min, traces.written_mm_per_min]))
     plot.legend_above(panels[2])
@@ -126,7 +126,7 @@ def _feed_axis(panel: Axes, feeds: Vector) -> None:
 
 
 class _Along:
-    """Plot values over the distance: steps, or bands where an interval holds several stations."""
+    """Plot values over the distance: steps, or bands where an interval has several stations."""
 
     def __init__(self, traces: FeedTraces, starts: npt.NDArray[np.intp]) -> None:
         self._starts = starts
@@ -152,12 +152,12 @@ class _Along:
 
 
 def plot_force_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
-    """Where is the force large? The path from above, before and after in one scale; behind it what is left standing.
+    """Plot the force on the path from above, before and after in one scale, over the remaining material.
 
-    Pieces with the largest force are drawn last, so that passes below them do not hide them.
+    Pieces with the largest force are drawn last, so that lower passes do not hide them.
 
     Args:
-        schedule: what was scheduled.
+        schedule: the schedule.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -203,7 +203,7 @@ def plot_force_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
 
 
 def _coloured_path(panel: Axes, traces: FeedTraces, force_n: Vector, norm: Any) -> Any:
-    """Draw the pieces of the path, those with the largest force last; what a colour bar needs."""
+    """Draw the pieces of the path, those with the largest force last; returns the data for a colour bar."""
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection
 
@@ -230,7 +230,7 @@ def _pieces(traces: FeedTraces) -> tuple[Vector, npt.NDArray[np.intp]]:
 
 
 def _ground(panel: Axes, material: _core.Material, low: Vector, high: Vector) -> None:
-    """What is left of the stock, the higher the darker."""
+    """Draw the remaining stock, higher parts darker."""
     size = high - low
     cell = max(float(size.max()) / _GROUND, 1e-9)
     columns, rows = (max(int(np.ceil(each / cell)), 1) for each in size)
@@ -244,10 +244,10 @@ def _ground(panel: Axes, material: _core.Material, low: Vector, high: Vector) ->
 
 
 def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
-    """How far off is the wall? Error over distance and axial height before and after, in one scale.
+    """Plot the wall error over distance and axial height, before and after, in one scale.
 
     Args:
-        schedule: what was scheduled.
+        schedule: the schedule.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -258,7 +258,7 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     """
     walls = schedule.walls
     if walls is None:
-        raise _core.ArgumentError("no wall is made whose cutting force is known: there is nothing to draw")
+        raise _core.ArgumentError("no wall with a known cutting force: nothing to draw")
     maps = {"before": walls.error_um.original, "after": walls.error_um.emitted}
     everything = np.concatenate([each[np.isfinite(each)] for each in maps.values()])
     low, high = min(float(everything.min()), 0.0), max(float(everything.max()), 0.0)
@@ -266,7 +266,7 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     both = _both_sides(low, high)
     panels = plot.column(
         ax, 3, size_inch=(11.0, 7.0), part=_summary(schedule),
-        title="Form error of the wall; +: material is left standing",
+        title="Form error of the wall; +: material remains",
     )  # fmt: skip
     step = walls.height_mm[1] - walls.height_mm[0]
     levels = np.append(walls.height_mm - 0.5 * step, walls.height_mm[-1] + 0.5 * step)
@@ -283,7 +283,7 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
         panel.set_title(f"{name}: up to {plot.number(worst)} µm", loc="left", fontsize=10)
     whole: Any = panels[0].figure
     whole.colorbar(
-        mesh, ax=panels[:-1], pad=0.01, label="error of the wall in µm\nred: left standing, blue: cut too far"
+        mesh, ax=panels[:-1], pad=0.01, label="error of the wall in µm\nred: material remains, blue: cut too deep"
     )
     last = panels[-1]
     for (name, values), colour in zip(maps.items(), (_BEFORE, _AFTER), strict=True):
@@ -298,7 +298,7 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
 
 
 def _both_sides(low: float, high: float) -> Colormap:
-    """Colours from `low` to `high`, white at 0 and as strong on one side as on the other; `low` <= 0 <= `high`."""
+    """Colours from `low` to `high`, white at 0 and symmetric; `low` <= 0 <= `high`."""
     from matplotlib import colormaps
     from matplotlib.colors import LinearSegmentedColormap
 
@@ -308,7 +308,7 @@ def _both_sides(low: float, high: float) -> Colormap:
 
 
 def with_forces(scene: Scene, schedule: FeedSchedule) -> Scene:
-    """The motion with the largest resultant in a revolution, by place along each region."""
+    """Add the largest resultant in a revolution along each region to the motion."""
     loads = schedule.loads
     regions = [[part.region for part in schedule.survey.regions], list(schedule.written.regions)]
     variants = []
@@ -330,7 +330,7 @@ def _along(variant: Variant, known: Sequence[tuple[Region, Vector, Vector]]) -> 
         rows = np.flatnonzero((variant.line >= region.first_line) & (variant.line <= region.last_line))
         if len(rows) < 2 or not len(stations_mm) or travel[rows[-1]] <= travel[rows[0]]:
             continue
-        # The thinned travel is a little shorter than the path: both are taken from their beginning to their end.
+        # The decimated travel is slightly shorter than the path: scale one to the other.
         ratio = (travel[rows] - travel[rows[0]]) / (travel[rows[-1]] - travel[rows[0]])
         force[rows] = np.interp(ratio * stations_mm[-1], stations_mm, values_n)
     return force

@@ -1,4 +1,4 @@
-"""What a feed schedule gains: force, torque, power and deflection before and after, and what limits each block."""
+"""Result of a feed schedule: force, torque, power and deflection before and after, and limits of each block."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ _LIMIT_WORDS = {
     "programmed": "feed as programmed",
     "max_feed": "largest feed of tool or axes",
     "air": "nothing to cut",
-    "minimum": "least feed",
-    "kept": "left as it was",
+    "minimum": "lowest feed",
+    "kept": "left unchanged",
 }
 
 
@@ -51,11 +51,11 @@ class ResultantForce:
 
 @dataclass(frozen=True)
 class PeakLoad:
-    """The largest value along the program."""
+    """Largest value along the program, before and after."""
 
     original: float  # with the original feeds
-    emitted: float  # with the new ones
-    place: str  # file and line of the latter; empty where there is none
+    emitted: float  # with the new feeds
+    place: str  # file and line of the latter; empty if there is none
 
 
 @dataclass(frozen=True)
@@ -71,38 +71,38 @@ class PeakLoads:
 
 @dataclass(frozen=True)
 class HeldLines:
-    """Lines whose feed is held by one thing."""
+    """Lines whose feed is determined by the same limit."""
 
     lines: tuple[int, int]  # first and last, from 1
-    feed_mm_per_min: FeedRange  # the feeds that stand there
-    # what holds them: "resultant", "deflection", "torque", "power" or "chip_load"; "programmed": the feed of the
-    # program; "max_feed": the largest feed of tool file or axes; "air": nothing to cut; "minimum": the least feed;
-    # "kept": left as it was
+    feed_mm_per_min: FeedRange  # the feeds in these lines
+    # their limit: "resultant", "deflection", "torque", "power" or "chip_load"; "programmed": the feed of the
+    # program; "max_feed": the largest feed of tool file or axes; "air": nothing to cut; "minimum": the lowest feed;
+    # "kept": left unchanged
     limit: str
-    reason: str  # why they are left as they were; else empty
+    reason: str  # why they are left unchanged; else empty
 
 
 @dataclass(frozen=True)
 class ScheduledRegion:
-    """A run of cutting moves between two stops."""
+    """A sequence of cutting moves between two stops."""
 
     lines: tuple[int, int]  # first and last, from 1
     kept: str  # why its feeds stay; empty if they may change
-    spindle_rev_per_min: float  # speed of the spindle; 0: not known
-    radial_depth_mm: float | None  # largest; None: not known
-    removal_mm3: float | None  # volume that is cut; None: not known
-    misses: tuple[str, ...]  # limits that are not kept, in words
-    resultant_force_n: Pair[ResultantForce] | None  # before and after; None: not known
+    spindle_rev_per_min: float  # speed of the spindle; 0: unknown
+    radial_depth_mm: float | None  # largest; None: unknown
+    removal_mm3: float | None  # removed volume; None: unknown
+    misses: tuple[str, ...]  # messages for exceeded limits
+    resultant_force_n: Pair[ResultantForce] | None  # before and after; None: unknown
 
 
 @dataclass(frozen=True)
 class KeptMove:
-    """A cutting move outside of the regions that meets material: its feed stays."""
+    """A cutting move in material outside the regions: its feed stays."""
 
     place: str  # file and line
     feed_mm_per_min: float  # as programmed
-    misses: tuple[str, ...]  # limits that are not kept, in words
-    load: PathLoad | None = field(metadata=hidden())  # its force; None: not known
+    misses: tuple[str, ...]  # messages for exceeded limits
+    load: PathLoad | None = field(metadata=hidden())  # its force; None: unknown
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -113,24 +113,24 @@ class FeedSchedule(Result):
         program: name of the program.
         machine: name of the machine.
         tools: names of the tools that cut.
-        margin: share of each limit that was left free.
-        feed_mm_per_min: of what is written.
-        resultant_force_n: along the whole program, cutting moves only.
+        margin: safety margin to each limit, as a ratio.
+        feed_mm_per_min: range of the written feeds.
+        resultant_force_n: resultant along the whole program, cutting moves only.
         peak: largest loads along the program.
-        cycle_time_s: of the whole program.
-        air_time_s: of cutting moves that meet nothing.
-        blocks: with a cutting move of a region.
-        limits: what holds the feed of which lines, in order.
-        regions: runs of cutting moves between two stops.
-        moves: cutting moves outside of them that meet material.
-        excess_ratio: by how much the worst limit is exceeded where a lower feed could help; 0: nowhere.
-        warnings: what was noticed, each with its place.
+        cycle_time_s: time of the whole program.
+        air_time_s: time of cutting moves without engagement.
+        blocks: number of blocks with a cutting move of a region.
+        limits: limits of the feed by lines, in order.
+        regions: sequences of cutting moves between two stops.
+        moves: cutting moves in material outside of them.
+        excess_ratio: largest relative excess of a limit where a lower feed could help; 0: none.
+        warnings: findings, each with its location.
         text: the program with its new feeds.
-        written: the same, as read back.
-        survey: what the tool meets.
+        written: the same program, as read back.
+        survey: tool engagement.
         plans: the feeds of each region that may change; None for the others.
-        loads: along each region; None where nothing is known.
-        simulated: the program before and after, to show both on a page.
+        loads: loads along each region; None: unknown.
+        simulated: the program before and after, for a page.
     """
 
     program: str
@@ -157,12 +157,12 @@ class FeedSchedule(Result):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Published methods of the force and of the controller."""
+        """Published methods of force model and controller."""
         return ("cutting force", *(() if self.simulated is None else self.simulated.methods))
 
     @property
     def misses(self) -> tuple[str, ...]:
-        """Limits that are not kept, of regions and moves, in words."""
+        """Messages for exceeded limits of regions and moves."""
         groups = [*(region.misses for region in self.regions), *(move.misses for move in self.moves)]
         return tuple(miss for misses in groups for miss in misses)
 
@@ -173,7 +173,7 @@ class FeedSchedule(Result):
 
     @property
     def answer(self) -> str:
-        """Whether every limit is kept and what that takes, or where not."""
+        """Whether every limit is kept, with force and time, or where not."""
         name, misses = Path(self.program).name, self.misses
         if not misses:
             force, time = self.resultant_force_n, self.cycle_time_s
@@ -186,32 +186,30 @@ class FeedSchedule(Result):
 
     @property
     def next_step(self) -> str:
-        """The one thing to do next, in one sentence."""
+        """Next command or change, in one sentence."""
         if self.ok:
             return "shapegcode convert shapes this program too; or both in one go: convert --feed-schedule"
         unknown = [region for region in self.regions if region.misses and region.resultant_force_n is None]
         if unknown or any(move.load is None for move in self.moves):
-            return "say what is not known: S in the program or feed.spindle_rev_per_min in the tool file"
-        return (
-            "take less material at once there, lower the feed of moves that are left unchanged, or choose another limit"
-        )
+            return "specify the unknown: S in the program or feed.spindle_rev_per_min in the tool file"
+        return "reduce the depth of cut there, lower the feed of moves that are left unchanged, or choose another limit"
 
     @cached_property
     def traces(self) -> FeedTraces | None:
-        """The curves along the cutting path; None where no force is known."""
+        """Curves along the cutting path; None without a known force."""
         assert self.simulated is not None
         return feed_traces(self.survey, self.plans, self.loads, self.simulated.machine)
 
     @cached_property
     def walls(self) -> WallMaps | None:
-        """The form error of the walls along the cutting path; None where none are made."""
+        """Form error of the walls along the cutting path; None without walls."""
         return None if self.traces is None else wall_maps(self.survey, self.loads, self.traces)
 
     def page(self, **options: Any) -> Page:
-        """The schedule as a page, see `Result.page`; its motion has the cutting force.
+        """The schedule as a page, see `Result.page`; its motion includes the cutting force.
 
         Args:
-            options: of `Result.page`.
+            options: options of `Result.page`.
 
         Returns:
             The page, as data.
@@ -236,11 +234,11 @@ class FeedSchedule(Result):
         )  # fmt: skip
 
     def tables(self) -> list[Table]:
-        """Before and after; what holds the feed of which lines."""
+        """Tables of figures before and after, and of the limits of the feed by lines."""
         return [self._gain_table(), self._limit_table()]
 
     def plots(self) -> Mapping[str, Plot]:
-        """Curves along the path, the path coloured by force, the walls; none where no force is known."""
+        """Curves along the path, the path coloured by force, the walls; none without a known force."""
         return self._drawn_beside()
 
     def _gain_table(self) -> Table:
@@ -249,7 +247,7 @@ class FeedSchedule(Result):
             *((name, getattr(self.peak, key), digits, unit) for key, (name, unit, digits) in LOADS.items()),
             ("mean resultant over the time in material", Pair(force.original.mean, force.emitted.mean), 1, "N"),
             ("cycle time", self.cycle_time_s, 2, "s"),
-            ("of it cutting moves in air", self.air_time_s, 2, "s"),
+            ("of which cutting moves in air", self.air_time_s, 2, "s"),
             ("cutting blocks", self.blocks, 0, ""),
         ]
         columns = (
@@ -270,7 +268,7 @@ class FeedSchedule(Result):
         columns = (
             Column("lines", value=lambda entry: _from_to(*map(str, entry.lines)), text=True),
             Column("feed", "mm/min", lambda entry: _from_to(*map("{:g}".format, astuple(entry.feed_mm_per_min)))),
-            Column("held by", value=lambda entry: _LIMIT_WORDS.get(entry.limit, entry.limit), text=True),
+            Column("limited by", value=lambda entry: _LIMIT_WORDS.get(entry.limit, entry.limit), text=True),
         )
         return Table(title, columns, sorted(slowest, key=lambda entry: entry.lines[0]))
 

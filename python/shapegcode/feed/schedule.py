@@ -1,4 +1,4 @@
-"""Feed scheduling: a program with the highest feeds that keep every limit of the cut, and what that gains."""
+"""Feed scheduling: a program with the highest feeds within every limit of the cut, and its gain."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.program.compensation import program_for_conversion
 from shapegcode.results.outcome import Pair
 
-MARGIN = 0.015  # Share of each limit that a schedule leaves free: for what model and position of the load are off by
+MARGIN = 0.015  # safety margin to each limit, for errors of the model and the load's position
 
-_SWEEPING = 0.5  # share of the progress bar; of the rest for planning
+_SWEEPING = 0.5  # fraction of the progress bar; of the rest for planning
 _PLANNING = 0.7
 _SAME_PLACE_INCREMENTS = 1.0
 _NEEDS_FEED = re.compile(rb"F|G0*[123](?!\d)|G\s*[78]\d|G\s*6[56]|M\s*\d*9[789]|[#<]")  # cuts, cycles, calls
@@ -53,25 +53,25 @@ def schedule_feed(
     """Set the feeds of a program so that force, deflection, torque, power and chip stay within the tool's limits.
 
     Args:
-        program: what to schedule, or its file.
-        machine: whose controller runs it.
+        program: the program, or its file.
+        machine: machine whose controller runs it.
         tools: the tool, or several with their T numbers.
-        stock: what is there before the first block.
-        motion: how the feeds will be run; None: as the controller runs an ordinary program.
-        margin: share of each limit that is left free.
+        stock: stock before the first block.
+        motion: motion at the new feeds; None: the controller's own, as for an ordinary program.
+        margin: safety margin to each limit, as a ratio.
         resolution_mm: grid of the material; None: a hundredth of the tool's diameter.
-        on_progress: called with the share that is done, 0 to 1.
+        on_progress: called with the completed fraction, 0 to 1.
 
     Returns:
-        The text with its new feeds, and time, force and load before and after.
+        The program text with its new feeds; time, force and load before and after.
 
     Raises:
         ProgramError: the program cannot be read, or was shaped already.
         ArgumentError: a value outside its range, no tool, no cutting move.
         StockError: the stock does not suit the program.
-        RoundTripError: the written text would not be equivalent: a defect of shapegcode.
+        RoundTripError: the new program would not be equivalent: a defect of shapegcode.
 
-    Source: this project; the force model and feeds that follow the force are those of Kim and Ko, 2001 (paper 001).
+    Source: this project; the force model and force-controlled feeds are those of Kim and Ko, 2001 (paper 001).
     """
     machine = Machine.of(machine)
     program = program_for_conversion(program, machine)
@@ -95,7 +95,7 @@ def schedule_survey(
     margin: float = MARGIN,
     on_progress: Progress = lambda _done: None,
 ) -> FeedSchedule:
-    """As :func:`schedule_feed`, for a program whose engagement is known already."""
+    """Like :func:`schedule_feed`, for a program with known engagement."""
     if not 0.0 <= margin < 1.0:
         raise _core.ArgumentError(f"margin is {margin:g}, must be at least 0 and below 1")
     program = surveyed.program
@@ -164,7 +164,7 @@ def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine)
     parts: list[bytes] = []
     first_lines: list[int] = []
     line, position, blocks = 1, 0, 0
-    modal_feed = 0.0  # where it is not that of the original
+    modal_feed = 0.0  # the active F if it is not that of the original
     for index, (region, plan) in enumerate(zip(program.regions, plans, strict=True)):
         between = core.slice(position, region.text_begin)
         line += between.count(b"\n")
@@ -188,7 +188,7 @@ def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine)
 
 
 def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index: int) -> bool:
-    """Whether the region behind one is written too, and nothing in between could need the modal feed."""
+    """Whether the next region is written too, and nothing in between needs the modal feed."""
     if index + 1 == len(plans) or plans[index + 1] is None:
         return False
     here, following = program.regions[index], program.regions[index + 1]
@@ -197,7 +197,7 @@ def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index
 
 
 def _read_back(text: bytes, program: Program, first_lines: Sequence[int], machine: Machine) -> Program:
-    """The written text as a program; its regions must be those of the original, by place, length and end."""
+    """Read the new text back; its regions must match the original's in position, length and end."""
     try:
         emitted = Program.from_text(text, machine, source="the written program", emitted=True)
     except _core.ProgramError as error:
@@ -227,7 +227,7 @@ def feed_figures(
     surveyed: Survey, plans: Plans, loads: Loads, machine: Machine, *, margin: float, text: bytes, written: Program,
     cycle_time_s: Pair[float], blocks: Pair[int],
 ) -> FeedSchedule:  # fmt: skip
-    """The result of a schedule."""
+    """Build the result of a schedule."""
     program = surveyed.program
     moves = tuple(_move(move, machine) for move in surveyed.moves)
     parts = list(zip(surveyed.regions, plans, loads, strict=True))
@@ -264,7 +264,7 @@ def feed_figures(
 
 def _move(move: SurveyedMove, machine: Machine) -> result.KeptMove:
     load = move_load(move)
-    misses = ["its force is not known: no spindle speed"]
+    misses = ["its force is unknown: no spindle speed"]
     if load is not None:
         misses = [
             f"cut at its own feed: {words} {getattr(load.emitted, column).max():.4g} {unit}, limit {limit:.4g} {unit}"
@@ -279,7 +279,7 @@ def _region(
     track = part.track
     misses = [words for words, _ in _misses(part, plan, load, machine)]
     if load is None and track is not None and track.section_mm2.any():
-        misses = [f"its force is not known: {part.kept or 'no reason is known'}"]
+        misses = [f"its force is unknown: {part.kept or 'reason unknown'}"]
     removed = None
     if track is not None and len(track) > 0:
         removed = float((np.diff(np.concatenate(([0.0], track.s_mm))) * track.section_mm2).sum())
@@ -297,7 +297,7 @@ def _region(
 def _misses(
     part: SurveyedRegion, plan: FeedPlan | None, load: PathLoad | None, machine: Machine
 ) -> Iterator[tuple[str, float]]:
-    """Limits not kept behind the schedule, in words, and by what share too much where a lower feed could help."""
+    """Messages for limits exceeded after the schedule, and the relative excess if a lower feed could help."""
     if load is None or part.tool is None or part.track is None:
         return
     helped = np.zeros(len(load.s_mm), dtype=bool) if plan is None else ~np.isin(plan.holds, (KEPT, MINIMUM))
@@ -307,9 +307,9 @@ def _misses(
         line = int(part.region.path.segment_lines[part.track.segment[worst]])
         cause = ""
         if plan is None or plan.holds[worst] == KEPT:
-            cause = ", where the feed is left unchanged: lower it in the program"
+            cause = ", where the feed is left unchanged: reduce it in the program"
         elif plan.holds[worst] == MINIMUM:
-            cause = ", at the least feed"
+            cause = ", at the lowest feed"
         message = f"{words} {float(values[worst]):.4g} {unit} in line {line}, limit {limit:.4g} {unit}{cause}"
         yield message, float(values[helped].max(initial=0.0)) / limit - 1.0
 
@@ -332,7 +332,7 @@ def _resultant(loads: Sequence[Load]) -> result.ResultantForce:
 
 
 def _peak(column: str, loads: Sequence[tuple[Callable[[int], str], PathLoad]]) -> result.PeakLoad:
-    """Largest value of a column before and after, and the place of the latter; beside a load what tells its places."""
+    """Largest value of a column before and after, with the location of the latter; loads come with their locator."""
     original, emitted, place = 0.0, 0.0, ""
     for place_of, load in loads:
         was, now = getattr(load.original, column), getattr(load.emitted, column)
@@ -387,7 +387,7 @@ def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[result.Held
     holds: list[str] = []
     for i in range(len(path)):
         inside = slice(starts[i], ends[i])
-        # A block that cuts is held by what holds it there, even if it begins in air.
+        # A block with material is limited by the limit there, even if it begins in air.
         feeds = np.where(plan.holds[inside] == AIR, np.inf, plan.limit_mm_per_min[inside])
         tightest = int(np.argmin(feeds)) if ends[i] > starts[i] else 0
         holds.append(str(plan.holds[inside][tightest]) if ends[i] > starts[i] else KEPT)
@@ -431,8 +431,8 @@ def _warnings(surveyed: Survey, plans: Plans, moves: Sequence[result.KeptMove], 
             yield from _kept_blocks(program.place, part, plan)
             if plan.held_at_minimum.any():
                 yield (
-                    f"{place}: the limits need a feed below the lowest feed, which is written instead: take less "
-                    "material at once"
+                    f"{place}: the limits need a feed below the lowest feed, which is written instead: reduce "
+                    "the depth of cut"
                 )
     yield from (f"{move.place}: {miss}" for move in moves for miss in move.misses)
 
@@ -444,11 +444,11 @@ def _kept_blocks(place: Callable[[int], str], part: SurveyedRegion, plan: FeedPl
         if reason:
             first, last = int(lines[indices[0]]), int(lines[indices[-1]])
             where = "" if first == last else f" to line {last}"
-            yield f"{place(first)}{where}: left as it was: {reason}"
+            yield f"{place(first)}{where}: left unchanged: {reason}"
 
 
 def _shortened(warnings: Iterable[str], source: str) -> list[str]:
-    """Each warning once; of many of one reason in different lines the first few, and how many more there are."""
+    """Each warning once; of many with one reason the first few, and the number of others."""
     shown: list[str] = []
     seen: Counter[str] = Counter()
     for warning in dict.fromkeys(warnings):

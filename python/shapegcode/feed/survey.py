@@ -1,4 +1,4 @@
-"""What the tool meets along a program: the stock is swept move by move, in the order of the program."""
+"""Tool engagement along a program: the tool sweeps the stock move by move, in program order."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.program.compensation import program_for_conversion
 
-_COARSEST = 0.1  # resolution, of the smallest tool's radius
-_RESOLUTION_RATIO = 0.01  # of the smallest tool's diameter
+_COARSEST = 0.1  # coarsest resolution, relative to the smallest tool's radius
+_RESOLUTION_RATIO = 0.01  # default resolution, relative to the smallest tool's diameter
 Progress = Callable[[int, int], None]
 _SHOWN_COLLISIONS = 5
 _SLACK_MM = 1e-6
@@ -36,11 +36,11 @@ class Survey:
     """A program swept through its stock.
 
     Attributes:
-        program: what was swept.
+        program: the swept program.
         regions: its regions in order.
-        moves: cutting moves outside of them that meet material.
-        material: what is left.
-        warnings: what was noticed, each with its place.
+        moves: cutting moves in material outside of them.
+        material: remaining stock.
+        warnings: findings, each with its location.
     """
 
     program: Program
@@ -62,26 +62,26 @@ def survey(
     """Compute the tool engagement along a program.
 
     Args:
-        program: what to sweep, or its file.
-        machine: whose controller runs it.
-        tools: what cuts; several need their T numbers.
-        stock: what is there before the first block.
+        program: the program, or its file.
+        machine: machine whose controller runs it.
+        tools: the cutting tools; several need their T numbers.
+        stock: stock before the first block.
         resolution_mm: grid of the material; None: a hundredth of the smallest tool's diameter.
-        on_progress: called with steps done and steps in all.
+        on_progress: called with completed and total steps.
 
     Returns:
-        Per region of the program the engagement along its path, and the material that is left.
+        Engagement along the path of each region, and the remaining stock.
 
     Raises:
         ProgramError: the program cannot be read.
-        ArgumentError: no tool, tools that cannot be distinguished, no cutting move, or a grid that does not fit into
+        ArgumentError: no tool, indistinguishable tools, no cutting move, or a grid that does not fit into
             memory.
         StockError: the stock does not suit the program.
     """
     machine = Machine.of(machine)
     tools = [tools] if isinstance(tools, Tool) else list(tools)
     if not tools:
-        raise _core.ArgumentError("no tool is given: at least one must cut")
+        raise _core.ArgumentError("no tool is given: needed is at least one")
     program = program_for_conversion(program, machine)
     walk = Walk(program, tools)
     material = _material(walk, program, machine, tools, stock, resolution_mm)
@@ -98,11 +98,11 @@ def survey(
         else:
             regions.append(walk.sweep_region(material, index))
         on_progress(done + 1, total)
-    walk.warn_of_collisions()  # first of all, as nothing else is right if they are
+    walk.warn_of_collisions()  # first, as collisions invalidate all other warnings
     known = [region.track for region in regions if region.track is not None]
     if known and not any(track.section_mm2.any() for track in known):
         walk.warnings.append(
-            f"{program.source}: the tool never touches the stock: see where it lies, in the program's own coordinates"
+            f"{program.source}: the tool never touches the stock: check its position, in program coordinates"
         )
     return Survey(program, tuple(regions), tuple(walk.moves), material, tuple(walk.warnings))
 
@@ -116,7 +116,7 @@ def _material(
     if not swept:
         why = next((f": {reason}" for reason in reasons if reason), walk.why_no_tool(cutters))
         if program.core.kept_compensated_moves:
-            why = ': they run under cutter compensation that is kept as it stands; set input.compensation = "expand"'
+            why = ': they run under unexpanded cutter compensation; set input.compensation = "expand"'
         raise _core.ArgumentError(f"{program.source}: no cutting moves whose engagement can be computed{why}")
     smallest = min(tools, key=lambda tool: tool.radius_mm)
     if resolution_mm is not None and not 0.0 < resolution_mm <= _COARSEST * smallest.radius_mm:
@@ -125,7 +125,7 @@ def _material(
             f"(a tenth of the radius of {smallest.tool.name})"
         )
     resolution = resolution_mm or _RESOLUTION_RATIO * smallest.tool.diameter_mm
-    # The walls of an allowance are those that the finishing tool leaves.
+    # The walls of an allowance are those of the finishing tool.
     walls = [program.regions[index].path for index in swept if cutters[index] is smallest]
     others = [program.regions[index].path for index in swept if cutters[index] is not smallest]
     return build_material(stock, walls, smallest, resolution, machine, others=[*others, *walk.cuts_elsewhere()])
@@ -133,53 +133,53 @@ def _material(
 
 @dataclass(frozen=True)
 class SurveyedRegion:
-    """A run of cutting moves between two stops, and what the tool meets on it."""
+    """A sequence of cutting moves between two stops, with its engagement."""
 
-    region: _core.Region  # of the program
-    index: int  # of the region
+    region: _core.Region  # region of the program
+    index: int  # index of the region
     tool: Tool | None  # the tool that cuts it; None: one without a tool file
-    track: _core.EngagementTrack | None  # what the tool meets; None where it is not known
-    spindle_rev_per_min: float  # speed of the spindle, 0 where it is not known
-    sense: _core.SpindleSense  # in which it turns
-    kept: str  # why the feeds of the region stay as they are; empty if they may change
-    # per sample whether nothing is met for certain, (n,): behind a ramp the layers of the material are cut in part,
-    # which the track takes for whole or gone. None: wherever the track says so
+    track: _core.EngagementTrack | None  # engagement; None if unknown
+    spindle_rev_per_min: float  # speed of the spindle, 0 if unknown
+    sense: _core.SpindleSense  # sense of rotation
+    kept: str  # why the feeds of the region stay unchanged; empty if they may change
+    # certainly air at each sample, (n,): after a ramp the layers of the material are partly cut,
+    # but are whole or gone in the track. None: as in the track
     clear: npt.NDArray[np.bool_] | None = None
 
     @property
     def window_s(self) -> float:
-        """Time between two teeth, over which feeds are taken; of a region with tool and speed."""
+        """Time between two teeth, s, over which feeds are averaged; needs tool and speed."""
         assert self.tool is not None
         return 60.0 / (self.tool.tool.flutes * self.spindle_rev_per_min)
 
 
 @dataclass(frozen=True)
 class SurveyedMove:
-    """A cutting move outside of the regions that meets material: its feed stays, but its force counts."""
+    """A cutting move in material outside the regions: its feed stays, but its force counts."""
 
     place: str  # file and line
-    tool: Tool  # what cuts
-    track: _core.EngagementTrack  # what it meets
+    tool: Tool  # its tool
+    track: _core.EngagementTrack  # its engagement
     feed_mm_per_min: float  # as programmed
-    spindle_rev_per_min: float  # speed of the spindle, 0 where it is not known
-    sense: _core.SpindleSense  # in which it turns
+    spindle_rev_per_min: float  # speed of the spindle, 0 if unknown
+    sense: _core.SpindleSense  # sense of rotation
 
 
 def why_not_swept(region: _core.Region, zero: ZeroPoints) -> str:
-    """Why what the tool meets on a region is not known; empty if it is."""
+    """Why the engagement in a region is unknown; empty if it is known."""
     if elsewhere := zero.why_elsewhere(region.first_line):
         return elsewhere
     if region.incremental:
-        return "its place is not known"
+        return "its position is unknown"
     if not region.path.arcs_in_xy:
         segments = map(region.path.__getitem__, range(len(region.path)))
         first = next(each for each in segments if each.kind == _core.SegmentKind.arc and each.normal != 2)
-        return f"it holds arcs that are not in the XY plane (G17), the first in line {first.line_number}"
+        return f"it has arcs that are not in the XY plane (G17), the first in line {first.line_number}"
     return ""
 
 
 def _above_overhang(tool: Tool, track: _core.EngagementTrack) -> float:
-    """Height above the tip of what is cut above the clamping, mm; 0: nothing."""
+    """Height above the tip of a cut above the overhang, mm; 0: none."""
     top = float(track.arcs[:, 3].max(initial=0.0)) if len(track.arcs) else 0.0
     return top if top > tool.tool.overhang_mm else 0.0
 
@@ -197,12 +197,12 @@ class Walk:
         self._ready = -1  # T before its M06
         self._number = -1
         self.moves: list[SurveyedMove] = []
-        # A second work piece on which ramps leave what they may have left: what is air there is air for certain.
+        # A second stock on which ramps leave all possible material: air there is certain.
         self.cautious: _core.Material | None = None
         self._speed = -1.0
         self._stands = False  # M05
         self._collisions: list[str] = []
-        # Where a program moves from places that are not known, neither are those of its rapids.
+        # If a program moves from unknown positions, those of its rapids are unknown too.
         self._adrift = any(region.incremental for region in program.regions)
         self._tools: dict[int, Tool] = {}
         self._any: Tool | None = None
@@ -216,17 +216,17 @@ class Walk:
                 raise _core.ArgumentError(f"two tools have the number T{number}")
             else:
                 self._tools[number] = tool
-        # Where the program changes tools, T alone only gets the next one ready.
+        # If the program changes tools, T alone only preselects the next one.
         self._changes = any(_TOOL_CHANGE in m_codes for m_codes, _, _ in self._functions)
         self._used = [f"T{number}" for number in sorted({tool for _, tool, _ in self._functions if tool > 0})]
         if self._any is not None and len(self._used) > 1:
             self.warnings.append(
-                f"{program.source}: uses the tools {', '.join(self._used)}: all are taken as "
-                f"{self._any.tool.name}; give tool.number to tell them apart"
+                f"{program.source}: uses the tools {', '.join(self._used)}: all are assumed to be "
+                f"{self._any.tool.name}; set tool.number to distinguish them"
             )
 
     def function(self, index: int) -> None:
-        """A block with M, S or T words."""
+        """Process a block with M, S or T words."""
         m_codes, tool, speed = self._functions[index]
         if speed > 0.0:
             self._speed = speed
@@ -245,17 +245,17 @@ class Walk:
         if self._any is not None:
             return self._any
         number = self._in_spindle
-        if number <= 0 and len(self._tools) == 1 and not self._changes:  # a program for one tool need not name it
+        if number <= 0 and len(self._tools) == 1 and not self._changes:  # a program with one tool need not name it
             return next(iter(self._tools.values()))
         return self._tools.get(number)
 
     @property
     def _in_spindle(self) -> int:
-        """T number of the tool that cuts; not positive: not known."""
+        """T number of the tool in the spindle; 0 or negative: unknown."""
         return self._number if self._changes else self._ready
 
     def tools_of_regions(self) -> list[Tool | None]:
-        """What cuts each region; the walk stands at the program's start again afterwards."""
+        """Tool of each region; afterwards the walk is at the program's start again."""
         found: list[Tool | None] = []
         for kind, index, _ in self._program.core.steps:
             if kind == _core.StepKind.function:
@@ -266,14 +266,14 @@ class Walk:
         return found
 
     def why_no_tool(self, cutters: Sequence[Tool | None]) -> str:
-        """Which tools are missing where no region has one; empty if that is not the reason."""
+        """Message for missing tools if no region has one; empty if that is not the reason."""
         if not cutters or any(cutter is not None for cutter in cutters):
             return ""
         used_tools = f"the program uses {', '.join(self._used)}" if self._used else "the program names no tool"
         return f": {used_tools}, the tool files describe {', '.join(f'T{n}' for n in sorted(self._tools))}"
 
     def cuts_elsewhere(self) -> list[_core.Path]:
-        """Cutting moves outside of the regions, each as a path."""
+        """Cutting moves outside the regions, each as a path."""
         return [
             _core.Path([segment])
             for segment, dwell_s in self._moves
@@ -281,7 +281,7 @@ class Walk:
         ]
 
     def sweep_other(self, material: _core.Material, index: int, line: int) -> None:
-        """A rapid, or a cutting move outside of the regions."""
+        """Sweep a rapid, or a cutting move outside the regions."""
         segment, dwell_s = self._moves[index]
         tool = self._tool
         if tool is None or dwell_s > 0.0 or not segment.length_mm > 0.0:
@@ -305,7 +305,7 @@ class Walk:
             self.moves.append(SurveyedMove(place, tool, track, feed, speed, tool.sense(self._sense)))
 
     def warn_of_collisions(self) -> None:
-        """A warning for each place at which a rapid runs into material; of many the first ones."""
+        """Warn of each rapid into material; of many the first ones."""
         places = list(dict.fromkeys(self._collisions))
         why = "rapid into material: is Z 0 of the stock file that of the program?"
         messages = [f"{place}: {why}" for place in places[:_SHOWN_COLLISIONS]]
@@ -350,7 +350,7 @@ class Walk:
             elif not speed > 0.0:
                 kept = "no spindle speed: neither S in the program nor feed.spindle_rev_per_min in the tool file"
             elif self._stands:
-                kept = "the spindle stands (M05)"
+                kept = "the spindle is stopped (M05)"
             elif not _core.feeds_per_minute(self._program.core, region):
                 kept = "not all of its feeds are per minute (G94) in one unit"
         sense = _core.SpindleSense.clockwise if tool is None else tool.sense(self._sense)
@@ -358,11 +358,11 @@ class Walk:
 
 
 class ZeroPoints:
-    """Work coordinates and zero shifts along the text; the stock lies in those of the first cutting move."""
+    """Work coordinates and zero shifts along the program; the stock is in those of the first cutting move."""
 
     def __init__(self, program: Program) -> None:
-        self._lines: list[int] = []  # at which something changes
-        self._states: list[tuple[str, str]] = []  # work coordinates, what shifted them
+        self._lines: list[int] = []  # lines of changes
+        self._states: list[tuple[str, str]] = []  # work coordinates, their shift
         self._machine: set[int] = set()  # lines with positions of the machine (G53)
         system, shift = "", ""
         for number, raw in enumerate(program.core.text.split(b"\n"), start=1):
@@ -387,11 +387,11 @@ class ZeroPoints:
 
     @staticmethod
     def _shift(code: bytes, line: bytes, number: int, shift: str) -> str:
-        if code == b"10" and not (b"L2" in line and b"L12" not in line):  # tools, parameters: no zero point
+        if code == b"10" and not (b"L2" in line and b"L12" not in line):  # tools, parameters: not a zero point
             return shift
         values = [float(value) for value in _SHIFT_WORD.findall(line.split(b"G" + code, 1)[-1]) if value != b"."]
         if code == b"52" and values and not any(values) and (not shift or shift.startswith("G52")):
-            return ""  # back where it was
+            return ""  # shift cancelled
         return f"G{code.decode()} in line {number}"
 
     def _state(self, line: int) -> tuple[str, str]:
@@ -399,7 +399,7 @@ class ZeroPoints:
         return self._states[at - 1] if at else ("", "")
 
     def why_elsewhere(self, line: int) -> str:
-        """Why the positions of a line are not in the coordinates of the stock; empty if they are."""
+        """Why the positions of a line are not in stock coordinates; empty if they are."""
         if line in self._machine:
             return "its positions are those of the machine (G53)"
         system, shift = self._state(line)
@@ -407,9 +407,9 @@ class ZeroPoints:
         if (system or "G54") != (first_system or "G54"):
             return (
                 f"it is cut in other work coordinates ({system or 'G54'}) than the first cutting move "
-                f"({first_system or 'G54'}), in which the stock lies"
+                f"({first_system or 'G54'}), which are those of the stock"
             )
         if shift != first_shift:
             what = f"the zero point has been moved ({shift})" if shift else f"the shift of {first_shift} has ended"
-            return f"{what} since the first cutting move, in whose coordinates the stock lies"
+            return f"{what} since the first cutting move, whose coordinates are those of the stock"
         return ""

@@ -1,6 +1,6 @@
-"""What modes move across the axis along which they were found: their poles in the responses of the other axes.
+"""Mode shapes along the other axes: fits the known poles of modes to the responses along those axes.
 
-With the poles known the rest is linear; the ratio of the amplitudes along two axes is the mode's shape between them.
+With known poles the amplitudes follow linearly; the ratio of the amplitudes along two axes is the mode shape.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from shapegcode.results.outcome import Xyz
 
 Measured = Record | FrequencyResponse
 _AXES = "xyz"
-_WIDTHS, _NEAREST = 8.0, 0.08  # half-power widths around a mode, and share of its frequency, that are fitted
-_LOCAL_WIDTHS, _LOCAL_LINES = 2.0, 4  # of what is left around a mode
-_HITS_TO_SCATTER = 5  # fewer say little of how hits differ
-_NO_VIBRATION = 0.3  # damping ratio of what is background
-LEAST_MOVE = 0.01  # of the motion along the axis itself: less is not written, and its phase not told
-_OUT_OF_PHASE = 1.0  # tan of the phase beyond which two directions do not move together
+_WIDTHS, _NEAREST = 8.0, 0.08  # fitted around a mode: half-power widths; ratio to its frequency
+_LOCAL_WIDTHS, _LOCAL_LINES = 2.0, 4  # range around a mode for its residual
+_HITS_TO_SCATTER = 5  # fewer impacts do not determine their scatter
+_NO_VIBRATION = 0.3  # damping ratio above which a pole is background
+LEAST_MOVE = 0.01  # relative to the motion along its own axis; smaller motion is not written, its phase not reported
+_OUT_OF_PHASE = 1.0  # tan of the phase angle beyond which two axes do not move in phase
 
 
 @dataclass(frozen=True, eq=False)
 class _Poles:
     omega: FloatArray  # (m,) rad/s
     zeta: FloatArray  # (m,)
-    applied: float  # 1/s, by which a window makes responses decay faster
+    applied: float  # 1/s, decay rate added by an exponential window
 
     @classmethod
     def of(cls, modes: Sequence[IdentifiedMode], window_s: float | None = None) -> _Poles:
@@ -49,25 +49,25 @@ class _Poles:
 
     @property
     def in_plane(self) -> ComplexArray:
-        """(m,) 1/s, of the responses."""
+        """Poles of the responses, (m,) 1/s."""
         turn = 1j * np.sqrt(1.0 - self.zeta**2)
         return np.asarray(self.omega * (turn - self.zeta) - self.applied, dtype=np.complex128)
 
 
 @dataclass(frozen=True, eq=False)
 class _Amplitudes:
-    """Of every mode along one axis in one record or response."""
+    """Amplitude of every mode along one axis, from one record or response."""
 
     value: ComplexArray  # (m,)
     variance: FloatArray  # (m,) of real and imaginary part together
 
     def turned(self, is_turned: bool) -> _Amplitudes:
-        """With the sign that the sensor gave: those of the other axes have it."""
+        """Amplitudes with the sensor's own sign, as along the other axes."""
         return replace(self, value=-self.value) if is_turned else self
 
 
 def measured(sources: Sequence[Any], options: ReadOptions) -> list[Measured]:
-    """Records and frequency responses, those of files read."""
+    """Records and frequency responses; files are read."""
     found: list[Measured] = []
     for each in sources:
         found += [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options)
@@ -75,7 +75,7 @@ def measured(sources: Sequence[Any], options: ReadOptions) -> list[Measured]:
 
 
 def with_moves(found: Identification, others: Sequence[Measured], window_s: float | None = None) -> Identification:
-    """The identification with what its modes move of the other axes; `window_s`: exponential window of all `others`."""
+    """Add the mode shapes along other axes to an identification; `window_s`: exponential window of all `others`."""
     if found.axis is None:
         raise RecordError(f"{found.files[0]} does not say along which axis it was measured: add --axis x, y or z")
     others = [each for each in others if not _is_of_refused(each, found)]
@@ -83,8 +83,8 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
     if not any(by_axis.values()):
         raise RecordError(
             f"{', '.join(dict.fromkeys(each.source for each in others)) or found.files[0]}: no response along "
-            f"{' or '.join(letter.upper() for letter in by_axis)}: needed is a sensor of three axes, or files that "
-            "state theirs"
+            f"{' or '.join(letter.upper() for letter in by_axis)}: needed is a triaxial sensor, or files that "
+            "state their axis"
         )
     if not found.modes:
         return found
@@ -99,14 +99,14 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
             if out_of_phase and _is_told(in_phase[1], abs(ratio)):
                 notes.append(
                     f"{mode.frequency_hz.value:.4g} Hz: {letter.upper()} moves {abs(ratio):.3g} times as far, "
-                    f"{abs(np.degrees(np.angle(ratio))):.0f}° behind or ahead: only the part in phase is taken"
+                    f"{abs(np.degrees(np.angle(ratio))):.0f}° out of phase: only the part in phase is used"
                 )
         modes.append(replace(mode, moves=Xyz(moves["x"], moves["y"], moves["z"])))
     return replace(found, modes=tuple(modes), notes=tuple(notes))
 
 
 def left_by(modes: Sequence[IdentifiedMode], record: Record) -> float:
-    """Share of a free decay's energy that known modes leave, whatever their amplitudes."""
+    """Residual energy ratio of a free decay after a fit of known modes with free amplitudes."""
     values = record.response - np.mean(record.response)
     left = _decays(_Poles.of(modes), record.period_s, values)[2]
     return float(left @ left) / max(float(values @ values), 1e-300)
@@ -127,7 +127,7 @@ def _is_told(estimate: Estimate, size: float) -> bool:
 def _amplitudes(
     found: Identification, by_axis: Mapping[str, Sequence[Measured]], poles: _Poles
 ) -> tuple[list[_Amplitudes], dict[str, list[_Amplitudes]]]:
-    """Along the axis of the modes, and along each other axis."""
+    """Amplitudes along the axis of the modes, and along each other axis."""
     ready = found.prepared
     of_own: Measured = found.responses[0] if ready is None else ready.records[0]
     for each in (part for parts in by_axis.values() for part in parts):
@@ -150,8 +150,8 @@ def _amplitudes(
     for letter, amplitudes in along.items():
         if by_axis[letter] and not amplitudes:
             raise RecordError(
-                f"{by_axis[letter][0].source}: over frequency where {found.files[0]} is over time, or the other way "
-                "round: needed is the same kind"
+                f"{by_axis[letter][0].source} and {found.files[0]}: one is a frequency response, one a time record: "
+                "both must be of the same kind"
             )
     return own, {letter: parts for letter, parts in along.items() if parts}
 
@@ -159,27 +159,27 @@ def _amplitudes(
 def _records_beside(
     ready: Prepared, records: Sequence[Record], files: Sequence[str]
 ) -> Sequence[tuple[Usable, Record]]:
-    """Each impact or stop with the record of another axis."""
+    """Pair each impact or stop with the record of another axis."""
     if not records:
         return []
     together = all(any(_same_file(use, each, files) for use in ready.records) for each in records)
     if not together and ready.records[0].force_n is None:
         raise RecordError(
-            f"{records[0].source}: a free decay tells what moves across only beside the axis it was found along: "
+            f"{records[0].source}: amplitudes of separate free decays cannot be compared across axes: "
             "needed is one record of all axes"
         )
     forceless = [] if together else [each for each in records if each.force_n is None]
     if forceless:
         raise RecordError(
-            f"{forceless[0].source}: no force, but {ready.records[0].source} has one: amplitudes of different hits "
-            "are comparable over their forces only; needed is the hammer's signal in both"
+            f"{forceless[0].source}: no force, but {ready.records[0].source} has one: amplitudes of different impacts "
+            "are comparable relative to their forces only; needed is the hammer's signal in both"
         )
     hits = ready if together else prepare(records)
     return [(use, _beside(use.record, records, files)) for use in hits.usable]
 
 
 def _beside(use: Record, records: Sequence[Record], files: Sequence[str]) -> Record:
-    """The record of another channel that covers one that was looked through."""
+    """Find the record of another channel that covers the time of a checked one."""
 
     def far(each: Record) -> tuple[bool, bool, float]:
         own = f"{use.source} ".startswith(f"{each.source} ")
@@ -198,24 +198,24 @@ def _beside(use: Record, records: Sequence[Record], files: Sequence[str]) -> Rec
         raise RecordError(
             f"{beside.source}: overload: the response ({beside.quantity}) is cut off at "
             f"{np.max(np.abs(beside.response)):.5g} {UNITS[beside.quantity]}; needed is a larger range of the input or "
-            "a softer hit"
+            "a softer impact"
         )
     return beside
 
 
 def _is_of_refused(each: Measured, found: Identification) -> bool:
-    """Whether it was recorded with impacts or stops none of which is used."""
+    """True if it was recorded with impacts or stops that were all refused."""
     own = any(f"{each.source} ".startswith(f"{name} ") for name in found.files)
     return own and isinstance(each, Record) and not any(_same_file(use, each, found.files) for use in found.taps)
 
 
 def _same_file(use: Record, other: Record, files: Sequence[str]) -> bool:
-    """Records by file name; the name may be followed by channel and impact."""
+    """True if both records are of one file; in a source, channel and impact follow the file name."""
     return any(all(f"{each.source} ".startswith(f"{name} ") for each in (use, other)) for name in files)
 
 
 def _in_time(use: Usable, record: Record, poles: _Poles) -> _Amplitudes:
-    """Amplitudes at the first sample after the impact or stop; over the hammer's force at the poles, if any."""
+    """Amplitudes at the first sample after impact or stop; divided by the hammer's force at the poles, if measured."""
     first, period_s = 0, record.period_s
     if use.hit is not None:
         first = min(use.hit.end + (use.hit.end - use.hit.first) + _LOCAL_LINES, len(record.response) - 1)
@@ -231,7 +231,7 @@ def _in_time(use: Usable, record: Record, poles: _Poles) -> _Amplitudes:
 
 
 def _decays(poles: _Poles, period_s: float, values: FloatArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Amplitudes of the modes at the first sample, fitted with a straight line, their variance, and the residual."""
+    """Fit mode amplitudes at the first sample and a straight line; returns amplitudes, variance and residual."""
     time_s = period_s * np.arange(len(values))
     waves = np.exp(time_s[:, None] * poles.in_plane)
     smooth = np.stack((np.ones(len(time_s)), np.linspace(-1.0, 1.0, len(time_s))), axis=1)
@@ -239,7 +239,7 @@ def _decays(poles: _Poles, period_s: float, values: FloatArray) -> tuple[Complex
 
 
 def _in_lines(each: FrequencyResponse, poles: _Poles) -> _Amplitudes:
-    """Residues, mode by mode from the lines around it."""
+    """Residues, each mode fitted to the lines around it."""
     omega, zeta = poles.omega, poles.zeta
     lines = measured_lines(each, 1.0 / poles.applied if poles.applied else None)
     value = np.zeros(len(omega), dtype=np.complex128)
@@ -264,7 +264,7 @@ def _in_lines(each: FrequencyResponse, poles: _Poles) -> _Amplitudes:
 
 
 def _solved(columns: FloatArray, goal: FloatArray, modes: int) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Complex factors of the first columns (real parts, then imaginary ones), their variance, and what is left."""
+    """Complex factors of the first columns (real parts, then imaginary ones), their variance, and the residual."""
     norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     basis, sizes, turned = np.linalg.svd(columns / norms, full_matrices=False)
     kept = sizes > 1e-10 * sizes[0]
@@ -279,7 +279,7 @@ def _solved(columns: FloatArray, goal: FloatArray, modes: int) -> tuple[ComplexA
 
 
 def _local(at: FloatArray, power: FloatArray, poles: _Poles) -> FloatArray:
-    """By how much more of it is left around each mode than on average."""
+    """Residual power around each mode, relative to the mean."""
     omega, zeta = poles.omega, poles.zeta
     mean, step = max(float(np.mean(power)), 1e-300), float(at[1] - at[0])
     reach = np.maximum(_LOCAL_WIDTHS * zeta * omega, _LOCAL_LINES * step)
@@ -289,12 +289,12 @@ def _local(at: FloatArray, power: FloatArray, poles: _Poles) -> FloatArray:
 
 
 def _ratio(own: Sequence[_Amplitudes], other: Sequence[_Amplitudes], index: int) -> tuple[complex, Estimate]:
-    """A mode's amplitude along another axis over that along its own, and its real part with the 95 % interval."""
+    """Ratio of a mode's amplitude along another axis to that along its own; its real part with the 95 % interval."""
     sides = [
         (np.array([part.value[index] for part in parts]), np.array([part.variance[index] for part in parts]))
         for parts in (own, other)
     ]
-    if len(own) != len(other):  # else hit by hit: what changes from hit to hit changes along both
+    if len(own) != len(other):  # else impact by impact: common changes cancel in the ratio
         sides = [(value.mean(keepdims=True), spread.sum(keepdims=True) / len(value) ** 2) for value, spread in sides]
     (one, one_variance), (two, two_variance) = sides
     weight = np.abs(one) ** 2

@@ -1,7 +1,7 @@
-"""Modes from a control's own capture: commands and actual positions of an axis while it did its work.
+"""Modes from a control's own capture: commands and actual positions of an axis in production.
 
-The position loop moves the encoder, and what stands on it vibrates as with that point held: actual over command has a
-dip there, command over actual a peak. The drive between both is smooth beside a mode.
+The position loop holds the encoder, so the structure vibrates as with that point held: actual over command has a dip
+there, command over actual a peak. The drive's own response varies little over the width of a mode.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from shapegcode.io.record import ReadOptions
 from shapegcode.io.servo_log import is_servo_log
 from shapegcode.io.units import FloatArray
 
-_LOWEST_HZ, _OVER_HALF = 4.0, 2.5  # samples in a cycle of the highest line
+_LOWEST_HZ, _OVER_HALF = 4.0, 2.5  # lowest line; samples per cycle of the highest line
 _WINDOW_S = 8.0  # of a motion without rests
-_AFTER_S = 1.0  # of what rings on behind the last part
+_AFTER_S = 1.0  # of the decay after the last part
 _FEWEST_PARTS = 2
 
 
 def is_capture(path: Path) -> bool:
-    """Whether a file holds commands and actual positions of axes."""
+    """Whether a file contains commands and actual positions of axes."""
     with open_file(path) as file:
         head = file.read(4096)
     return is_edge_json(head) or is_servo_log(path, head)
@@ -48,7 +48,7 @@ def find_modes_of_captures(paths: Sequence[Path], options: ReadOptions, sought: 
     responses = [_response(*each, sought.band_hz, options.axis) for each in traces]
     found = find_frf_modes(responses, tuple(map(str, paths)), replace(sought, phase_known=False))
     source, period_s, trace = traces[0]
-    notes.append("of what the encoder measures: the modes with it held, no masses")
+    notes.append("modes are those with the encoder held, without masses")
     return as_sweep(found, notes, source, trace.samples, period_s, source, "capture of command and encoder")
 
 
@@ -59,16 +59,16 @@ def _axis_of(source: str, traces: Sequence[ServoTrace], axis: str | None) -> Ser
     if len(named) == 1 or (axis is not None and len(linear) == 1 and not set("xyz") & set(linear[0].name.lower())):
         return (named or linear)[0]
     names = ", ".join(f"{each.name}{'' if each in linear else ' (turns)'}" for each in traces)
-    wanted = "say --axis x, y or z"
+    wanted = "add --axis x, y or z"
     if axis is not None:
         wanted = f"{'several are' if named else 'no linear one is'} called {axis.upper()}"
-    raise RecordError(f"{source}: holds command and actual position of {names}: {wanted}")
+    raise RecordError(f"{source}: contains command and actual position of {names}: {wanted}")
 
 
 def _response(
     source: str, period_s: float, trace: ServoTrace, band_hz: tuple[float, float] | None, axis: str | None
 ) -> FrequencyResponse:
-    """Minus command over actual, where the command excites and the parts agree."""
+    """Ratio −command/actual at the lines that the command excites and on which the parts agree."""
     windows = _windows(trace, period_s)
     if len(windows) < _FEWEST_PARTS:
         raise RecordError(
@@ -80,9 +80,9 @@ def _response(
     longest = (max(len(command) for command, _ in windows) + 2) * period_s
     hertz = np.arange(max(low, _LOWEST_HZ), high, 0.5 / longest)
     if len(hertz) < FEWEST_LINES:
-        asked = "" if band_hz is None else f", asked for are {band_hz[0]:g} to {band_hz[1]:g} Hz"
+        asked = "" if band_hz is None else f", the band asked for is {band_hz[0]:g} to {band_hz[1]:g} Hz"
         raise RecordError(
-            f"{source}: a sample every {period_s * 1e3:g} ms tells of {_LOWEST_HZ:g} to "
+            f"{source}: a sample every {period_s * 1e3:g} ms resolves {_LOWEST_HZ:g} to "
             f"{1.0 / (_OVER_HALF * period_s):.4g} Hz{asked}"
         )
     none = np.zeros(len(windows))
@@ -91,7 +91,7 @@ def _response(
     used, coherence = spectra.coherent()
     if np.count_nonzero(used) < FEWEST_LINES:
         raise RecordError(
-            f"{source}: the actual position of {trace.name} does not go with its command between {low:g} and "
+            f"{source}: the actual position of {trace.name} does not follow its command between {low:g} and "
             f"{high:.0f} Hz: too little motion, or positions too coarse; a sweep moves enough (shapegcode sweep)"
         )
     ratio = -1.0 / spectra.ratio()[used]
@@ -99,7 +99,7 @@ def _response(
 
 
 def _windows(trace: ServoTrace, period_s: float) -> list[tuple[FloatArray, FloatArray]]:
-    """Changes of speed, mm per period, of both in each part between rests; tapered windows where there are none."""
+    """Changes of speed, mm per period, of both in each part between rests; tapered windows if there are no rests."""
     found: list[tuple[FloatArray, FloatArray]] = []
     after, size = round(_AFTER_S / period_s), round(_WINDOW_S / period_s)
     for command, actual in zip(trace.command, trace.actual, strict=True):

@@ -1,4 +1,4 @@
-"""Which records can be used: double hits, overload, missing force, too short, too slow; and what their noise is."""
+"""Which records can be used: double hits, overload, missing force, too short, too slow; measures their noise."""
 
 from __future__ import annotations
 
@@ -18,81 +18,81 @@ from shapegcode.io.units import FloatArray
 
 @dataclass(frozen=True)
 class RecordUse:
-    """What became of one tap or decay."""
+    """Whether one tap or decay was used, and why not."""
 
-    source: str  # file, and which hit or channel of it
-    used: bool  # whether the modes come from it too
+    source: str  # file, with the number of the impact or the channel
+    used: bool  # whether the modes were fitted to it
     reason: str = ""  # why it is not used; empty: it is
-    samples: int | None = None  # that were recorded; null where it is not used, as for the others
+    samples: int | None = None  # number of recorded samples; null if not used, as for the following
     period_s: float | None = None  # time between two samples
     start_s: float | None = None  # time of the first sample in the file
     quantity: Quantity | None = None  # what the sensor measured
-    excited_hz: float | None = None  # up to where the hit excites (-20 dB); null for a decay
-    # distance of two lines of a frequency response without time record, whose lines are its samples
+    excited_hz: float | None = None  # highest frequency that the impact excites (-20 dB); null for a decay
+    # line spacing of a frequency response without time record; `samples` are then its lines
     resolution_hz: float | None = None
 
     @property
     def duration_s(self) -> float | None:
-        """How long it lasts; None where it is not used."""
+        """Duration, s; None if not used."""
         return None if self.samples is None or self.period_s is None else self.samples * self.period_s
 
 
 @dataclass(frozen=True, eq=False)
 class Usable:
-    """A record that can be used, and what is known of it; all but the record is None of a free decay."""
+    """A usable record and its noise and pulse; all but the record is None for a free decay."""
 
-    record: Record  # without offset; the force is 0 outside the pulse; a free decay from where it begins
-    force_noise_n: float | None = None  # RMS noise of the force off the pulse
-    response_noise: float | None = None  # RMS noise of the response before the hit, in its unit; None: not measured
+    record: Record  # without offset; the force is 0 outside the pulse; a free decay from its beginning
+    force_noise_n: float | None = None  # RMS noise of the force outside the pulse
+    response_noise: float | None = None  # RMS noise of the response before the impact, in its unit; None: not measured
     excited_hz: float | None = None  # frequency up to which the force excites (-20 dB)
     hit: Hit | None = None  # the pulse
-    turned: bool = False  # whether the sign of the response was turned
+    turned: bool = False  # whether the sign of the response was reversed
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Records of taps or decays that were looked through."""
+    """Checked records of taps or decays."""
 
     usable: tuple[Usable, ...]
     refused: tuple[RecordUse, ...]  # the others
-    warnings: tuple[str, ...]  # what the user should know
-    notes: tuple[str, ...]  # what was left out of the files
+    warnings: tuple[str, ...]  # for the user
+    notes: tuple[str, ...]  # parts of the files that were ignored
 
     @property
     def records(self) -> tuple[Record, ...]:
-        """Those that can be used."""
+        """Usable records."""
         return tuple(each.record for each in self.usable)
 
     def without(self, unused: Sequence[Usable], why: str) -> Prepared:
-        """The same with some of the records refused."""
+        """Copy with some of the records refused."""
         refused = tuple(RecordUse(each.record.source, False, why) for each in unused)
         usable = tuple(each for each in self.usable if each not in unused)
         return replace(self, usable=usable, refused=(*self.refused, *refused))
 
 
-# A second pulse above this share of the first is refused: the momentum, and so the mass, would be off by as much.
+# A second pulse above this ratio to the first is refused: the impulse, and so the mass, would be wrong by as much.
 DOUBLE_HIT = 0.1  # Below, it may be the ringing of an anti-aliasing filter, which reaches 9 %
-MIN_FORCE = 10.0  # The force must stand out of its noise by this factor: the mass would be off by about the inverse
-MIN_PULSE = 3  # A pulse of fewer samples does not tell its momentum: with three, a half sine is known to about 10 %
-MIN_LEAD = 8  # Samples before the hit from which noise and offset are measured: a standard deviation to 25 %
-_CUT_PULSE = 0.2  # A record that begins inside the pulse at more than this share of its peak lacks too much momentum
-_AT_REST = 0.1  # The machine was at rest before the hit if it shook less than this share of what it did afterwards
-_MIN_MARGIN = 3  # The force counts for half a pulse on either side of it, and for so many samples at least
-_OFFSET_ERRORS = 2.0  # An offset is taken away where it exceeds so many standard errors of its mean
-_OFFSET_TOLD = 0.05  # An offset of the force above this share of the peak is told
-_OPPOSED = -0.7  # Correlation of force and response below which the two point against one another
-_SAME_PERIOD = 1e-5  # Sampling periods may differ by this share, as in files of six digits
+MIN_FORCE = 10.0  # Least ratio of force to its noise: the mass would be wrong by about the inverse
+MIN_PULSE = 3  # Least samples of a pulse: with three, the impulse of a half sine is known to about 10 %
+MIN_LEAD = 8  # Least samples before the impact to measure noise and offset: a standard deviation to 25 %
+_CUT_PULSE = 0.2  # Refuse a record that begins within the pulse above this ratio to its peak
+_AT_REST = 0.1  # At rest before the impact: vibration below this ratio to that afterwards
+_MIN_MARGIN = 3  # The force is used for half a pulse on either side, at least this many samples
+_OFFSET_ERRORS = 2.0  # An offset above this many standard errors of its mean is removed
+_OFFSET_TOLD = 0.05  # An offset of the force above this ratio to the peak is reported
+_OPPOSED = -0.7  # Correlation of force and response below which they are opposite
+_SAME_PERIOD = 1e-5  # Allowed relative difference of sampling periods, as in files of six digits
 
 
 def _mean_to_remove(values: FloatArray) -> float:
-    """Mean of a quiet interval; 0 if it is within its own uncertainty."""
+    """Mean of a quiet interval; 0 if not significant."""
     mean = float(np.mean(values))
     error = float(np.std(values)) / np.sqrt(len(values))
     return mean if abs(mean) > _OFFSET_ERRORS * error else 0.0
 
 
 def _is_opposed(record: Record, hit: Hit, response: FloatArray, force: FloatArray) -> bool:
-    """Whether the response goes against the push of the hammer."""
+    """Whether the response is opposite to the hammer's force."""
     if hit.end - hit.first < MIN_PULSE:
         return False
     stretch = slice(hit.first, min(hit.end + (hit.end - hit.first), len(force)))
@@ -115,7 +115,7 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> Usable:
         if is_clipped(values):
             top = float(values[np.argmax(np.abs(values - np.median(values)))])
             raise RecordError(
-                f"overload: the {name} is cut off at {top:.5g}; needed is a larger range of the input or a softer hit"
+                f"overload: the {name} is cut off at {top:.5g}; needed is a larger input range or a softer impact"
             )
     hits = find_hits(record)
     off_pulse = np.ones(len(force), dtype=bool)
@@ -126,7 +126,7 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> Usable:
     if not hits or abs(hits[0].peak_n) < MIN_FORCE * sigma:
         peak = float(np.max(np.abs(force - np.median(force))))
         raise RecordError(
-            f"no hit stands out: the largest force, {peak:.4g} N, is less than {MIN_FORCE:g} times its noise of "
+            f"no impact above the noise: the largest force, {peak:.4g} N, is below {MIN_FORCE:g} times its noise of "
             f"{sigma:.3g} N; hit harder or choose a smaller range"
         )
     hit = hits[0]
@@ -155,19 +155,19 @@ def _windowed(
     where = record.source
     offset = _mean_to_remove(quiet) if quiet.size >= MIN_LEAD else 0.0
     if abs(offset) > _OFFSET_TOLD * abs(hit.peak_n):
-        warnings.append(f"{where}: offset of the force, {offset:.4g} N, taken away")
+        warnings.append(f"{where}: offset of the force, {offset:.4g} N, removed")
     force = np.zeros(len(record.force_n))
     margin = max(_MIN_MARGIN, (hit.end - hit.first) // 2)
     window = slice(max(hit.first - margin, 0), hit.end + margin)
     force[window] = record.force_n[window] - offset
     if hit.peak_n < 0.0:
-        warnings.append(f"{where}: the pulse is negative: a hammer only pushes, so the sign of the force is turned")
+        warnings.append(f"{where}: the pulse is negative: a hammer only pushes, so the sign of the force is reversed")
         force = -force
     response, noise = record.response, None
     lead = response[: max(hit.first - 1, 0)]
     if len(lead) < MIN_LEAD:
         warnings.append(
-            f"{where}: {len(lead)} samples before the hit: noise and offset are measured from {MIN_LEAD} or more "
+            f"{where}: {len(lead)} samples before the impact: noise and offset are measured from {MIN_LEAD} or more "
             "(pre-trigger)"
         )
     else:
@@ -176,13 +176,13 @@ def _windowed(
         after = float(np.sqrt(np.mean(response[hit.end :][: len(lead)] ** 2))) if hit.end < len(response) else 0.0
         if noise > _AT_REST * after > 0.0:
             warnings.append(
-                f"{where}: before the hit the sensor shows {100 * noise / after:.0f} % of what it shows afterwards: "
+                f"{where}: before the impact the sensor shows {100 * noise / after:.0f} % of what it shows afterwards: "
                 "noise, or the machine was not at rest"
             )
     width = int(np.count_nonzero(np.abs(force) > 0.1 * abs(hit.peak_n)))
     if width < MIN_PULSE:
         warnings.append(
-            f"{where}: the pulse has {width} samples above a tenth of its peak: below {MIN_PULSE} its momentum, and "
+            f"{where}: the pulse has {width} samples above a tenth of its peak: below {MIN_PULSE} its impulse, and "
             "so the mass, is uncertain; sample faster or take a softer tip"
         )
     begin = hit.first if hit.end - hit.first > MIN_PULSE else hit.end
@@ -191,7 +191,7 @@ def _windowed(
     wanted = band_hz or strongest
     if reached < wanted:
         warnings.append(
-            f"{where}: the hit excites up to {reached:.4g} Hz (-20 dB), less than "
+            f"{where}: the impact excites up to {reached:.4g} Hz (-20 dB), less than "
             f"{'the' if band_hz else 'the strongest vibration at'} {wanted:.4g} Hz"
             f"{' asked for' if band_hz else ''}: take a harder tip"
         )
@@ -199,7 +199,7 @@ def _windowed(
     if turned:
         response = -response
         warnings.append(
-            f"{where}: the response goes against the push of the hammer: its sign is turned, as for a sensor at the "
+            f"{where}: the response is opposite to the hammer's force: its sign is reversed, as for a sensor at the "
             "same point that points the other way"
         )
     return Usable(replace(record, response=response, force_n=force), sigma, noise, reached, hit, turned)
@@ -222,7 +222,7 @@ def _decay(record: Record, band_hz: float | None, start_s: float | None, warning
 
 
 def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s: float | None = None) -> Prepared:
-    """Divide recordings into impacts, find the starts of decays, and leave out what cannot be used."""
+    """Split recordings into impacts, find the starts of decays, and refuse unusable records."""
     if not records:
         raise RecordError("no record: needed is at least one tap or decay")
     _refuse_mixture(records)
@@ -258,22 +258,22 @@ def _refuse_mixture(records: Sequence[Record]) -> None:
         if abs(first.period_s / other.period_s - 1.0) > _SAME_PERIOD:
             raise RecordError(
                 f"{first.source} has a sample every {first.period_s:.9g} s, {other.source} every "
-                f"{other.period_s:.9g} s: must be sampled alike"
+                f"{other.period_s:.9g} s: must have the same sampling rate"
             )
 
 
-_CLIPPED_RUN = 3  # So many equal extreme samples on end may be an overload; two can lie on either side of a smooth peak
-_CLIPPED_STEP = 1e-4  # Values closer than this share of the range are equal: filters do not clip to one value
-_SMOOTH_FALL = 6.0  # A smooth peak has fallen by four resolutions twice as far from the top as the run's ends
-# A lobe is flat if more than half of what lies above half of it lies above 95 %, in so many samples at least.
+_CLIPPED_RUN = 3  # Consecutive equal extreme samples that may be an overload; a smooth peak has two
+_CLIPPED_STEP = 1e-4  # Values closer than this fraction of the range count as equal: filters do not clip to one value
+_SMOOTH_FALL = 6.0  # A smooth peak falls by four resolution steps at twice the distance of the run's ends from the top
+# A lobe is flat if over half of its samples above 50 % are above 95 %, with at least this many samples.
 _NEARLY_TOP, _FLAT_SHARE, _FLAT_RUN = 0.95, 0.5, 5
-EXCITED = 0.1  # Where the force's spectrum has fallen to this share (-20 dB), noise counts tenfold
-EXCITED_HALF_SINE = 1.3033  # A half sine falls to it at this many over its duration: cos(pi x) / (1 - 4 x²) = 0.1
-MIN_PERIODS = 8.0  # Periods that tell damping though the response has not decayed; fewer do not tell decay from beat
-_STRONG_PEAK = 0.3  # ... of the lowest vibration whose peak in the spectrum has this share of the largest
-DECAYED = 0.1  # Decayed: the last tenth of the record is below this share of the beginning
-_MIN_SAMPLES = 32  # Samples after the hit below which no model has data enough
-FOLDING = 0.8  # share of half the sampling rate for the strongest frequency: above, filters cut and modes fold
+EXCITED = 0.1  # Force spectrum fallen to this ratio (-20 dB): noise counts tenfold
+EXCITED_HALF_SINE = 1.3033  # A half sine reaches it at this multiple of 1/duration: cos(pi x) / (1 - 4 x²) = 0.1
+MIN_PERIODS = 8.0  # Least periods to find damping without full decay; fewer cannot distinguish decay from beat
+_STRONG_PEAK = 0.3  # ... of the lowest spectral peak above this ratio to the largest
+DECAYED = 0.1  # Decayed: the last tenth of the record is below this ratio to the beginning
+_MIN_SAMPLES = 32  # Least samples after the impact for any model
+FOLDING = 0.8  # highest strongest frequency relative to half the sampling rate: above, filters cut and modes alias
 
 
 def is_clipped(values: FloatArray) -> bool:
@@ -297,14 +297,14 @@ def is_clipped(values: FloatArray) -> bool:
                 continue
             reach = (len(run) + 1) // 2
             sides = [k for k in (int(run[0]) - reach, int(run[-1]) + reach) if 0 <= k < len(signal)]
-            # A cut falls on both sides; a peak with a kink, where the force begins or ends, on one.
+            # Clipping is steep on both sides; a peak at a kink, where the force begins or ends, on one.
             if sides and top - max(float(signal[k]) for k in sides) > _SMOOTH_FALL * step:
                 return True
     return False
 
 
 def _is_flat_topped(signal: FloatArray) -> bool:
-    """Whether the highest lobe is cut off though noise hides it: .5 of its upper half above 95 %, .3 of a smooth one"""
+    """Whether the highest lobe is clipped under noise: half of its upper half is above 95 %, 0.3 of a smooth one"""
     top, crest = float(np.max(signal)), int(np.argmax(signal))
     lobes = (label(signal > share * top)[0] for share in (_NEARLY_TOP, 0.5))
     high, half = (np.count_nonzero(lobe == lobe[crest]) for lobe in lobes)
@@ -312,7 +312,7 @@ def _is_flat_topped(signal: FloatArray) -> bool:
 
 
 def excited_hz(force_n: FloatArray, period_s: float) -> float:
-    """Frequency up to which a pulse excites: where its spectrum has fallen by 20 dB, at most half the sampling rate."""
+    """Highest frequency that a pulse excites, Hz: its spectrum has fallen by 20 dB; at most half the sampling rate."""
     pulse = np.trim_zeros(force_n)
     if pulse.size == 0:
         return 0.0
@@ -329,7 +329,7 @@ def excited_hz(force_n: FloatArray, period_s: float) -> float:
 def refuse_short(
     record: Record, response: FloatArray, noise: float, band_hz: float | None, warnings: list[str]
 ) -> float:
-    """Refuse what is too short or sampled too slowly for the strongest mode."""
+    """Refuse a record that is too short, or sampled too slowly for the strongest mode."""
     half_rate = 0.5 / record.period_s
     if len(response) < _MIN_SAMPLES:
         raise RecordError(
@@ -346,12 +346,12 @@ def refuse_short(
     duration = len(response) * record.period_s
     peaks = decay_spectrum(replace(record, response=response, force_n=None)).peaks
     if not peaks:
-        raise RecordError(f"no vibration stands out of the spectrum of {duration:.4g} s: too short, or noise only")
+        raise RecordError(f"no vibration above the noise in the spectrum of {duration:.4g} s: too short, or noise only")
     frequency = peaks[0].frequency_hz
     if frequency > FOLDING * half_rate:
         text = (
             f"the strongest vibration, {frequency:.4g} Hz, is above {FOLDING * half_rate:.4g} Hz, "
-            f"{100 * FOLDING:g} % of half the sampling rate: sampling may be too slow and the mode folded; needed are "
+            f"{100 * FOLDING:g} % of half the sampling rate: sampling may be too slow and the mode aliased; needed are "
             f"{5.0 * frequency:.4g} samples per second or more, with an anti-aliasing filter"
         )
         if band_hz is None:
@@ -365,27 +365,27 @@ def refuse_short(
     periods = lowest * duration
     if last > DECAYED * first and periods < MIN_PERIODS:
         raise RecordError(
-            f"{duration:.4g} s hold {periods:.1f} periods of {lowest:.4g} Hz, and the response is still "
+            f"{duration:.4g} s contain {periods:.1f} periods of {lowest:.4g} Hz, and the response is still "
             f"at {100 * last / first:.0f} %: too short; needed are {MIN_PERIODS / lowest:.4g} s "
             f"({MIN_PERIODS:g} periods) or more"
         )
     if last > DECAYED * first and record.force_n is not None:
         warnings.append(
             f"{record.source}: the response is still at {100 * last / first:.0f} % at the end of the record: its "
-            " FRF is smeared, the fit in time is not"
+            " FRF is smeared (leakage), the fit over time is not"
         )
     return frequency
 
 
-_PULSE_ENDS = 0.01  # A pulse ends below this share of its peak; a half sine has then lost 0.01 % of its momentum
+_PULSE_ENDS = 0.01  # A pulse ends below this share of its peak; a half sine then lacks 0.01 % of its impulse
 _NOISE_ENDS = 3.0  # ... or into the noise, so many standard deviations
-_SMALLEST_PULSE = 0.03  # Pulses are looked for above this share of the largest force
-_SMALLEST_HIT = 0.1  # A pulse is a hit above this share of the largest force; below, somebody has touched the hammer
-_PULSE_NOISE = 7.0  # ... and above so many standard deviations of noise, which a million samples of noise do not reach
-_RINGING_SAMPLES = 8  # A pulse within so many samples belongs to the one before: anti-aliasing filters ring
-_BOUNCE_S = 0.1  # Nobody hits twice on purpose within this time: a hammer that comes down again sooner has bounced
-_RESTED = 0.1  # Between two hits on purpose the response has fallen to this share of its peak
-_LEAD_SHARE = 0.1  # A record cut out of a recording begins before its hit by this share of the time between the hits
+_SMALLEST_PULSE = 0.03  # Pulses are searched above this ratio to the largest force
+_SMALLEST_HIT = 0.1  # An impact is above this ratio to the largest force; below, someone touched the hammer
+_PULSE_NOISE = 7.0  # ... and above so many standard deviations of noise, not reached by a million samples of noise
+_RINGING_SAMPLES = 8  # A pulse this many samples later is ringing of the anti-aliasing filter
+_BOUNCE_S = 0.1  # A second impact within this time is a bounce of the hammer
+_RESTED = 0.1  # Before an intended next impact the response has fallen to this ratio to its peak
+_LEAD_SHARE = 0.1  # A record of one impact begins this fraction of the time between impacts before it
 _MAD = 1.4826  # Normal noise: standard deviation over median absolute deviation
 
 
@@ -396,13 +396,13 @@ class Hit:
     first: int  # first sample of the pulse
     peak: int  # sample of its largest force
     end: int  # first sample after the pulse
-    peak_n: float  # largest force over the offset; negative where the force is
-    second_share: float = 0.0  # largest later pulse before the next hit, as a share of this one; 0: none
-    second_s: float = 0.0  # how long after this one it comes
+    peak_n: float  # largest force relative to the offset, with its sign
+    second_share: float = 0.0  # largest later pulse before the next impact, relative to this one; 0: none
+    second_s: float = 0.0  # its delay after this one
 
 
 def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
-    """Every pulse of a force without offset whose largest value is positive."""
+    """Find every pulse of a force without offset and with a positive maximum."""
     peak = float(np.max(force))
     level = max(_SMALLEST_PULSE * peak, _PULSE_NOISE * sigma)
     above = np.flatnonzero(force > level)
@@ -431,7 +431,7 @@ def _has_rested(record: Record, noise: float, hit: Hit, next_hit: Hit) -> bool:
 
 
 def find_hits(record: Record) -> list[Hit]:
-    """The impacts of a record, in their order; pulses of a bounce belong to the impact before."""
+    """Find the impacts of a record, in order; pulses of a bounce belong to the impact before."""
     if record.force_n is None or not np.ptp(record.force_n) > 0.0:
         return []
     force = record.force_n - np.median(record.force_n)

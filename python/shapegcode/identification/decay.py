@@ -1,4 +1,4 @@
-"""Where the free decay begins in a record without force: the command that stopped the axis is not known."""
+"""Finds the start of the free decay in a record without force, where the axis' command is unknown."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from shapegcode.identification.spectra import decay_spectrum
 from shapegcode.io.record import Record
 from shapegcode.io.units import FloatArray
 
-_ENVELOPE_PERIODS = 2.0  # of the slowest mode, over which the envelope is the RMS; or a beat of the two closest modes
-_ENVELOPE_SHARE = 0.05  # While the modes are not known, it is the RMS over this share of the record, at least
-_EVENT_RISES, _EVENT_SHARE = 1.3, 0.3  # Something happens where the envelope rises so, to this share of its maximum
-_TAIL = 0.3  # The tail of a decay, in which no command is left, begins after this share of it
-_MIN_TAIL = 16  # Samples below which a tail tells no frequency
-_MODE_SHARE = 0.2  # Modes above this share of the tail's largest peak are vibration, what is slower is motion
-# A window of one period that holds this share of the largest RMS begins half a period early at most: so the decay
-# begins this share of a period later.
+_ENVELOPE_PERIODS = 2.0  # RMS window of the envelope: periods of the slowest mode, or a beat of the two closest modes
+_ENVELOPE_SHARE = 0.05  # ... and at least this fraction of the record while the modes are unknown
+_EVENT_RISES, _EVENT_SHARE = 1.3, 0.3  # An event: the envelope rises by this factor, to this ratio to its maximum
+_TAIL = 0.3  # The tail of a decay, without command, begins after this fraction of it
+_MIN_TAIL = 16  # Least samples of a tail to find a frequency
+_MODE_SHARE = 0.2  # Modes are peaks above this ratio to the tail's largest; slower motion is of the axis
+# A window of one period with this fraction of the largest RMS begins at most half a period early, so the decay
+# begins this fraction of a period later.
 _ONSET = 0.7
-_SLOWER = 0.8  # What is slower than this share of the slowest mode is motion of the axis
-_MOTION_SHARE = 0.4  # The axis moves where its mean over a period of the lowest mode is above this of the envelope
-_FEWEST_PERIODS = 3.0  # in the record, of the strongest frequency
-_STOP_PERIODS, _STOP_FALLS = 3.0, 0.3  # of the lowest frequency behind a stop; to which the envelope falls
-_LOWEST_HZ = 10.0  # of modes in an ordinary run; what is slower is motion
+_SLOWER = 0.8  # Below this ratio to the slowest mode's frequency it is motion of the axis
+_MOTION_SHARE = 0.4  # The axis moves: mean over a period of the lowest mode above this ratio to the envelope
+_FEWEST_PERIODS = 3.0  # of the strongest frequency in the record
+_STOP_PERIODS, _STOP_FALLS = 3.0, 0.3  # periods of the lowest frequency after a stop; ratio to which the envelope falls
+_LOWEST_HZ = 10.0  # lowest mode in an ordinary run; slower is motion
 _MOST_STOPS = 20
 
 
 def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
-    """Strongest frequency of the differences, in which the slow motion of the axis weighs little; 0: there is none."""
+    """Strongest frequency of the differences, which suppress slow axis motion; 0: none."""
     jerk = np.diff(response)
     count = 4 * len(jerk)
     spectrum = np.abs(np.fft.rfft(jerk - np.mean(jerk), count))
     spectrum[: int(np.ceil(_FEWEST_PERIODS * 4))] = 0.0
-    # Undo the differences' weight above the lowest quarter of the band, where it would favour noise.
+    # Divide by the differences' gain above the lowest quarter of the band, where it would favour noise.
     frequency = np.arange(len(spectrum)) / (count * period_s)
     weight = np.maximum(np.sin(np.pi * frequency * period_s), np.sin(np.pi / 8))
     at = int(np.argmax(spectrum / weight))
@@ -72,13 +72,13 @@ def _events(envelope: FloatArray) -> npt.NDArray[np.intp]:
 
 
 def _until_next(envelope: FloatArray, starts: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
-    """First and last + 1 sample of what follows each start; the envelope looks ahead and rises before an event."""
+    """First and last + 1 sample of the decay after each start; the forward RMS rises before an event."""
     ends = [int(a) + int(np.argmin(envelope[a:b])) + 1 for a, b in pairwise(starts)]
     return list(zip([int(each) for each in starts], [*ends, len(envelope)], strict=True))
 
 
 def _end_of(envelope: FloatArray, start: int, window_samples: float) -> int:
-    """Last + 1 sample of a decay whose beginning is known."""
+    """Last + 1 sample of a decay with known beginning."""
     later = [int(at) for at in _events(envelope) if at > start + window_samples]
     return _until_next(envelope, np.array([start, *later], dtype=np.intp))[0][1]
 
@@ -90,15 +90,15 @@ def _longest(envelope: FloatArray) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class _Scales:
-    """Of the modes in the tail of a decay, in samples."""
+    """Periods of the modes in the tail of a decay, in samples."""
 
     slowest: float  # period of the slowest mode
     strongest: float  # period of the strongest
-    window: float  # over which the envelope is smooth
+    window: float  # averaging window of the envelope
 
 
 def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_samples: float) -> _Scales:
-    """The modes of a decay: the slowest from its tail, after the command has ended, the strongest from all of it."""
+    """Find the slowest mode of a decay from its tail (after the command), the strongest from all of it."""
     rate = 1.0 / record.period_s
     tail = quiet[start + int(_TAIL * (end - start)) : end]
     peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= _MIN_TAIL else ()
@@ -112,7 +112,7 @@ def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_sample
 
 
 def _onset(quiet: FloatArray, scales: _Scales, start: int, end: int) -> int:
-    """Sample from which a period of the strongest vibration holds half of its power: it has certainly started."""
+    """First sample where one period of the strongest vibration has half of the full power: it has started."""
     last = min(end, start + max(2, round(scales.window)))
     one = max(2, round(scales.strongest))
     short = _forward_rms(quiet[start : min(end, last + one)], one)
@@ -121,7 +121,7 @@ def _onset(quiet: FloatArray, scales: _Scales, start: int, end: int) -> int:
 
 
 def _rest_after_motion(quiet: FloatArray, period_samples: float, level: float, start: int, end: int) -> int:
-    """First sample from which the axis itself stays at rest for a period of the slowest mode."""
+    """First sample after which the axis is at rest for a period of the slowest mode."""
     moving = np.abs(_mean_over(quiet, period_samples)[start:end]) > _MOTION_SHARE * np.sqrt(2.0) * level
     window = max(1, round(period_samples))
     ahead = maximum_filter1d(moving.astype(np.uint8), window, mode="nearest", origin=-(window // 2))
@@ -138,14 +138,14 @@ def _without_median(record: Record) -> FloatArray:
 
 
 def part_of(record: Record, begin: int, end: int, name: str = "") -> Record:
-    """Some samples of a record as one of their own."""
+    """A range of samples as a record of its own."""
     force_n = None if record.force_n is None else record.force_n[begin:end]
     at_s, response = record.start_s + begin * record.period_s, record.response[begin:end]
     return replace(record, source=f"{record.source}{name}", response=response, force_n=force_n, start_s=at_s)
 
 
 def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
-    """One record for each stop of a run behind which the machine rests, those with least motion first, 20 at most."""
+    """One record for each stop after which the machine rests, least motion first, at most 20."""
     quiet = _without_median(record)
     period = 1.0 / ((lowest_hz or _LOWEST_HZ) * record.period_s)
     envelope = _envelope(quiet, period, _ENVELOPE_PERIODS * period)
@@ -167,7 +167,7 @@ def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
 
 
 def find_decay(record: Record, start_s: float | None = None) -> Record:
-    """The free decay in a record without force."""
+    """Find the free decay in a record without force."""
     response = record.response
     last_s = record.start_s + record.period_s * (len(response) - 1)
     if start_s is not None and not record.start_s <= start_s < last_s:
@@ -177,7 +177,7 @@ def find_decay(record: Record, start_s: float | None = None) -> Record:
     quiet = _without_median(record)
     frequency = _fast_frequency_hz(response, record.period_s)
     if frequency == 0.0:
-        raise RecordError(f"{record.source}: {len(response)} samples and no vibration with three periods or more")
+        raise RecordError(f"{record.source}: {len(response)} samples without a vibration of three periods or more")
     period = 1.0 / (frequency * record.period_s)
     window = max(_ENVELOPE_PERIODS * period, _ENVELOPE_SHARE * len(quiet))
     envelope = _envelope(quiet, period, window)
@@ -187,7 +187,7 @@ def find_decay(record: Record, start_s: float | None = None) -> Record:
         start = int(np.ceil((start_s - record.start_s) / record.period_s - 1e-9))
         end = _end_of(envelope, start, window)
     scales = _scales(record, quiet, start, end, period)
-    # Envelope and motion are told apart by the slowest mode, which is known only now.
+    # The slowest mode separates envelope from motion; it is known only now.
     envelope = _envelope(quiet, scales.slowest, scales.window)
     if start_s is not None:
         return part_of(record, start, _end_of(envelope, start, scales.window))

@@ -1,4 +1,4 @@
-"""Modes of frequency responses and of impacts with many modes, each with its 95 % interval, or the reason for its
+"""Modes of frequency responses and of impacts with many modes, each with its 95 % interval or the reason for its
 refusal."""
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ from shapegcode.identification.result import ChartPole, Identification, Identifi
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.units import FloatArray
 
-_BESIDE = 0.25  # lines beside the band asked for that are fitted along, as a share of its ends
-_COMMON = 0.5  # share of the band that several responses must have in common
-_FURTHER = 1.3  # lines are fitted up to so far above what the hits excite
-_SAME_POINT = 0.1  # responses of one point differ by no more than this share
-_MIN_WIDTH = 1.0  # a resonance narrower than so many distances of two lines is not told from the record's length
-_HUM = 0.1  # beside a harmonic of the mains, what has not fallen to this share at the end of the record may be hum
-_MAINS_HZ, _HARMONICS, _HUM_WIDTH = (50.0, 60.0), 20, 1.5  # the width in resolutions
+_BESIDE = 0.25  # also fit lines this far outside the requested band, relative to its ends
+_COMMON = 0.5  # least common fraction of the bands of several responses
+_FURTHER = 1.3  # fit lines up to this factor above the excited frequency
+_SAME_POINT = 0.1  # largest relative difference of responses of one point
+_MIN_WIDTH = 1.0  # least width of a resonance, in line spacings: narrower may be leakage
+_HUM = 0.1  # at a mains harmonic, not decayed to this ratio at the end of the record: may be hum
+_MAINS_HZ, _HARMONICS, _HUM_WIDTH = (50.0, 60.0), 20, 1.5  # width in frequency lines
 _MAINS_WIDTH_HZ = 2.0
-_VERY_CLEAR = 6.0  # evidence beyond that for a mode without a peak of its own or without a stable pole
-_LOCAL, _LOCAL_WIDTHS = 30.0, 2.0  # % left unexplained, within so many half-power widths
-_TURNED = 1.0  # tan of the phase of a residue: beyond it hammer and sensor are not at the same point
-_ACCEPTED_PERCENT = 50.0  # a damping ratio less certain than this is refused
-_MAX_MODES, _IN_WINDOW = 40, 24  # of a structure unless asked otherwise; of a window
-_NO_VIBRATION = 0.3  # damping ratio of what is background, not a mode
-_BEYOND = "beyond the number of modes that were asked for: its peak is lower"
-_SMALL = 0.02  # of the highest supported peak: what is refused and lower is left out
-_DIFFERENT = 0.5  # share of a hit's response that the model of all hits leaves: another point, axis or sign
+_VERY_CLEAR = 6.0  # added evidence needed by a mode without a peak of its own or a stable pole
+_LOCAL, _LOCAL_WIDTHS = 30.0, 2.0  # % residual; range in half-power widths
+_TURNED = 1.0  # tan of the phase of a residue: beyond, hammer and sensor are at different points
+_ACCEPTED_PERCENT = 50.0  # largest accepted half interval of the damping ratio
+_MAX_MODES, _IN_WINDOW = 40, 24  # by default for a structure; in a window
+_NO_VIBRATION = 0.3  # damping ratio above which it is background, not a mode
+_BEYOND = "beyond the requested number of modes: its peak is lower"
+_SMALL = 0.02  # ratio to the highest supported peak: refused modes below are ignored
+_DIFFERENT = 0.5  # residual ratio of one impact after the model of all: another point, axis or sign
 _OUT_OF_NOISE = 5.0
-_ENOUGH = 3.0  # independent samples a parameter of a fit that another one is held against
+_ENOUGH = 3.0  # least independent samples per parameter of a comparison fit
 _PEAK = 0.5  # half-power widths
-_RISES = 2.0  # a peak rises by this factor out of its surroundings
-POOR = 0.3  # share of the response in the band that a model which is used may leave unexplained
+_RISES = 2.0  # factor by which a peak exceeds its surroundings
+POOR = 0.3  # largest residual ratio in the band of a usable model
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,24 +60,24 @@ class _Measured:
     parts: tuple[Lines, ...]
     low: float  # rad/s
     high: float
-    record_s: float | None  # length of a record; None: lines without one
+    record_s: float | None  # length of a record; None: lines only
     resolution_hz: float
     hits: Hits | None = None
-    excitation: FloatArray | None = None  # (n,) of the lines of hits, 1 at its largest
+    excitation: FloatArray | None = None  # (n,) force spectrum at the lines of impacts, maximum 1
 
 
 @dataclass(frozen=True, eq=False)
 class FrfModes:
-    """Modes found in lines, and the model of each response."""
+    """Modes found in frequency lines, and the model of each response."""
 
     modes: tuple[IdentifiedMode, ...]  # refused ones too
     windows: tuple[Window, ...]
     chart: tuple[ChartPole, ...]
-    model: tuple[ComplexArray, ...]  # (n,) lines of each response; as measured where no window is
+    model: tuple[ComplexArray, ...]  # (n,) lines of each response; as measured outside all windows
     fit_percent: float
-    missing_peak_hz: float | None  # the highest peak of the mobility, if no supported mode is there
-    different: str = ""  # the record of a hit that the model of all hits does not explain
-    steady: bool = False  # something oscillates throughout the records and was taken out
+    missing_peak_hz: float | None  # highest peak of the mobility, if no supported mode explains it
+    different: str = ""  # source of an impact that the model of all impacts does not explain
+    steady: bool = False  # a steady oscillation was removed from the records
 
 
 def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...], sought: Sought) -> Identification:
@@ -86,15 +86,15 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
     merged = _merged(used) if one_point else used
     notes = list(dict.fromkeys(note for each in responses for note in each.notes))
     if len(used) > 1:
-        said = f"are of several points: the modes are those of all, masses those at {used[0].source}"
+        said = f"are of several points: modes are fitted to all, masses are those at {used[0].source}"
         notes.append(f"{len(used)} frequency responses {'agree and are averaged: one point' if one_point else said}")
     if sought.exponential_window_s is None and sought.phase_known:
         notes.append(
-            "a frequency response no longer tells overload, double hits or windows: an exponential window adds its "
+            "a frequency response does not show overload, double hits or windows: an exponential window adds its "
             "damping, unless --exponential-window states it"
         )
     found = _in_responses(merged, sought)
-    # Whether the significant modes move against the force, counting all that are supported.
+    # Reverse the sign if the significant supported modes move opposite to the force.
     with_it, against = (sum(_height(m) for m in found.modes if m.refusal == each) for each in ("", OPPOSED))
     turned = [f"{responses[0].source}: {model_search.TURNED}"] if against > with_it else []
     if turned:
@@ -122,7 +122,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
 
 
 def _height(mode: IdentifiedMode) -> float:
-    """Height of the peak of the mobility, up to a factor."""
+    """Height of the peak of the mobility, up to a constant factor."""
     assert mode.mass_kg is not None
     return 1.0 / (mode.damping_ratio.value * mode.frequency_hz.value * mode.mass_kg.value)
 
@@ -130,7 +130,7 @@ def _height(mode: IdentifiedMode) -> float:
 def _chosen(
     responses: Sequence[FrequencyResponse], band_hz: tuple[float, float] | None
 ) -> tuple[list[FrequencyResponse], bool]:
-    """The lines that are fitted, and whether they are of one point."""
+    """Lines to fit, and whether they are of one point."""
     first = responses[0]
     for other in responses[1:]:
         for name in ("quantity", "axis", "scaled"):
@@ -152,8 +152,8 @@ def _chosen(
     common, whole = last_hz.min() - first_hz.max(), last_hz.max() - first_hz.min()
     if common < _COMMON * whole:
         raise RecordError(
-            f"{used[0].source} and {len(used) - 1} more have {max(common, 0.0):.4g} Hz of {whole:.4g} Hz in common: "
-            "identify responses of different bands apart"
+            f"{used[0].source} and {len(used) - 1} more share {max(common, 0.0):.4g} Hz of {whole:.4g} Hz: "
+            "identify responses of different bands separately"
         )
     used = [_within(each, first_hz.max(), last_hz.min()) for each in used]
     if len(used) < 2 or not all(np.array_equal(each.frequency_hz, used[0].frequency_hz) for each in used[1:]):
@@ -175,7 +175,7 @@ def _of_lines(each: FrequencyResponse, inside: npt.NDArray[np.bool_]) -> Frequen
 
 
 def _merged(used: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
-    """The mean of several responses of one point, with what they differ by as coherence."""
+    """The mean of several responses of one point, with their differences as coherence."""
     stacked = np.array([each.response for each in used])
     mean = np.mean(stacked, axis=0)
     scatter = np.sum(np.abs(stacked - mean) ** 2, axis=0) / (len(used) - 1) / len(used)
@@ -184,7 +184,7 @@ def _merged(used: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
 
 
 def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -> tuple[_Measured, Hits]:
-    """The impacts with these responses, as they are fitted."""
+    """Lines of the impacts with these responses, for the fit."""
     period = ready.records[0].period_s
     duration = min(len(each) for each in responses) * period
     excited = min(max(each.excited_hz or 0.0 for each in ready.usable), 0.45 / period)
@@ -206,7 +206,7 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
     measured, hits = _of_hits(ready, quiet, sought)
     pool, poles = frf_search.candidates_of(measured.parts)
     windows = frf_search.search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
-    # What oscillates throughout is looked for once more in what a first model leaves.
+    # Search for steady oscillations again in the residual of a first model.
     left = hits.in_time(_left(measured, hits, _model(measured.parts, windows)[0]))
     steady = [steady_sines(rest, period) for rest in left]
     if any(hertz for _, hertz in steady):
@@ -236,7 +236,7 @@ def _left(measured: _Measured, hits: Hits, model: ComplexArray) -> ComplexArray:
 
 
 def _in_responses(responses: Sequence[FrequencyResponse], sought: Sought) -> FrfModes:
-    """Search twice, with the lines weighed by what is left in between, and test every mode."""
+    """Search twice, weighting the lines by the first residual for the second, and test every mode."""
     parts = tuple(measured_lines(each, sought.exponential_window_s) for each in responses)
     low, high = min(float(each.omega[0]) for each in parts), max(float(each.omega[-1]) for each in parts)
     measured = _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
@@ -255,7 +255,7 @@ def _in_responses(responses: Sequence[FrequencyResponse], sought: Sought) -> Frf
 def _tested(
     measured: _Measured, windows: Sequence[Window], pool: Sequence[StablePole], poles: Sequence[Pole], sought: Sought
 ) -> FrfModes:
-    """Every mode of the windows with its refusal, if any, and what the model explains."""
+    """Every mode of the windows with its refusal, if any, and the quality of the fit."""
     modes = [mode for window in windows for mode in _modes(window, measured, pool, sought)]
     low_hz, high_hz = sought.band_hz or (0.0, np.inf)
     modes = _strongest([each for each in modes if low_hz <= each.frequency_hz.value <= high_hz], sought)
@@ -273,10 +273,10 @@ def _tested(
 
 
 def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[IdentifiedMode]:
-    """As many modes as are wanted: those of the highest peaks, the others refused."""
+    """Keep the requested number of modes, those with the highest peaks; the others are refused."""
     supported = [mode for mode in modes if not mode.refusal and mode.mass_kg is not None]
     if sought.modes is not None and len(supported) < sought.modes:
-        raise RecordError(f"{sought.modes} modes are asked for, and the data hold no more than {len(supported)}")
+        raise RecordError(f"{sought.modes} modes are asked for, and the data support no more than {len(supported)}")
     most = sought.modes or sought.max_modes or _MAX_MODES
     supported.sort(key=_height, reverse=True)
     over = {id(mode) for mode in supported[most:]}
@@ -290,11 +290,11 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
-    """The same lines with weights for what a model leaves: even, as high as the response, or half of each."""
+    """Reweight lines for the model residual: constant, proportional to the response, or half of each."""
     left = np.abs(lines.response - model) ** 2
-    # Lines without a mode nearby have no model: their noise stays what it was taken to be.
+    # Lines without a mode nearby have no model: they keep their assumed noise.
     left = np.where(left > 0.0, left, np.log(2.0) / lines.weight**2)
-    # A mean over lines of which some are far larger may be rounded to 0 or below.
+    # The running mean may round to 0 or below next to far larger lines.
     even, high = (
         np.maximum(shape * smoothed(left / shape), 1e-300)
         for shape in (1.0 / lines.weight**2, np.abs(model) ** 2 + 1e-300)
@@ -304,7 +304,7 @@ def _weighed(lines: Lines, model: ComplexArray) -> Lines:
 
 
 def _model(parts: Sequence[Lines], windows: Sequence[Window]) -> list[ComplexArray]:
-    """Lines of each response as the windows have them."""
+    """Model of each response, from the windows."""
     found = [lines.response.copy() for lines in parts]
     for window in windows:
         for row, (lines, left) in enumerate(zip(window.parts, window.fit.left, strict=True)):
@@ -315,7 +315,7 @@ def _model(parts: Sequence[Lines], windows: Sequence[Window]) -> list[ComplexArr
 
 
 def _inside(lines: Lines, measured: _Measured) -> npt.NDArray[np.bool_]:
-    """Which lines the modes that count are looked for in."""
+    """Mask of the lines in which modes are searched."""
     return (lines.omega >= measured.low) & (lines.omega < measured.high)
 
 
@@ -328,7 +328,7 @@ def _share_left(parts: Sequence[Lines], left: Sequence[ComplexArray], inside: Se
 
 
 def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float | None:
-    """Frequency of the highest peak of the mobility, unless a supported mode is there."""
+    """Frequency of the highest peak of the mobility, Hz, if no supported mode explains it."""
     lines = measured.parts[0]
     height = np.abs(lines.response * lines.s ** (1 - lines.power))
     inside = _inside(lines, measured)
@@ -351,7 +351,7 @@ def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float
 def doubt_of(found: FrfModes) -> str:
     """Why the modes should not be used; empty: they may."""
     if found.different:
-        return f"{found.different} answers differently from the other hits: another point, axis or sign"
+        return f"{found.different} responds differently from the other impacts: another point, axis or sign"
     if found.missing_peak_hz is not None:
         return f"the highest peak of the mobility, at {found.missing_peak_hz:.4g} Hz, belongs to no supported mode"
     if found.fit_percent < 100.0 * (1.0 - POOR):
@@ -373,7 +373,7 @@ def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], soug
         mode = mode_estimates(values, spread)
         dull = _excitation_refusal(mode.frequency_hz.value, measured)
         refusal = dull or _refusal(window, index, mode, measured, pool, sought)
-        # Where a sweep begins to excite, or parts join, a line alone may stand out: no machine vibrates so.
+        # A single high line can come from the start of a sweep or a joint between parts, not from a mode.
         width_hz = 2.0 * mode.damping_ratio.value * mode.frequency_hz.value
         spike = not sought.phase_known and width_hz < _MIN_WIDTH * measured.resolution_hz
         found.append(replace(mode, refusal=refusal, left_out=bool(dull) or (spike and bool(refusal))))
@@ -381,7 +381,7 @@ def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], soug
 
 
 def _other_fits(window: Window) -> list[ModalFit]:
-    """The same modes in a narrower band with another background, and as the other kind of modes, real or complex."""
+    """The same modes in a narrower band with another background, and with the other kind (real, complex)."""
     starts, kind = starts_of(window.fit), window.fit.complex_modes
     ends = (float(window.parts[0].omega[0]), float(window.parts[0].omega[-1]))
     narrow = [cut(lines, window.low / 1.15, window.high * 1.15, kind, 1) for lines in window.parts]
@@ -412,7 +412,7 @@ def _logarithms(
         moved = np.array([np.log(other.omega[index]), np.log(other.zeta[index]), np.log(max(size, 1e-300))]) - base
         half = np.hypot(half, np.abs(change @ moved))
     if measured.hits is not None:
-        # Noise of the force turns and scales the whole response about a mode.
+        # Force noise rotates and scales the whole response near a mode.
         error = 2.0 * float(np.interp(omega, measured.parts[0].omega, measured.hits.gain_error))
         half = np.hypot(half, error * np.array([zeta, 1.0, 1.0, 1.0, 1.0]))
         half = np.maximum(half, _scatter(window, known, index, measured, change, scale))
@@ -438,7 +438,7 @@ def _scatter(
     change: FloatArray,
     scale: FloatArray,
 ) -> FloatArray:
-    """Half widths of the intervals from the scatter of a mode between single impacts; 0 if noise explains it."""
+    """Half widths of the intervals from the scatter of a mode between impacts; 0 if noise explains it."""
     hits, fit, lines = measured.hits, window.fit, window.parts[0]
     assert hits is not None
     count = len(hits.force)
@@ -483,14 +483,14 @@ def _record_refusal(hertz: float, zeta: float, measured: _Measured) -> str:
             return ""
         return (
             f"its half-power width of {width:.3g} Hz is less than the {measured.resolution_hz:.3g} Hz between two "
-            "lines: window and length of the record make such a peak; needed is a finer resolution, or the time record"
+            "lines: window and record length can cause such a peak; needed is a finer resolution, or the time record"
         )
     refusal, lasting = model_search.lasting_refusal(hertz, zeta, measured.record_s)
     if refusal:
         return refusal
     mains = min((k * base for base in _MAINS_HZ for k in range(1, _HARMONICS)), key=lambda each: abs(each - hertz))
     if lasting > _HUM and abs(mains - hertz) < min(_HUM_WIDTH * measured.resolution_hz, _MAINS_WIDTH_HZ):
-        return f"beside {mains:g} Hz, a harmonic of the mains, and still at {100.0 * lasting:.0f} %: it may be hum"
+        return f"at {mains:g} Hz, a mains harmonic, and still at {100.0 * lasting:.0f} %: it may be hum"
     return ""
 
 
@@ -501,33 +501,33 @@ def _excitation_refusal(hertz: float, measured: _Measured) -> str:
     if excitation >= EXCITED:
         return ""
     return (
-        f"the hit excites it at {20.0 * np.log10(max(excitation, 1e-9)):.0f} dB of its largest force only (limit "
+        f"the impact excites it at {20.0 * np.log10(max(excitation, 1e-9)):.0f} dB of its largest force only (limit "
         "-20 dB): take a harder tip"
     )
 
 
 def _response_refusal(residues: ComplexArray) -> str:
     first = complex(residues[0])
-    if len(residues) > 1:  # points other than the one of the force may move either way
+    if len(residues) > 1:  # other points than that of the force may move in either direction
         return ""
     if first.real < 0.0:
         return OPPOSED
     if abs(first.imag) > _TURNED * first.real:
         return (
-            f"its phase is {np.degrees(np.angle(first)):.0f}° off that of hammer and sensor at one point (limit 45°): "
+            f"its phase is {np.degrees(np.angle(first)):.0f}° from that of hammer and sensor at one point (limit 45°): "
             "another point, a delay between the channels, or no mode"
         )
     return ""
 
 
 def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[StablePole]) -> str:
-    """Without a peak of its own and a stable pole, the fit must be clearly worse without the mode."""
+    """Refuse a mode without a peak of its own or a stable pole unless the fit without it is clearly worse."""
     fit = window.fit
     omega, zeta = starts_of(fit)[index]
     share = min(lines.independent for lines in window.parts)
     starts = [each for place, each in enumerate(starts_of(fit)) if place != index]
     apart = np.abs(fit.omega - omega) > zeta * omega + fit.zeta * fit.omega
-    # Where another mode lies within its width, that one must not take its part.
+    # A mode within its width must not take its place.
     effort = (0, 1.0) if np.count_nonzero(~apart) == 1 else (10, 1e-4)
     without = fitted(window.parts, starts, effort)
     gain = np.inf if without is None else frf_search.evidence_of(without, share) - frf_search.evidence_of(fit, share)
@@ -542,8 +542,8 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
     if gain >= needed:
         return ""
     return (
-        f"no {'peak of its own' if not peak else 'pole that stays over the orders'} at {hertz:.4g} Hz, and the fit "
-        f"without it is hardly worse (evidence {gain:.1f}, limit {needed:g})"
+        f"no {'peak of its own' if not peak else 'pole stable over model orders'} at {hertz:.4g} Hz, and the fit "
+        f"without it is hardly worse (information criterion {gain:.1f}, limit {needed:g})"
     )
 
 
@@ -552,4 +552,4 @@ def _local_refusal(window: Window, omega: float, width: float) -> str:
     percent = 100.0 * _share_left(window.parts, window.fit.left, near)
     if percent <= _LOCAL:
         return ""
-    return f"the model leaves {percent:.0f} % of the response around it unexplained (limit {_LOCAL:g} %)"
+    return f"the model does not explain {percent:.0f} % of the response around it (limit {_LOCAL:g} %)"

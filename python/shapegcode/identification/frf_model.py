@@ -15,9 +15,9 @@ from shapegcode.io.frequency_response import ComplexArray
 from shapegcode.io.units import FloatArray
 
 POWERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
-_LARGEST_STEP = 0.3  # of ln omega and ln zeta in one iteration
+_LARGEST_STEP = 0.3  # largest change of ln omega and ln zeta in one iteration
 _STEP_FLOOR = 1e-10
-_RANK = 1e-12  # columns nearer to each other than this share are one
+_RANK = 1e-12  # relative tolerance below which columns are dependent
 _MIN_DAMPING, _MAX_DAMPING = 1e-6, 0.99
 
 
@@ -25,17 +25,17 @@ _MIN_DAMPING, _MAX_DAMPING = 1e-6, 0.99
 class Lines:
     """Lines of one response over force."""
 
-    s: ComplexArray  # (n,) rad/s, points of the Laplace plane: off the imaginary axis behind an exponential window
-    response: ComplexArray  # (n,) SI over N
+    s: ComplexArray  # (n,) rad/s, points of the Laplace plane: off the imaginary axis with an exponential window
+    response: ComplexArray  # (n,) SI unit per N
     weight: FloatArray  # (n,) 1 over the standard deviation of the noise
-    power: int  # of s in the numerator of a mode: 0 displacement, 1 velocity, 2 acceleration
-    background: ComplexArray  # (n, k) columns with real factors for what lies outside the lines
+    power: int  # power of s in a mode's numerator: 0 displacement, 1 velocity, 2 acceleration
+    background: ComplexArray  # (n, k) columns (real factors) for modes outside the lines
     correlation: ComplexArray  # (m,) of the noise of two lines 0, 1, 2, ... apart
     complex_modes: bool = True  # residues are complex
 
     @property
     def omega(self) -> FloatArray:
-        """Angular frequencies."""
+        """Angular frequencies, rad/s."""
         return np.asarray(self.s.imag, dtype=np.float64)
 
     @cached_property
@@ -57,24 +57,24 @@ class Lines:
         return found
 
     def near(self, omega: float, reach: float, steps: float = 3.0) -> npt.NDArray[np.bool_]:
-        """Which lines lie within a reach of an angular frequency, some steps between lines at least."""
+        """Mask of the lines within a distance of an angular frequency, at least *steps* line spacings."""
         return np.asarray(np.abs(self.omega - omega) <= max(reach, steps * float(self.omega[1] - self.omega[0])))
 
     @property
     def independent(self) -> float:
-        """Share of the lines that are independent."""
+        """Independent fraction of the lines."""
         return 1.0 / float(1.0 + 2.0 * np.sum(np.abs(self.correlation[1:]) ** 2))
 
 
 @dataclass(frozen=True, eq=False)
 class ModalFit:
-    """Modes and what they leave."""
+    """Fitted modes and their residuals."""
 
     omega: FloatArray  # (m,) rad/s
     zeta: FloatArray  # (m,)
     residues: ComplexArray  # (responses, m) 1/kg; the real part is 1/mass, the imaginary part is of a complex mode
     background: tuple[FloatArray, ...]  # factors of the columns, of each response
-    left: tuple[ComplexArray, ...]  # (n,) of each response, weighted
+    left: tuple[ComplexArray, ...]  # (n,) weighted residual of each response
     jacobian: tuple[FloatArray, ...]  # (2n, columns + 2m) of each response
     complex_modes: bool
 
@@ -85,14 +85,14 @@ class ModalFit:
 
     @property
     def parameters(self) -> int:
-        """Number of fitted ones."""
+        """Number of fitted parameters."""
         modes = len(self.omega)
         per_response = (2 if self.complex_modes else 1) * modes
         return 2 * modes + sum(per_response + len(part) for part in self.background)
 
 
 def mode_columns(lines: Lines, omega: FloatArray, zeta: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Responses of modes of 1 kg, (n, m), and their derivatives to ln omega and ln zeta."""
+    """Responses of modes of 1 kg, (n, m), and their derivatives with respect to ln omega and ln zeta."""
     s = lines.s[:, None]
     damping = 2.0 * zeta * omega * s
     below = s * s + damping + omega**2
@@ -104,8 +104,8 @@ def mode_columns(lines: Lines, omega: FloatArray, zeta: FloatArray) -> tuple[Com
 @dataclass(frozen=True, eq=False)
 class _Linearised:
     linear: list[FloatArray]
-    jacobian: list[FloatArray]  # of the linear factors, then of ln omega and ln zeta of each mode
-    projected: FloatArray  # without what the linear factors follow
+    jacobian: list[FloatArray]  # columns: linear factors, then ln omega and ln zeta of each mode
+    projected: FloatArray  # projected off the columns of the linear factors
     residual: FloatArray
     squares: float
 
@@ -118,7 +118,7 @@ def _linearised(parts: Sequence[Lines], theta: FloatArray) -> _Linearised:
     for lines in parts:
         column, to_omega, to_zeta = mode_columns(lines, omega, zeta)
         goal, blocks = lines.goal, [lines.weighted(column)]
-        if complex_modes:  # a second column per mode: numerator of first degree
+        if complex_modes:  # second column per mode: first-degree numerator
             turn = lines.s[:, None] / omega
             blocks.append(lines.weighted(column * turn))
         columns = np.hstack([*blocks, lines.weighted_background])

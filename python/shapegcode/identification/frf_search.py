@@ -1,4 +1,4 @@
-"""Which modes frequency responses hold: poles that stay over orders and bands, fitted window by window."""
+"""Searches modes of frequency responses: poles stable over model orders and bands, fitted window by window."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from shapegcode.io.frequency_response import ComplexArray
 from shapegcode.io.units import FloatArray
 
 _BAND = 1.8  # upper end of a band of poles over its lower end
-_STEP = 1.3  # from band to band
-_EDGE = 1.05  # poles so near to an end of a band are left to the next one
-_SAME, _SAME_DAMPING = 0.35, 0.4  # one pole: distance in half-power half widths, and in ln zeta
+_STEP = 1.3  # ratio from band to band
+_EDGE = 1.05  # poles this near to the end of a band belong to the next one
+_SAME, _SAME_DAMPING = 0.35, 0.4  # poles count as one: distance in half-power half widths, and in ln zeta
 _CORE = 1.35  # upper end of a window over its lower end
-_MARGIN = 1.3  # the lines of a window reach so far beyond its ends
-_BESIDE = 0.02, 3.0  # modes that count beyond the lines: share of the frequency, and damping ratios
-STABLE = 0.34  # share of the higher orders that have a pole which is fitted from the start
-_SEEN = 0.12  # ... which is tried
-_CLEARLY = 40.0  # times ln of the samples: by so much less a fit without a mode explains, before the others move
-_QUICK, _FULL = (8, 1e-3), (40, 1e-8)  # iterations, and the gain below which they end
+_MARGIN = 1.3  # a window's lines extend beyond its ends by this factor
+_BESIDE = 0.02, 3.0  # modes used beyond the lines: within this ratio of the frequency, and damping ratios
+STABLE = 0.34  # fraction of higher orders with a pole that is fitted from the start
+_SEEN = 0.12  # ... that is tried
+_CLEARLY = 40.0  # times ln of the samples: loss of fit without a mode, before the others are refitted
+_QUICK, _FULL = (8, 1e-3), (40, 1e-8)  # iterations, and the gain that ends them
 _TRIED, _WEAKEST = 3, 2
-_MORE_REAL = 2  # real modes may be half as many again as complex ones, and so many more: more cost more than they tell
-_UNUSUAL = 2.0  # times the median of what a fit leaves: around a mode that may be two
+_MORE_REAL = 2  # real modes may exceed 1.5 times the complex ones by this number
+_UNUSUAL = 2.0  # times the median residual: near a mode that may be two
 _LINES_PER_MODE = 4
-_FEW = 350  # lines of a window that trials take
-_BAND_LINES = 48  # a band or window has at least so many
-_MAX_CHANGES, _ROUNDS = 60, 4  # with few lines, and behind those with all
-_FEWEST = 12  # lines below which a window is left out
-_DEGREE = 2  # of the background of a window
-_CLEAR, _OPPOSED = 6.0, 8.0  # by so much beyond Bayes' criterion a mode must better the fit; one against the push more
-_TWINS = 0.02  # modes nearer than this share of their width are one
+_FEW = 350  # lines of a window used in trials
+_BAND_LINES = 48  # least lines of a band or window
+_MAX_CHANGES, _ROUNDS = 60, 4  # with few lines, then with all
+_FEWEST = 12  # least lines of a fitted window
+_DEGREE = 2  # polynomial degree of a window's background
+_CLEAR, _OPPOSED = 6.0, 8.0  # gain over Bayes' criterion that a mode needs; if opposite to the force
+_TWINS = 0.02  # modes nearer than this fraction of their width are one
 _START_DAMPING = (0.005, 0.02, 0.06)
 _NO_VIBRATION = 0.5
 
@@ -46,11 +46,11 @@ class StablePole:
 
     omega: float  # rad/s
     zeta: float
-    share: float  # of the models of higher order that have it
+    share: float  # fraction of the models of higher order that contain it
 
 
 def candidates_of(parts: Sequence[Lines]) -> tuple[list[StablePole], list[Pole]]:
-    """Poles that stay over orders and bands, ascending, and all poles."""
+    """Poles stable over model orders and bands, ascending, and all poles."""
     low = min(float(lines.omega[0]) for lines in parts)
     high = max(float(lines.omega[-1]) for lines in parts)
     begin, found, everything = low, [], []
@@ -73,7 +73,7 @@ def candidates_of(parts: Sequence[Lines]) -> tuple[list[StablePole], list[Pole]]
 
 
 def _clusters(poles: list[Pole], orders: int) -> list[StablePole]:
-    """Poles of one band that are the same mode, as the models of higher order have it."""
+    """Group poles of one band that are one mode; values are from the models of higher order."""
     left = sorted(poles, key=lambda pole: -pole.order)
     found = []
     while left:
@@ -94,22 +94,22 @@ def _same(one: Pole | StablePole, other: Pole | StablePole) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """A part of the lines and what was fitted to it."""
+    """A part of the lines and the fit to it."""
 
-    low: float  # rad/s, of the modes that count
+    low: float  # rad/s, limits of the modes used
     high: float
-    parts: tuple[Lines, ...]  # lines beyond both ends too, without what modes further off do there
+    parts: tuple[Lines, ...]  # including lines beyond both ends; responses of modes further away are subtracted
     fit: ModalFit
 
     def inside(self) -> list[int]:
-        """Modes that count."""
+        """Indices of the modes within the window."""
         return [i for i, omega in enumerate(self.fit.omega) if self.low <= omega < self.high]
 
 
 def search(
     parts: Sequence[Lines], low: float, high: float, most: int, candidates: Sequence[StablePole], starts: Starts | None
 ) -> list[Window]:
-    """Fit windows, each without what the modes outside of it do in it; from poles that are stable, or from `starts`."""
+    """Fit windows, with the response of outside modes subtracted; starts from stable poles, or from `starts`."""
     final, least = starts is not None, STABLE if starts is None else np.inf
     spare = [(each.omega, each.zeta) for each in candidates if each.share < least]
     if starts is None:
@@ -136,7 +136,7 @@ def search(
 
 
 def _upper_end(parts: Sequence[Lines], low: float, ratio: float, highest: float) -> float:
-    """Upper end of a band: some ratio above its lower end, further where the lines are few."""
+    """Upper end of a band: *ratio* times its lower end, higher where frequency lines are sparse."""
     fewest = max(
         float(lines.omega[min(int(np.searchsorted(lines.omega, low)) + _BAND_LINES, len(lines.s) - 1)])
         for lines in parts
@@ -145,12 +145,12 @@ def _upper_end(parts: Sequence[Lines], low: float, ratio: float, highest: float)
 
 
 def modes_of(windows: Sequence[Window]) -> Starts:
-    """All modes that count."""
+    """All modes within their windows."""
     return [starts_of(window.fit)[i] for window in windows for i in window.inside()]
 
 
 def _linear(parts: Sequence[Lines], starts: Starts) -> ComplexArray:
-    """(responses, m) residues of modes whose poles are taken as they are."""
+    """Residues of modes with fixed poles, (responses, m)."""
     found = []
     omega, zeta = np.array(starts, dtype=np.float64).reshape(-1, 2).T
     for lines in parts:
@@ -166,7 +166,7 @@ def _without(lines: Lines, modes: Starts, residues: ComplexArray) -> Lines:
     if not modes:
         return lines
     omega, zeta = np.array(modes).T
-    # The imaginary part of a residue goes with s/omega.
+    # The imaginary part of a residue is multiplied by s/omega.
     gain = residues.real + residues.imag * (lines.s[:, None] / omega)
     return replace(lines, response=lines.response - np.sum(mode_columns(lines, omega, zeta)[0] * gain, axis=1))
 
@@ -184,7 +184,7 @@ def cut(lines: Lines, low: float, high: float, complex_modes: bool, degree: int 
 
 
 def residues_of(fit: ModalFit) -> ComplexArray:
-    """(responses, m) residues, real ones turned by the delay of each response."""
+    """(responses, m) residues; real ones include the phase of each response's delay."""
     if fit.complex_modes:
         return fit.residues
     delay_s = -np.array([factors[-1:] for factors in fit.background])
@@ -194,7 +194,7 @@ def residues_of(fit: ModalFit) -> ComplexArray:
 def _fit_window(
     parts: Sequence[Lines], near: Starts, spare: Starts, low: float, high: float, most: int, final: bool
 ) -> list[Window]:
-    """A window with its modes by evidence, begun from those near it; none where there are too few lines or no mode."""
+    """Fit a window, modes chosen by evidence, from the starts near it; None with too few lines or no mode."""
     found: list[tuple[float, Window]] = []
     for complex_modes in (True, False) if final else (True,):
         wide = tuple(cut(lines, low / _MARGIN, high * _MARGIN, complex_modes) for lines in parts)
@@ -212,7 +212,7 @@ def _fit_window(
 def _best_of(wide: Sequence[Lines], near: Starts, spare: Starts, room: int, final: bool) -> ModalFit | None:
     fewer = [_thinned(lines) for lines in wide]
     both = [_Selection(fewer, near[:room]).best_of(spare, room)]
-    # Complex modes are the second time searched from those of the first.
+    # The second search of complex modes starts from those of the first.
     pruned = near[:room] if final and wide[0].complex_modes else _pruned(fewer, [*near, *spare])[:room]
     if sorted(pruned) != sorted(near[:room]):
         both.append(_Selection(fewer, pruned).best_of(spare, room))
@@ -234,7 +234,7 @@ def _thinned(lines: Lines) -> Lines:
 
 
 class _Selection:
-    """Modes of a window from some on, with one more or one less as long as the data speak for it."""
+    """Modes of a window: adds or removes one from the starts while the evidence supports it."""
 
     def __init__(self, parts: Sequence[Lines], starts: Starts) -> None:
         self.parts, self.share = parts, min(lines.independent for lines in parts)
@@ -252,7 +252,7 @@ class _Selection:
         return self.best
 
     def _betters(self, starts: Starts, *, apart: bool = False) -> bool:
-        """Take a fit from these modes on if it is better; with `apart` only if no two of its modes are one."""
+        """Fit from these modes and keep the fit if it is better; with `apart` only if no two of its modes coincide."""
         found = fitted(self.parts, starts, _QUICK)
         if found is None or (apart and _twins(found)) or not evidence_of(found, self.share) < self.evidence:
             return False
@@ -270,7 +270,7 @@ class _Selection:
         return float(samples * np.log(max(squares, 1e-300)) + columns * np.log(samples))
 
     def _reduces(self) -> bool:
-        """Leave out the mode that explains least, if the data do not speak for it."""
+        """Remove the mode that explains least if the evidence does not support it; True if one was removed."""
         fit = self.best
         if fit is None:
             return False
@@ -290,7 +290,7 @@ class _Selection:
         return False
 
     def _grows(self, spare: Starts) -> bool:
-        """One mode more for which the data speak: of the pool, or where most is left."""
+        """Add a mode that the evidence supports: from the pool, or at the largest residual; True if one was added."""
         parts = self.parts
         whole = [lines.weight * lines.response for lines in parts]
         left: Sequence[ComplexArray] = whole if self.best is None else self.best.left
@@ -308,7 +308,7 @@ class _Selection:
         squares = sum(float(np.sum(np.abs(part) ** 2)) for part in left)
         samples = 2 * sum(map(len, left)) * self.share
         for index in np.argsort(gains)[::-1][:_TRIED]:
-            # Poles move and residues with them: a mode may come to explain some times more than at its start.
+            # As its pole moves, a mode may explain several times more than at its start.
             if samples * np.log(max(1.0 - 3.0 * gains[index] / squares, 1e-9)) + 4.0 * np.log(samples) > 0.0:
                 break
             if self._betters([*starts_of(self.best), tried[index]], apart=True):
@@ -316,7 +316,7 @@ class _Selection:
         return False
 
     def _splits(self) -> bool:
-        """Two modes instead of the one around which the residual is largest relative to its width."""
+        """Replace the mode with the largest residual relative to its width by two; True if that is better."""
         if self.best is None:
             return False
         fit, left = self.best, []
@@ -337,7 +337,7 @@ class _Selection:
 
 
 def _pruned(parts: Sequence[Lines], starts: Starts) -> Starts:
-    """Of more poles than there are modes those that explain most, left as they are, as many as the data speak for."""
+    """Of too many poles those that explain most, unchanged, as many as the evidence supports."""
     if not starts:
         return []
     omega, zeta = np.array(starts).T
@@ -378,7 +378,7 @@ def evidence_of(fit: ModalFit, share: float) -> float:
 
 
 def fitted(parts: Sequence[Lines], starts: Starts, effort: tuple[int, float] = _FULL) -> ModalFit | None:
-    """A fit, or None where there are no starts or too few lines for them."""
+    """A fit, or None without starts or with too few lines."""
     if not starts:
         return None
     try:
@@ -389,12 +389,12 @@ def fitted(parts: Sequence[Lines], starts: Starts, effort: tuple[int, float] = _
 
 
 def starts_of(fit: ModalFit | None) -> Starts:
-    """The modes of a fit, for another one to begin with."""
+    """Modes of a fit, as starts of another one."""
     return [] if fit is None else list(zip(fit.omega.tolist(), fit.zeta.tolist(), strict=True))
 
 
 def _twins(fit: ModalFit) -> bool:
-    """Whether two modes are one, fitted twice to make up for what is no mode, or one is no vibration."""
+    """Whether two modes coincide (fitted to something that is no mode), or one is no vibration."""
     order = np.argsort(fit.omega)
     omega, zeta = fit.omega[order], fit.zeta[order]
     near = np.diff(omega) < _TWINS * np.maximum(zeta[1:], zeta[:-1]) * omega[1:]
@@ -402,7 +402,7 @@ def _twins(fit: ModalFit) -> bool:
 
 
 def _apart(fit: ModalFit) -> Starts:
-    """The modes of a fit without the weaker of each two that are one."""
+    """Modes of a fit; of two that coincide only the stronger."""
     order = np.argsort(np.max(np.abs(fit.residues), axis=0))[::-1]
     kept: list[int] = []
     for index in order:
@@ -426,12 +426,12 @@ class Uncertainty:
     """Covariances of the modes of a window."""
 
     each: FloatArray  # (responses, m, 3, 3) of ln omega, ln zeta and the residue's real part
-    freedom: float  # independent samples, less the parameters
-    step: FloatArray  # (p, 2n) residual to parameters; for the scatter of hits
+    freedom: float  # independent samples minus parameters
+    step: FloatArray  # (p, 2n) maps residual to parameters; for the scatter of impacts
 
 
 def uncertainty_of(window: Window) -> Uncertainty:
-    """Covariances with the noise that is left and its correlation between lines."""
+    """Covariances from the residual noise and its correlation between lines."""
     fit, parts = window.fit, window.parts
     modes = len(fit.omega)
     counts = [jacobian.shape[1] - 2 * modes for jacobian in fit.jacobian]
@@ -476,7 +476,7 @@ def _correlated(columns: ComplexArray, correlation: ComplexArray) -> ComplexArra
 
 # --- poles by poly-reference least squares in the frequency domain (pLSCF), band by band -----------------------------
 
-_CIRCLE = 0.85  # share of the unit circle that a band is laid on
+_CIRCLE = 0.85  # fraction of the unit circle onto which a band is mapped
 _LINES_PER_ORDER, _MAX_ORDER, _MIN_ORDER, _MOST_POLE_DAMPING = 4, 24, 2, 0.3
 
 
@@ -518,7 +518,7 @@ def band_poles(parts: Sequence[Lines], low: float, high: float) -> list[Pole]:
             solved = scipy.linalg.lstsq(numerators[:size, :size], mixed[:size, :size], check_finite=False)[0]
             normal += denominators[:size, :size] - mixed[:size, :size].conj().T @ solved
         try:
-            # With the highest coefficient fixed, poles of noise come out unstable.
+            # With the highest coefficient fixed, noise poles are unstable.
             free = np.linalg.solve(normal[:-1, :-1], -normal[:-1, -1])
         except np.linalg.LinAlgError:
             continue

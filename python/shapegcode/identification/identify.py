@@ -1,4 +1,4 @@
-"""A tap test or a decay from its files to its modes: read, looked through, identified."""
+"""A tap test or a decay from files to modes: read, check, identify."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     from shapegcode.program import Program
 
 _LARGEST_MODEL = 99
-_OPTIONS = {"period_s": "sample_period", "exponential_window_s": "exponential_window"}  # where they are called else
+_OPTIONS = {"period_s": "sample_period", "exponential_window_s": "exponential_window"}  # options with another name
 _MIN_SAMPLES = 3
-_FIRST_STOPS, _STOP_LEFT = 4, 0.1  # with least motion; of a stop's energy that their modes may leave
+_FIRST_STOPS, _STOP_LEFT = 4, 0.1  # stops with least motion; largest residual energy ratio of a stop after their modes
 
 
 def identify(
@@ -66,33 +66,33 @@ def identify(
         response: what a sensor measured at these instants, shape (n,), in the unit of `quantity`. Read options are
             taken here too.
         force: of the hammer at these instants in N, shape (n,); None: a free decay.
-        options: what the files do not say.
+        options: information missing in the files.
         quantity: of `response`: "acceleration" in m/s², "velocity" in m/s or "displacement" in m.
         max_modes: largest number of modes; None: 40 over frequency, 8 over time.
-        modes: number of modes; None: chosen by evidence.
+        modes: number of modes; None: by information criterion.
         band_hz: lowest and highest frequency of interest; None: all.
-        start_s: time at which a decay begins; None: it is looked for.
-        stops: the records are of an ordinary run: every stop behind which the machine rests is a decay, the 20
-            strongest of each. What is slower than 10 Hz, or than the lower end of `band_hz`, is motion.
+        start_s: time at which a decay begins; None: found automatically.
+        stops: the records are of an ordinary run: every stop after which the machine rests is a decay, the 20
+            strongest of each. Motion slower than 10 Hz, or than the lower end of `band_hz` is no vibration.
         accepted_percent: a mode is refused whose damping ratio is less certain than this (95 %; of a fit over time its
             stiffness too); None: 5 % over time, 50 % over frequency.
-        sweep: the program that ran beside the sensor, of one axis, such as `write_sweep` writes: its command takes the
-            place of the force, start and clock of the logger are found from the record.
-        machine: whose controller ran it.
-        across: find what each mode moves along the other axes too: True: by other channels of the same files, which
-            state their axes (a sensor of three axes); or by other files or records, of hits at the same point.
-        strict: raise where no record can be used; False: the result says it, in `reason`.
+        sweep: the program that ran during the record and moves one axis, as from `write_sweep`: its command takes the
+            place of the force, the logger's start and clock error are found from the record.
+        machine: the machine whose controller ran it.
+        across: find the mode shapes along the other axes too: True: from other channels of the same files, which
+            state their axes (a triaxial sensor); or from other files or records, of impacts at the same point.
+        strict: raise if no record can be used; False: the reason is in the result's `reason`.
 
     Returns:
         The modes with their uncertainties, those that were refused and why, and how well they fit.
 
     Raises:
         ArgumentError: a number of modes that is not from 1 to 99; a sweep without its machine.
-        RecordError: no record can be used; what was found and what is needed. No response along another axis.
+        RecordError: no record can be used; the message gives the fault and the need. No response along another axis.
         OSError: a file cannot be read.
 
     Source: Back, Ko and Kim, 2003 (paper 003 in docs/evidence/references.md) for its ARMA models; the fit in
-    time, intervals and refusals are this project's.
+    the time domain, intervals and refusals are this project's.
     """
     for name, number in (("max_modes", max_modes), ("modes", modes)):
         if number is not None and not 1 <= number <= _LARGEST_MODEL:
@@ -110,10 +110,10 @@ def identify(
     if sweep is not None and (machine is None or response is not None):
         raise ArgumentError("a sweep needs the machine whose controller ran it, and files or records")
     if sweep is not None and not isinstance(across, bool):
-        raise ArgumentError("across: a sweep needs one record of all axes: the channels beside its own are taken")
+        raise ArgumentError("across: a sweep needs one record of all axes, whose other channels are used")
     options = options or ReadOptions()
     if sweep is not None and (stops or start_s is not None or options.ignore_force):
-        raise ArgumentError("a sweep beside a program has neither a start of a decay nor stops: leave them out")
+        raise ArgumentError("a sweep with its program has neither a start of a decay nor stops: omit them")
     found = _identified(
         sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is not False, strict=strict
     )
@@ -129,23 +129,23 @@ def _identified(
     start_s: float | None, sweep: Program | str | Path | None, machine: Machine | str | Path | None, *, stops: bool,
     across: bool, strict: bool,
 ) -> Identification:  # fmt: skip
-    """The modes along one axis; of a sweep what they move across too."""
+    """Modes along one axis; of a sweep also their mode shapes."""
     ready: Prepared | None = None
     band_hz = sought.band_hz
     try:
-        # The matrices are small: further threads of BLAS would wait for each other, up to twenty times as long.
+        # The matrices are small: several BLAS threads would wait for each other, up to twenty times as long.
         with threadpool_limits(limits=1, user_api="blas"):
             if sweep is not None and machine is not None:
-                # A simulated control, which no tap needs.
+                # Imported here: it simulates a control, which no tap needs.
                 from shapegcode.identification.known_command import find_modes_of_command, known_command
 
                 return find_modes_of_command(known_command(sweep, machine), sources, options, sought, across=across)
-            # A column that is named as a sensor's makes a capture the record of that sensor.
+            # A column named as a sensor's makes a capture a record of that sensor.
             files = [] if options.response_columns else [Path(each) for each in sources if isinstance(each, str | Path)]
             if captures := [each for each in files if is_capture(each)]:
                 _refuse_of_sensors(captures[0], options, start_s, stops=stops, across=across)
                 if len(captures) < len(sources):
-                    raise RecordError(f"{captures[0]}: a capture of command and encoder: other files go apart")
+                    raise RecordError(f"{captures[0]}: a capture of command and encoder: identify others separately")
                 return find_modes_of_captures(captures, options, sought)
             swept = _swept(sources, options)
             if swept is not None:
@@ -157,7 +157,7 @@ def _identified(
                 return find_frf_modes(responses, names, sought)
             if stops:
                 if start_s is not None:
-                    raise ArgumentError(f"start at {start_s:g} s: goes with one decay, --stops finds where each begins")
+                    raise ArgumentError(f"start at {start_s:g} s: is for one decay, --stops finds each start")
                 return _modes_of_stops(records, names, sought)
             ready = prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
             return _turned_if_opposed(ready, find_modes(ready, names, sought), sought)
@@ -179,7 +179,7 @@ def _refuse_of_sensors(
         if is_said:
             option = _OPTIONS.get(name, name).replace("_", "-")
             raise ArgumentError(
-                f"{capture}: a capture of command and encoder, in which --{option} changes nothing: it goes with the "
+                f"{capture}: a capture of command and encoder, for which --{option} has no effect: it is for the "
                 "record of a sensor (--response-column names one in a CSV)"
             )
 
@@ -187,7 +187,7 @@ def _refuse_of_sensors(
 def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: bool = False) -> None:
     for option, is_said in (("--stops", stops), ("--start", start_s is not None), ("--across", across)):
         if is_said:
-            raise ArgumentError(f"{what}, in which {option} changes nothing: it goes with the record of a tap or decay")
+            raise ArgumentError(f"{what}, for which {option} has no effect: it is for the record of a tap or decay")
 
 
 def _turned_if_opposed(ready: Prepared, found: Identification, sought: model_search.Sought) -> Identification:
@@ -216,15 +216,15 @@ def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record
 
 
 def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: model_search.Sought) -> Identification:
-    """Modes of the stops of ordinary runs with least motion in them, then of all that these explain."""
+    """Modes of the stops with least motion of ordinary runs, then of all stops that these modes explain."""
     forced = [record for record in records if record.force_n is not None]
     if forced:
-        raise ArgumentError(f"{forced[0].source}: holds a force: stops are looked for in a run without a hammer")
+        raise ArgumentError(f"{forced[0].source}: contains a force: stops are searched in a run without a hammer")
     lowest_hz, highest_hz = sought.band_hz or (None, None)
     stops = [stop for record in records for stop in split_stops(record, lowest_hz)]
     if not stops:
         raise RecordError(
-            f"{records[0].source}: no stop behind which the machine rests for a third of a second and its vibration "
+            f"{records[0].source}: no stop after which the machine rests for a third of a second and its vibration "
             "falls to a third: needed is a run with pauses, such as dwells, or the decay after one stop"
         )
     ready = prepare(stops, band_hz=highest_hz)
@@ -259,7 +259,7 @@ def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quanti
 
 
 def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
-    """The record of a resonance sweep, if that is what the file holds; None: it is anything else."""
+    """The record of a resonance sweep; None if the file holds anything else."""
     found = []
     for path in [Path(each) for each in sources if isinstance(each, str | Path)]:
         if path.is_file():
@@ -272,29 +272,29 @@ def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
     return read_sweep(found[0], options)
 
 
-_FEW_MODES, _MORE, _START_DAMPING = 4, 2, 0.02  # that are fitted over time; beyond those that are seen at once
-_SAMPLES_IN_TIME = 20_000  # of all records together; more take too long
-_EXPLAINED, _NOISE_SHARE = 0.003, 1.5  # of the record's RMS that few modes may leave; or times its noise
-_MANY = "many modes, or more than modes: fitted over frequency, band by band, in what the hits excite"
-_COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which they are not taken for white
+_FEW_MODES, _MORE, _START_DAMPING = 4, 2, 0.02  # most modes fitted over time; more than those visible in the spectrum
+_SAMPLES_IN_TIME = 20_000  # most samples of all records for a fit over time
+_EXPLAINED, _NOISE_SHARE = 0.003, 1.5  # largest residual of few modes, relative to the record's RMS, or to its noise
+_MANY = "many modes, or more than modes: fitted over frequency, band by band, within the excited band"
+_COLOURED = 4.0  # residuals count as coloured above so many standard errors of their autocorrelation
 _SPECTRUM = 4096  # points of the force's transform
 _FOLDED = 2.0 / 3.0
-_FILTER_ERROR = 3e-4  # what thinning out may do to a mass: the filters let 80 dB less pass
+_FILTER_ERROR = 3e-4  # largest error of a mass by decimation: the filters stop 80 dB
 _FILTER_MOVES = (1e-6, 1e-4)  # ... and to a frequency and a damping ratio
-_FINER = 16  # steps of the check by Wilson's method in a sampling period
-_POSSIBLY = 15.0  # by so much (twice the logarithm of the odds) another course of the force may be less evident
+_FINER = 16  # steps per sampling period of the check by Wilson's method
+_POSSIBLY = 15.0  # allowed loss of evidence (twice the log odds) of another intersample course of the force
 
 
 def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sought) -> Identification:
-    """Find the modes that checked records of the same point support; see `identify.identify`."""
+    """Find the modes supported by checked records of the same point; see `identify.identify`."""
     problem = problem_of(ready, sought.band_hz, within=sought.modes is not None)
     windowed = sought.exponential_window_s is not None
     if windowed and problem.forces is None:
         raise RecordError(
-            "an exponential window of a free decay cannot be told from its damping: state it with the force"
+            "an exponential window of a free decay cannot be separated from its damping: state it with the force"
         )
     if problem.forces is not None and (windowed or (sought.modes is None and not are_blows(ready))):
-        # Over frequency all are cut to the shortest.
+        # In the frequency domain all are cut to the shortest.
         longest = max(len(record.response) for record in ready.records)
         short = [each for each in ready.usable if 2 * len(each.record.response) < longest]
         long = ready.without(short, "shorter than half of the longest record")
@@ -312,13 +312,13 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sou
 
 
 def _few(ready: Prepared, problem: FitProblem, many: FrfModes, narrow: bool) -> int | None:
-    """Number of modes that explain the whole record to its noise, if a fit over time is best for so few."""
+    """Number of modes that explain the records down to the noise, if few enough for a fit over time; else None."""
     supported = [mode for mode in many.modes if not mode.refusal]
     starts = [(2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in supported]
     power = np.mean([np.mean(record.response**2) for record in ready.records])
     noise = np.mean([(each.response_noise or 0.0) ** 2 for each in ready.usable]) / power
     limit = max(_EXPLAINED**2, _NOISE_SHARE**2 * noise)
-    # A model in time would take what oscillates throughout for modes.
+    # A fit over time would take a steady oscillation for a mode.
     if many.steady or (problem.samples > _SAMPLES_IN_TIME and (starts or narrow)):
         return None
     quick: Fit | None = None
@@ -355,26 +355,26 @@ def _many(ready: Prepared, files: tuple[str, ...], many: FrfModes, fitted: Seque
 
 
 def _warnings_of(ready: Prepared) -> list[str]:
-    """What the user should know of the records, those that are not used too."""
+    """Warnings of the records, including those not used."""
     return [*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)]
 
 
 def _choose_course(
     problem: FitProblem, models: model_search.Search, sought: model_search.Sought
 ) -> tuple[FitProblem, model_search.Search, list[Fit]]:
-    """The course of the force between its samples for which the data speak, and fits of what else it may have been."""
+    """Choose the intersample course of the force by evidence; also returns fits of the other possible courses."""
     courses = [(problem, models)]
     order = max(sought.order(models), 1)
     for other in problem.other_courses(models.fits[order - 1]):
         fits = tuple(other.fit(model_search.starts_of(fit)) for fit in models.fits[:order])
         evidence = tuple(model_search.evidence_of(other, fit) for fit in fits)
-        # The search is worth its time only where it may win: a wrong course asks for modes of its own.
+        # Search only where another course may win: a wrong course needs extra modes.
         may_win = min(evidence) < min(models.evidence)
         courses.append((other, model_search.search(other, sought) if may_win else model_search.Search(fits, evidence)))
     best = min(courses, key=lambda course: min(course[1].evidence))
     least = min(best[1].evidence)
     starts = model_search.starts_of(best[1].fits[max(sought.order(best[1]), 1) - 1])
-    # A record that begins within the pulse does not tell half of the momentum from the whole.
+    # A record that begins within the pulse cannot show whether half of the impulse is missing.
     in_pulse = problem.starts_in_pulse and best[0].hold != "impulse"
     possible = [other for other, searched in courses if in_pulse or min(searched.evidence) < least + _POSSIBLY]
     others: list[Fit] = [other.fit(starts) for other in possible if other is not best[0]]
@@ -416,8 +416,8 @@ def _result(
     if coloured:
         fit = problem.fit(model_search.starts_of(fit), coloured=True)
         warnings.append(
-            f"what the model leaves is no white noise (autocorrelation {fit.residual_autocorrelation:.2f}): the "
-            "intervals allow for it; other causes than modes, or a mode that is not linear"
+            f"the model residual is not white noise (autocorrelation {fit.residual_autocorrelation:.2f}): the "
+            "intervals allow for it; causes are other disturbances, or a nonlinear mode"
         )
     white_share = 1.0 / max(record.widened for record in ready.records) ** 2 if coloured else problem.white_share
     doubts = model_search.Doubts(
@@ -438,7 +438,7 @@ def _result(
         fit_percent=100.0 * (1.0 - left),
         noise_rms=float(np.sqrt(fit.sum_of_squares / (fit.samples - fit.parameters))),
         mass_check=_mass_check(problem, fit),
-        doubt=f"the model explains {100.0 * (1.0 - left):.0f} % of the response only"
+        doubt=f"the model explains only {100.0 * (1.0 - left):.0f} % of the response"
         if coloured and left > POOR
         else "",
         warnings=tuple(warnings),
@@ -449,20 +449,20 @@ def _result(
 def _thinned_note(ready: Prepared, problem: FitProblem, band_hz: tuple[float, float] | None) -> list[str]:
     if problem.thinned is None:
         return []
-    rates = f"{1.0 / ready.records[0].period_s:.6g} samples per second are thinned out to {1.0 / problem.period_s:.6g}"
+    rates = f"{1.0 / ready.records[0].period_s:.6g} samples per second are decimated to {1.0 / problem.period_s:.6g}"
     if band_hz is not None:
         return [
-            f"{rates}, which the band up to {band_hz[1]:g} Hz and what stands out of the response above it need, "
-            "behind one filter for force and response"
+            f"{rates}, enough for the band up to {band_hz[1]:g} Hz and response peaks above it, "
+            "with one filter for force and response"
         ]
     return [
-        f"{rates}, behind one filter for force and response: above {problem.band_hz[1]:.4g} Hz the hit excites little "
-        "and nothing stands out of the response (--frequencies LOW:HIGH states another band)"
+        f"{rates}, with one filter for force and response: above {problem.band_hz[1]:.4g} Hz the impact excites little "
+        "and the response has no peak (--frequencies LOW:HIGH states another band)"
     ]
 
 
 def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
-    """Share of the force's spectrum at a frequency that may have been folded down from above half the sampling rate."""
+    """Fraction of the force's spectrum at a frequency that may be aliased from above half the sampling rate."""
     is_simulated = problem.force_noise_n == 0.0 and problem.hold != "band_limited"
     record = ready.records[0]
     least = 0.0 if problem.thinned is None else _FILTER_ERROR
@@ -473,7 +473,7 @@ def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
     share = np.fft.rfftfreq(_SPECTRUM)
     highest = float(np.sqrt(np.mean(spectrum[share > HIGHEST_SHARE] ** 2)))
     noise = (ready.usable[0].force_noise_n or 0.0) * np.sqrt(len(pulse))
-    # A half sine falls with the square of the frequency: two thirds of it fold down from both sides of the rate.
+    # A half sine falls with the square of the frequency: two thirds of it alias from both sides of the rate.
     folded = _FOLDED * np.sqrt(max(highest**2 - 2.0 * noise**2, 0.0))
 
     def at(frequency_hz: float) -> float:
@@ -484,7 +484,7 @@ def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
 
 
 def _alone(problem: FitProblem, fit: Fit) -> list[Fit]:
-    """The same modes fitted to each record by itself; none if there is but one, or a record does not hold them."""
+    """The same modes fitted to each record alone; none if there is only one, or a record lacks a mode."""
     count = len(problem.responses)
     try:
         return [problem.record(index).fit(model_search.starts_of(fit)) for index in range(count if count > 1 else 0)]
@@ -504,7 +504,7 @@ def _mass_check(problem: FitProblem, fit: Fit) -> MassCheck | None:
 
 
 def _finer(signal: FloatArray, hold: str) -> FloatArray:
-    """A signal with more samples: straight between its samples, or band-limited."""
+    """Upsample a signal: straight between its samples, or band-limited."""
     if hold == "band_limited":
         return np.asarray(resample_poly(signal, _FINER, 1), dtype=np.float64)
     places = np.arange(len(signal) * _FINER) / _FINER

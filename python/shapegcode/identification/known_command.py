@@ -1,7 +1,7 @@
-"""Modes from the record of any accelerometer during a program whose command is known.
+"""Modes from any accelerometer's record during a program with known command.
 
-But for a smooth lag of the drive the sensor shows the command's acceleration times 1 - sum of G s²/(s² + 2 zeta omega s
-+ omega²). Start and clock of the logger, and the waits of the control, are found from the record, part by part.
+Apart from a smooth drive lag the sensor shows the commanded acceleration times 1 - sum of G s²/(s² + 2 zeta omega s
++ omega²). The logger's start and clock and the control's waits are found from the record, part by part.
 """
 
 from __future__ import annotations
@@ -32,40 +32,40 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 
-_CLOCK = 0.025  # the logger's clock may be off by this share
+_CLOCK = 0.025  # largest relative error of the logger's clock
 _COARSE_STEP, _FINE_STEP = 0.001, 5e-4
-_FURTHEST_RATE, _EXACT_RATE = 0.003, 3e-6  # from the one that is found below 40 Hz
-_LONGEST_WAIT_S, _WAIT_STEP_S = 0.21, 0.015  # that a part of the program lasts longer or shorter than simulated
-_WAIT_GRID_S = np.arange(-0.025, 0.025, 2.5e-4)  # about the one that is found below 40 Hz
+_FURTHEST_RATE, _EXACT_RATE = 0.003, 3e-6  # largest change from the rate found below 40 Hz; tolerance
+_LONGEST_WAIT_S, _WAIT_STEP_S = 0.21, 0.015  # largest difference of a part's duration from the simulated one; step
+_WAIT_GRID_S = np.arange(-0.025, 0.025, 2.5e-4)  # around the wait found below 40 Hz
 _TOLD_WAIT_S, _NEAR_S = 0.005, 0.03
-_CLOCK_KNOWN, _CLOCK_HZ = 3e-4, 150.0  # of a frequency, 95 %; the clock is refined by the lines below
-_COARSE_HZ = 40.0  # start and clock are first looked for in what lies below
-_AFTER_S, _RINGS_S = 3.0, 2.0  # of the record behind the last part; that a part needs behind it, or up to the next
+_CLOCK_KNOWN, _CLOCK_HZ = 3e-4, 150.0  # relative, 95 %; highest line that refines the clock
+_COARSE_HZ = 40.0  # start and clock are first searched below this frequency
+_AFTER_S, _RINGS_S = 3.0, 2.0  # of record after the last part; needed after a part unless the next follows
 _OVER_HALF = 2.5  # samples per cycle of the highest line
-_LONGEST_LAG_S = 0.02  # of a part against the others
-_IRREGULAR_S = 0.008  # of what is between a rise and its fall
-_LAST_LAG_S = 0.004  # less than half a cycle of the highest strokes
+_LONGEST_LAG_S = 0.02  # largest lag of a part relative to the others
+_IRREGULAR_S = 0.008  # irregularity of the time between a rise and its fall
+_LAST_LAG_S = 0.004  # below half a cycle of the fastest moves
 _LAG_STEP_S = 5e-4
-_UNLIKELY = 0.3  # of a correlation, that a part is the longest lag away
-_EXPLAINED = 0.5  # share of a part's power that the others must explain
+_UNLIKELY = 0.3  # weight of a correlation at the longest lag
+_EXPLAINED = 0.5  # least fraction of a part's power explained by the others
 _FEWEST_PARTS = 2
 _LOWEST_HZ, _NARROWEST = 4.0, 8.0  # lowest line; highest line over it
-_HELD = 0.002  # share of samples at an end of the range that stand beside another one
-_LOUD, _QUIET, _LEVELLED_HZ = 0.1, 0.01, 1.0  # of the loudest part: below 40 Hz
+_HELD = 0.002  # fraction of samples at a range end with an equal neighbour
+_LOUD, _QUIET, _LEVELLED_HZ = 0.1, 0.01, 1.0  # energy of a used part over the loudest; floor and width of levelling
 _SAME_START_S, _AWAY_S, _STANDS_OUT = 0.15, 0.5, 2.0
 _GAINS_PER_S = np.geomspace(10.0, 200.0, 14)
-_LOWEST_SHARE = 0.15  # of the power of the command
-_CORRELATED = 0.25  # squared correlation of a part, below 40 Hz
-_OWN = 0.1  # of the largest line of a part, in power
+_LOWEST_SHARE = 0.15  # relative to the power of the command
+_CORRELATED = 0.25  # least squared correlation of a part, below 40 Hz
+_OWN = 0.1  # relative to the largest line of a part, in power
 _LAGS_S = np.arange(-0.1, 0.1, 2.5e-4)
 
 
 @dataclass(frozen=True, eq=False)
 class KnownCommand:
-    """What a program commands one axis."""
+    """Commanded motion of one axis by a program."""
 
     source: str  # of the program
-    axis: str  # "x", "y" or "z": the one that moves
+    axis: str  # "x", "y" or "z": the axis that moves
     times_s: FloatArray  # (n,) instants of the set-points
     kicks: FloatArray  # (n,) change of speed at each of them, m/s
     parts: tuple[tuple[float, float], ...]  # begin and end of each part between rests, s
@@ -82,7 +82,7 @@ class KnownCommand:
 
 
 def known_command(program: str | Path | Program, machine: Machine | str | Path) -> KnownCommand:
-    """The command of the axis that a program shakes, as the machine's controller makes it."""
+    """Simulated command of the axis that a program shakes, on the machine's controller."""
     machine = Machine.of(machine)
     if not isinstance(program, Program):
         program = Program.read(program, machine)
@@ -90,7 +90,7 @@ def known_command(program: str | Path | Program, machine: Machine | str | Path) 
     moved = np.ptp(positions, axis=0)
     axis = int(np.argmax(moved))
     if not moved[axis] > 0.0:
-        raise RecordError(f"{program.source}: nothing moves: needed is the program that ran beside the logger")
+        raise RecordError(f"{program.source}: nothing moves: needed is the program that ran during the record")
     others = [f"{'XYZ'[k]} by {moved[k]:.3g} mm" for k in range(3) if k != axis and moved[k] > 0.0]
     if others:
         raise RecordError(
@@ -107,11 +107,11 @@ def known_command(program: str | Path | Program, machine: Machine | str | Path) 
 def find_modes_of_command(
     command: KnownCommand, sources: Sequence[str | Path | Record], options: ReadOptions, sought: Sought, *, across: bool
 ) -> Identification:
-    """Find the modes in records of a known command; with `across` their motion along the sensor's other axes, too."""
+    """Find the modes in records of a known command; with `across` also shapes along the sensor's other axes."""
     if options.axis not in (None, command.axis):
         raise RecordError(
-            f"axis {options.axis.upper()} is asked for, {command.source} moves {command.axis.upper()}: leave the axis "
-            "out, that of the sensor is found from the record"
+            f"axis {options.axis.upper()} is asked for, {command.source} moves {command.axis.upper()}: omit the axis, "
+            "the sensor's is found from the record"
         )
     options = replace(options, axis=None)
     aligned = [_aligned(command, source, options, sought.band_hz, across=across) for source in sources]
@@ -124,19 +124,19 @@ def find_modes_of_command(
         others = [_between(one, max(ends[0]), min(ends[1])) for each in aligned for one in each.others]
         found = with_moves(found, others)
     modes = []
-    for mode in found.modes:  # the interval of the frequency holds how well the logger's clock is found
+    for mode in found.modes:  # the frequency interval includes the uncertainty of the logger's clock
         known, own = mode.frequency_hz, _CLOCK_KNOWN * mode.frequency_hz.value
         below, above = np.hypot((known.value - known.low, known.high - known.value), own)
         modes.append(replace(mode, frequency_hz=Estimate(known.value, known.value - below, known.value + above)))
     rate = min(1.0 / each.record.period_s for each in aligned)
-    looked = f"looked at from {lines[0]:.0f} to {lines[-1]:.0f} Hz; {rate:.0f} samples per second reach "
+    looked = f"searched from {lines[0]:.0f} to {lines[-1]:.0f} Hz; {rate:.0f} samples per second reach "
     notes = (*(note for each in aligned for note in each.notes), f"{looked}{rate / _OVER_HALF:.0f} Hz")
     found = replace(found, modes=tuple(modes))
     return as_sweep(found, notes, first.source, len(first.response), first.period_s, command.source)
 
 
 def _between(each: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyResponse:
-    """The lines that all records have."""
+    """Lines common to all records."""
     inside = (each.frequency_hz >= low_hz) & (each.frequency_hz <= high_hz)
     assert each.coherence is not None
     lines, coherence = each.response[inside], each.coherence[inside]
@@ -146,16 +146,16 @@ def _between(each: FrequencyResponse, low_hz: float, high_hz: float) -> Frequenc
 @dataclass(frozen=True, eq=False)
 class _Aligned:
     record: Record
-    response: FrequencyResponse  # minus the acceleration over that of the command
+    response: FrequencyResponse  # ratio −acceleration/commanded acceleration
     notes: tuple[str, ...]
-    others: tuple[FrequencyResponse, ...] = ()  # the same of the sensor's other axes
+    others: tuple[FrequencyResponse, ...] = ()  # responses of the sensor's other axes
 
 
 def _aligned(
     command: KnownCommand, source: str | Path | Record, options: ReadOptions, band_hz: tuple[float, float] | None, *,
     across: bool,
 ) -> _Aligned:  # fmt: skip
-    """The record of a file that goes with the command, on the program's time."""
+    """Align the record of a file with the command, on the program's time."""
     records = [source] if isinstance(source, Record) else read_records(source, replace(options, ignore_force=True))
     clocks = [_Clock(command, record) for record in records]
     named = [clock for clock in clocks if clock.record.axis == command.axis] if across else []
@@ -165,14 +165,14 @@ def _aligned(
 
 
 def _held_at_ends(values: FloatArray) -> bool:
-    """Whether the largest or smallest value is repeated for several samples, more than once."""
+    """Whether the maximum or minimum is held for several samples, more than once."""
     ends = [end for end in (np.max(values), np.min(values)) if abs(end - np.median(values)) > 0.0]
     beside = (np.diff(np.flatnonzero(values == end)) == 1 for end in ends)
     return any(np.count_nonzero(each) > _HELD * len(values) for each in beside)
 
 
 class _Clock:
-    """A record; about the middle of each part, program time = middle + (logger's time - its place) * (1 + rate)."""
+    """Clock of a record; near a part's middle, program time = middle + (logger's time - its place) * (1 + rate)."""
 
     def __init__(self, command: KnownCommand, record: Record) -> None:
         if record.quantity != "acceleration":
@@ -186,8 +186,8 @@ class _Clock:
             )
         if len(command.parts) < _FEWEST_PARTS:
             raise RecordError(
-                f"{command.source}: moves without a rest of {REST_S:g} s or more: needed are {_FEWEST_PARTS} parts "
-                "with such a rest between them, as shapegcode sweep writes them"
+                f"{command.source}: has no rest of {REST_S:g} s or more: needed are {_FEWEST_PARTS} parts "
+                "separated by such rests, as from shapegcode sweep"
             )
         duration, needed = len(record.response) * record.period_s, command.parts[1][1]
         if duration < needed - command.parts[0][0]:
@@ -206,11 +206,11 @@ class _Clock:
         self.middles = np.array([np.mean(each) for each in self.windows])
         self.rate, start_s, self.wait_s, self.shares = self._coarse()
         late = self.wait_s * np.arange(len(self.windows))
-        self.places_s = (self.middles + start_s + late) / (1.0 + self.rate)  # of the middles, by the logger's clock
+        self.places_s = (self.middles + start_s + late) / (1.0 + self.rate)  # of the middles, on the logger's clock
         self.correlation = float(np.mean(self.shares))
 
     def _coarse(self) -> tuple[float, float, float, FloatArray]:
-        """Rate, start, wait, squared correlation of each part, by what lies below 40 Hz and 40 % of the sampling."""
+        """Rate, start, wait, squared correlation of each part; from below 40 Hz and 40 % of the sampling rate."""
         command, period = self.command, self.record.period_s
         thinner = max(1, int(0.4 / period / _COARSE_HZ))
         values = resample_poly(self.values, 1, thinner)
@@ -220,7 +220,7 @@ class _Clock:
         energy = np.array([np.sum(np.abs(smooth[part]) ** 2) for part in inside])
         used = np.flatnonzero(energy > _LOUD * energy.max())
         size = 1 << int(np.ceil(np.log2(len(values) + len(smooth) * (times[1] - times[0]) / step + 1)))
-        # A mode that rings for long would be most of the record: every frequency counts alike.
+        # Weight every frequency alike, since a long-ringing mode would dominate the record.
         spectrum = np.fft.fft(values, size)
         level = uniform_filter1d(np.abs(spectrum), max(1, round(_LEVELLED_HZ * size * step)), mode="wrap")
         hertz = np.abs(np.fft.fftfreq(size, step))
@@ -238,7 +238,7 @@ class _Clock:
                 at = begin + every * np.arange(int((end - begin) / every))
                 wave = np.interp(at, times, smooth.real) + 1j * np.interp(at, times, smooth.imag)
                 found = np.abs(np.fft.ifft(spectrum * np.conj(np.fft.fft(wave, size)))) ** 2
-                # Behind the end it begins again: a part that began before the record.
+                # The correlation is circular: indices past the end are parts that began before the record.
                 ends = np.arange(size) + len(at)
                 own = power[np.minimum(ends, size)] - power[:size] + power[np.maximum(ends - size, 0)]
                 own = np.maximum(own, _QUIET * float(np.max(own)))
@@ -261,7 +261,7 @@ class _Clock:
         return best[1:]
 
     def aligned(self, band_hz: tuple[float, float] | None, chosen: bool, others: Sequence[Record]) -> _Aligned:
-        """Minus the response over the command, with start and clock found; and of others on the same clock."""
+        """Ratio −response/command with start and clock found; also for others on the same clock."""
         rows = self._recorded(self._clear_parts(), _FEWEST_PARTS)
         clear = np.isin(np.arange(len(self.windows)), rows)
         spectra = self._spectra(None)
@@ -279,16 +279,16 @@ class _Clock:
         if np.min(explained) < _EXPLAINED:
             percent = 100 * max(np.min(explained), 0.0)
             raise RecordError(self._no_relation(f"parts of the program explain {percent:.0f} % of another"))
-        # Those of which the other of their two is there: else ringing is cut off, or another's.
+        # Keep complete pairs: otherwise ringing is cut off, or belongs to another part.
         alone = len(self.windows) - 1 if len(self.windows) % 2 else -1
         rows = self._recorded(rows[np.isin(rows ^ 1, rows) | (rows == alone)], 1)
         if len(rows) > 1:
-            self._refine(rows, _FINE_STEP)  # without those that did not go with the others
+            self._refine(rows, _FINE_STEP)  # without the parts that did not match the others
         spectra = self._spectra(None)
         lags = _lags(spectra.of(rows), rows)
         notes = self._notes(rows)
         if chosen:
-            notes.append(f"{self.record.source}: of the axes of the sensor this one goes with the command best")
+            notes.append(f"{self.record.source}: this axis of the sensor matches the command best")
         used = spectra.of(rows).late(lags).in_twos(rows)
         response = self._response(used)
         inside, beside = np.isin(used.hertz, response.frequency_hz), []
@@ -296,7 +296,7 @@ class _Clock:
             clock = copy(self)
             clock.record, clock.values = other, other.response - np.mean(other.response)
             of_other = clock._spectra(None).of(rows).late(lags).in_twos(rows)
-            # Delay, lag and sign that were taken out of the one are taken out of the other.
+            # Delay, lag and sign removed from the first are removed from the others too.
             lines = response.response * (of_other.ratio() / used.ratio())[inside]
             beside.append(replace(response, source=other.source, response=lines, axis=other.axis))
         if band_hz is not None:
@@ -320,9 +320,9 @@ class _Clock:
         begins, ends = np.array(self.windows).T
         hertz = np.arange(max(low, _LOWEST_HZ), high, 0.5 / np.max(ends - begins))
         rows = np.arange(len(self.windows)) if rows is None else rows
-        before = self.places_s * stretch - self.middles  # of the program time of each part in the record
+        before = self.places_s * stretch - self.middles  # logger's minus program time of each part
         first = np.ceil((begins + before) / period).astype(int)
-        last = np.append(first[1:], np.ceil((ends[-1] + before[-1]) / period).astype(int))  # A window ends at the next
+        last = np.append(first[1:], np.ceil((ends[-1] + before[-1]) / period).astype(int))  # a window ends at the next
         first, last = np.maximum(first, 0)[rows], np.minimum(last, len(self.values))[rows]
         parts = [self.values[each:end] for each, end in zip(first, last, strict=True)]
         parts = [each - np.mean(each) if len(each) else each for each in parts]
@@ -341,7 +341,7 @@ class _Clock:
         return rows
 
     def _recorded(self, rows: npt.NDArray[np.intp], fewest: int) -> npt.NDArray[np.intp]:
-        """Those of the parts that the record holds from their begin until they rang down, or the next one begins."""
+        """Parts recorded from their start until they rang down, or until the next one begins."""
         begins, ends = np.array(self.windows).T
         until = np.minimum(ends, np.array(self.command.parts)[:, 1] + _RINGS_S)
         first, last = (self.places_s + (each - self.middles) / (1.0 + self.rate) for each in (begins, until))
@@ -350,7 +350,7 @@ class _Clock:
         if len(inside) < fewest:
             raise RecordError(
                 f"{self.record.source}: no two parts of {self.command.source} (1 and 2, 3 and 4, ...) are both in the "
-                f"record as commanded, from the begin of the first to {_RINGS_S:g} s behind the second: needed is one "
+                f"record as commanded, from the start of the first to {_RINGS_S:g} s after the second: needed is one "
                 "such pair, a rise and fall of a sweep"
             )
         return inside
@@ -364,15 +364,15 @@ class _Clock:
         )
 
     def _refine(self, rows: npt.NDArray[np.intp], furthest: float) -> None:
-        """Find the rate for which each part agrees best with the next, wherever that begins, and the wait between."""
+        """Find the rate at which each part agrees best with the next, whose start is free, and the wait between."""
         band_hz = _LOWEST_HZ, _CLOCK_HZ
 
-        def shares(rate: float) -> Spectra:  # the response times the conjugate of the command, of all parts' power
+        def shares(rate: float) -> Spectra:  # response times conjugate command, over the power of all parts
             spectra = self._spectra(band_hz, rate, rows)
             share = np.conj(spectra.command) * spectra.response / np.sqrt(np.maximum(spectra.power, 1e-300))
             return replace(spectra, response=share)
 
-        def missed(rate: float) -> float:  # minus the power on which neighbours agree
+        def missed(rate: float) -> float:  # minus the power common to neighbours
             spectra = shares(rate)
             both = np.conj(spectra.response[:-1]) * spectra.response[1:]
             agreed = (both @ np.exp(spectra.turn[:, None] * _WAIT_GRID_S)).real
@@ -398,39 +398,39 @@ class _Clock:
         ]
         if abs(waits) > _TOLD_WAIT_S:
             notes.append(
-                f"each part of the program with the rest behind it takes {1e3 * abs(waits):.0f} ms "
+                f"each part of the program with the rest after it takes {1e3 * abs(waits):.0f} ms "
                 f"{'longer' if waits > 0.0 else 'less'} than simulated: the control's ramps or waits are not those of "
-                "the machine file, on which the modes do not rest; or the override was not 100 %, and frequencies are "
-                "off by as much"
+                "the machine file, which does not affect the modes; or the override was not 100 %, and frequencies are "
+                "wrong by as much"
             )
         missing = sorted(set(range(len(self.windows))) - set(rows.tolist()))
         if missing:
             begin = self.windows[missing[0]][0]
             what = f"in {len(missing)} of {len(self.windows)} parts"
-            cause = "little of it was recorded, or the control does not move as its machine file says"
+            cause = "little of it was recorded, or the control does not move as in its machine file"
             if missing == list(range(missing[0], len(self.windows))):
                 what = f"from {begin:.1f} s on"
                 cause = (
                     "feed hold, another override, a jump of the logger's clock, a short record, or too little motion"
                 )
-            notes.append(f"{what} the record does not go with the program ({cause}): not used")
+            notes.append(f"{what} the record does not match the program ({cause}): not used")
         return [f"{self.record.source}: {note}" for note in notes]
 
     def _response(self, spectra: Spectra) -> FrequencyResponse:
-        """Minus the response over the command where the command excites and parts agree."""
+        """Ratio −response/command at the lines that the command excites and on which the parts agree."""
         used, coherence = spectra.coherent()
         if np.count_nonzero(used) < FEWEST_LINES:
             raise RecordError(self._no_relation("no line is coherent with the command"))
         power = spectra.power
         hertz, ratio, coherence = spectra.hertz[used], spectra.ratio()[used], coherence[used]
-        # What is left of a delay and the lag of a position loop, by all lines: those that bring phases best together.
+        # Residual delay and position-loop lag, from all lines: the values that align the phases best.
         turn, turns = 2j * np.pi * hertz, np.exp(2j * np.pi * hertz * _LAGS_S[:, None])
         loops = [np.ones(len(hertz), dtype=np.complex128), *(1.0 + turn / gain for gain in _GAINS_PER_S)]
         sums = [np.abs(turns @ (ratio * loop / np.abs(ratio * loop))) for loop in loops]
         ratio = ratio * loops[int(np.argmax([np.max(each) for each in sums]))]
         unit = ratio / np.abs(ratio)
         best = turns[int(np.argmax(np.abs(turns @ unit)))]
-        # The sign of the sensor, by the lowest lines: there the axis moves as one.
+        # Sign of the sensor from the lowest lines, where the axis moves as a rigid body.
         power = power[used]
         lowest = np.cumsum(power) <= _LOWEST_SHARE * np.sum(power)
         ratio = ratio * best * (np.sign(np.sum((unit * best * power)[lowest].real)) or 1.0)
@@ -439,7 +439,7 @@ class _Clock:
 
 
 def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
-    """Parts that are clear, or correlate with their command best where they should be and stand out or are between."""
+    """Parts that are clear, or correlate best at their expected place and are significant or lie between such."""
     lags = np.linspace(-_AWAY_S, _AWAY_S, 401)
     crossed = spectra.response * np.conj(spectra.command)
     height = np.abs(crossed @ np.exp(spectra.turn[:, None] * lags))
@@ -451,7 +451,7 @@ def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.
 
 
 def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
-    """By how much the response of each part is later than the others say, s."""
+    """Delay of each part's response relative to the prediction of the others, s."""
     power = np.abs(spectra.command) ** 2
     own = power > _OWN * np.max(power, axis=1, keepdims=True)
     each = [np.array([part]) for part in range(len(rows))]
@@ -464,8 +464,8 @@ def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
         return lags
 
     lags = moved(np.zeros(len(rows)), each, _LONGEST_LAG_S)
-    # A rise outweighs the harmonics of the other parts in the band of its fall, and tells what is between the two; the
-    # median of that goes to all parts first. Then both are moved together: each would hold the other where it is.
+    # A rise dominates the other parts' harmonics in the band of its fall and determines the time between the two; all
+    # parts first get the median of that. Then both move together: alone, each would be kept in place by the other.
     between = [lags[pair[1]] - lags[pair[0]] for pair in pairs if len(pair) > 1]
     lags = np.asarray((float(np.median(between)) if between else 0.0) * (rows - np.mean(rows)), dtype=np.float64)
     lags = moved(lags, each, _IRREGULAR_S)
@@ -475,14 +475,14 @@ def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
 
 
 def _lag(spectra: Spectra, block: npt.NDArray[np.intp], own: npt.NDArray[np.bool_], longest_s: float) -> float:
-    """By how much the response of some parts is later than the others say, s; 0 where these do not explain it."""
+    """Delay of some parts' response relative to the prediction of the others, s; 0 if these do not explain it."""
     others = spectra.of(np.setdiff1d(np.arange(len(own)), block)).ratio() * spectra.command[block]
     expected, response = (np.where(own[block], each, 0.0) for each in (others, spectra.response[block]))
     whole = float(np.sqrt(np.sum(np.abs(expected) ** 2) * np.sum(np.abs(response) ** 2)))
     crossed = np.sum(response * np.conj(expected), axis=0) / max(whole, 1e-300)
 
     def missed(lag: float) -> float:
-        """A cycle away the highest parts correlate nearly as well: the shorter lag is the likelier one."""
+        """Cost of a lag; the fastest parts correlate nearly as well one cycle away, so shorter lags are preferred."""
         unlikely = _UNLIKELY * (lag / _LONGEST_LAG_S) ** 2
         return unlikely - float(np.sum((crossed * np.exp(spectra.turn * lag)).real))
 
@@ -494,7 +494,7 @@ def _lag(spectra: Spectra, block: npt.NDArray[np.intp], own: npt.NDArray[np.bool
 
 
 def _explained(spectra: Spectra) -> FloatArray:
-    """Share of the power of each part, where the command has most of its own, that the other parts explain."""
+    """Fraction of each part's power, at its own strongest lines, that the other parts explain."""
     found, rows = [], np.arange(len(spectra.command))
     for row in rows:
         others = spectra.of(rows[rows != row])

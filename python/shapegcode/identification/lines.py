@@ -1,4 +1,4 @@
-"""Lines of frequency responses: of hits behind an exponential window, of measured responses with their noise."""
+"""Lines of frequency responses: of impacts with an exponential window, of measured responses with noise."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from shapegcode.identification.frf_model import POWERS, Lines
 from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.units import FloatArray
 
-_END = 1e-2  # of the exponential window
+_END = 1e-2  # of the exponential window at the end of the record
 _LEAD, _LAGS = 4, 64  # samples before a pulse
-_QUIETEST = 1e-6  # of the largest line: no sensor has less noise
-_LATE = 0.4  # a steady disturbance is looked for behind this share of the record
+_QUIETEST = 1e-6  # least noise of a sensor, relative to the largest line
+_LATE = 0.4  # a steady disturbance is searched after this fraction of the record
 _STANDS_OUT = 8.0  # times the median of the spectrum there
-_STEADY = (0.8, 1.25)  # amplitude of the last quarter over that of the one before
+_STEADY = (0.8, 1.25)  # range of the last quarter's amplitude over that of the quarter before
 _MOST_STEADY = 12
 
 
 def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, list[float]]:
-    """What oscillates with the same amplitude in both halves of the late part (hum, a pump), and its frequencies."""
+    """Steady oscillations (hum, a pump), equal in both halves of the late part, and their frequencies."""
     samples = len(response)
     half = int(samples * (1.0 - _LATE)) // 2
     first, second = response[samples - 2 * half : samples - half], response[samples - half :]
@@ -39,7 +39,7 @@ def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, lis
     for top in tops[height[tops] > _STANDS_OUT * wide[tops]]:
         if top < 2 or not _STEADY[0] < height[top] / max(abs(spectra[0][top]), 1e-300) < _STEADY[1]:
             continue
-        # The phase turns by whole cycles and a rest from half to half.
+        # From half to half the phase advances by whole cycles and a remainder.
         turn = np.angle(spectra[1][top] / spectra[0][top] * np.exp(-2j * np.pi * top)) / (2.0 * np.pi)
         if abs(turn) < 0.45:
             found.append((float(height[top]), float((top + turn) * step)))
@@ -57,20 +57,20 @@ def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, lis
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """Impacts with one window, in the frequency domain."""
+    """Spectra of impacts with a common window."""
 
-    lines: Lines  # of all hits together (H1)
-    force: ComplexArray  # (hits, n)
-    response: ComplexArray  # (hits, n)
-    kept: slice  # of all lines of the transform
+    lines: Lines  # of all impacts together (H1)
+    force: ComplexArray  # (impacts, n)
+    response: ComplexArray  # (impacts, n)
+    kept: slice  # used lines of the transform
     starts: tuple[int, ...]  # first sample of each record
-    count: int  # samples of each
+    count: int  # samples samples per record
     period_s: float
     sigma: float  # 1/s: the window of the responses is exp(-sigma t)
     gain_error: FloatArray  # (n,) relative standard error of the force's spectrum: noise of its channel
 
     def in_time(self, lines: ComplexArray) -> FloatArray:
-        """(hits, count) samples of spectra of hits, the window undone."""
+        """(hits, count) samples from spectra of impacts, with the window divided out."""
         whole = np.zeros((len(lines), self.count // 2 + 1), dtype=np.complex128)
         whole[:, self.kept] = lines
         grown = np.exp(self.sigma * self.period_s * np.arange(self.count))
@@ -80,9 +80,9 @@ class Hits:
 def hits_of(
     usable: Sequence[Usable], responses: Sequence[FloatArray], low_hz: float, high_hz: float, applied_s: float | None
 ) -> Hits:
-    """Lines of all hits, each from its pulse on; `applied_s`: time constant of a window that the responses have.
+    """Lines of all impacts, each from its pulse on; `applied_s`: time constant of a window in the responses.
 
-    Behind the window exp(-t/tau) a system at rest answers at jw + 1/tau as it did at jw: no damping is added.
+    With the window exp(-t/tau) the response at jw equals the original one at jw + 1/tau: no damping is added.
     """
     period = usable[0].record.period_s
     starts = [max(0, each.hit.first - _LEAD) if each.hit else 0 for each in usable]
@@ -115,23 +115,23 @@ def hits_of(
     return Hits(lines, force, response, kept, tuple(starts), count, period, sigma, error)
 
 
-#: Noise is taken as even over so many lines, and over this share of all at least.
+#: Noise counts as constant over this many lines, and at least over this fraction of all.
 _SMOOTH_LINES, _SMOOTH_SHARE = 31, 0.02
-_MIN_NOISE = 1e-5  # a line counts for no more than a noise of this share of the largest one would have it
+_MIN_NOISE = 1e-5  # least assumed noise relative to the largest line, which limits weights
 _THIRD_DIFFERENCE = 20.0  # squared third difference of white noise, over its variance: 1 + 9 + 9 + 1
 
 
 def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
-    """Lines of a measured response, weighted by how rough the neighbours are, and by its coherence."""
+    """Lines of a measured response, weighted by the roughness of neighbouring lines and by coherence."""
     omega = 2.0 * np.pi * each.frequency_hz
     power = np.abs(each.response) ** 2
     quantity = POWERS[each.quantity]
-    course = omega ** (2.0 * (2.0 - quantity))  # noise is even as an acceleration's
+    course = omega ** (2.0 * (2.0 - quantity))  # noise is white as an acceleration
     rough = np.abs(np.diff(each.response, 3)) ** 2 / _THIRD_DIFFERENCE
     noise = smoothed(np.concatenate(([rough[0]], rough, [rough[-1]] * 2)) * course) / course
     if each.coherence is not None and np.any(each.coherence < 1.0):
         coherence = np.clip(each.coherence, 1e-3, 1.0)
-        # A coherence may claim less noise than neighbouring lines show: fitted so, noise would become modes.
+        # Coherence may understate the noise of neighbouring lines, and noise would be fitted as modes.
         noise = np.maximum(noise, power * smoothed((1.0 - coherence) / coherence))
     applied = 0.0 if applied_s is None else 1.0 / applied_s
     plane = np.asarray(applied + 1j * omega, dtype=np.complex128)
@@ -141,14 +141,14 @@ def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
 
 def weighted(lines: Lines, noise: FloatArray) -> Lines:
     """The same lines with weights for a noise power of each."""
-    # Of the acceleration: noise of a displacement made of it may exceed every mode at the lowest lines.
+    # As acceleration: noise of a displacement integrated from it may exceed all modes at the lowest lines.
     course = lines.omega ** (2.0 - lines.power)
     least = (_MIN_NOISE * float(np.max(np.abs(lines.response * course))) / course) ** 2
     return replace(lines, weight=np.asarray(1.0 / np.sqrt(np.maximum(noise, least)), dtype=np.float64))
 
 
 def smoothed(power: FloatArray) -> FloatArray:
-    """Running mean of a power over neighbouring lines, its peaks levelled by a median first."""
+    """Running mean of a power over neighbouring lines, after a median that removes its peaks."""
     width = max(_SMOOTH_LINES, int(_SMOOTH_SHARE * len(power))) | 1
     level = median_filter(power, width, mode="nearest") / np.log(2.0)
     return np.asarray(uniform_filter1d(level, width, mode="nearest"), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""How many modes the data hold, by models of growing order, and whether they support each: intervals, refusals."""
+"""Chooses the number of modes by models of growing order; intervals and refusals of each mode."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ from shapegcode.identification.problem import MIN_SWINGS, Fit, FitProblem, Start
 from shapegcode.identification.result import ChartPole, Estimate, IdentifiedMode
 from shapegcode.io.units import FloatArray
 
-# A further mode must explain this share of the response's energy: sensors are not linear beyond .1 % of amplitude.
+# Least fraction of the energy that a further mode explains: sensors are nonlinear by 0.1 % of amplitude.
 _MIN_SHARE = 1e-6
 _START_DAMPING = (0.01, 0.05)
-MAX_MODES = 8  # of a model, unless asked otherwise
-_TWINS = 0.25  # of the half width of a resonance
-_STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of the chart: the model one order lower has the pole too
-_APART = np.pi  # rad: two modes must come half a turn apart in the record
+MAX_MODES = 8  # default limit of a model
+_TWINS = 0.25  # distance of coinciding modes, relative to the half-power half width
+_STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of a stable pole: largest relative change from one order lower
+_APART = np.pi  # rad: two modes must differ by this phase over the record
 _CHART_ORDERS = 20  # of the stabilisation chart
-# Two poles of the chart are one start: of the half width of a resonance, and in the logarithm of their damping.
+# Chart poles merged to one start: distance in half-power half widths, and in ln of damping.
 _SAME_PLACE, _SAME_DAMPING = 0.2, 0.2
-_MAX_DAMPING = 0.7  # of a pole to begin with
-_PATIENCE = 2  # Two models in a row that the data do not ask for end the search: one may only have missed its place
+_MAX_DAMPING = 0.7  # of a pole used as a start
+_PATIENCE = 2  # Consecutive unsupported models that end the search: one may have missed its start
 
 
 @dataclass(frozen=True)
 class Sought:
-    """What is looked for."""
+    """Search parameters."""
 
     band_hz: tuple[float, float] | None  # frequencies of interest; None: all
     max_modes: int | None
-    modes: int | None  # their number; None: by evidence
+    modes: int | None  # number of modes; None: by evidence
     accepted_percent: float | None  # see `identify.identify`
-    exponential_window_s: float | None = None  # applied to the response before it was read
-    phase_known: bool = True  # of the residues: False where a drive lies between what is known and what moves
+    exponential_window_s: float | None = None  # time constant of a window already applied to the response
+    phase_known: bool = True  # phases of residues are known; False: a drive lies between command and motion
 
     def order(self, models: Search) -> int:
-        """Number of modes that is taken; refused where the data hold fewer than were asked for."""
+        """Number of modes to use; raises if the data support fewer than requested."""
         if self.modes is not None and len(models.fits) < self.modes:
-            raise RecordError(f"{self.modes} modes are asked for, and the data hold no more than {len(models.fits)}")
+            raise RecordError(f"{self.modes} modes are asked for, and the data support no more than {len(models.fits)}")
         return self.modes or models.order
 
 
@@ -54,7 +54,7 @@ class Search:
 
     fits: tuple[Fit, ...]  # the best fit of each number of modes, from 1
     # by number of modes, from 0: samples * ln(mean square of the residual) + (parameters + modes) * ln(samples);
-    # lower is better. One more is counted for each mode, as its place was looked for among all frequencies
+    # lower is better. Each mode counts one parameter more, since its frequency was searched
     evidence: tuple[float, ...]
 
     @property
@@ -64,7 +64,7 @@ class Search:
 
 
 def search(problem: FitProblem, sought: Sought) -> Search:
-    """Fit models of 0, 1, 2, ... modes until a further mode is not significant."""
+    """Fit models of 0, 1, 2, ... modes until a further mode is insignificant."""
     squares = problem.squares
     evidence = [evidence_of(problem, None)]
     fits: list[Fit] = []
@@ -95,7 +95,7 @@ def evidence_of(problem: FitProblem, fit: Fit | None) -> float:
 
 def chart_modes(problem: FitProblem) -> Iterator[Starts]:
     """Modes of the models of a stabilisation chart, by number of modes from 1."""
-    orders = (min(map(len, problem.responses)) - 8) // 8  # that the shortest record has samples for
+    orders = (min(map(len, problem.responses)) - 8) // 8  # limited by the samples of the shortest record
     most = max(1, min(_CHART_ORDERS, orders))
     for poles in _core.stabilisation_poles(problem.responses, most, problem.forces):
         omega, zeta = _core.poles_to_modes(list(poles), problem.period_s)
@@ -117,7 +117,7 @@ def chart_of(models: Iterable[tuple[int, Starts]]) -> tuple[ChartPole, ...]:
 
 
 def _pool(problem: FitProblem) -> Starts:
-    """Poles of the stabilisation chart that lie in the band, each mode once, as the models of higher order have it."""
+    """Stabilisation-chart poles in the band, one per mode, from the model of highest order."""
     low, high = problem.band_hz
     kept: Starts = []
     for w, z in reversed([mode for modes in chart_modes(problem) for mode in modes]):
@@ -129,7 +129,7 @@ def _pool(problem: FitProblem) -> Starts:
 
 
 def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None:
-    """The best fit with one mode more, from peaks of the last residual and the pole that explains most of it."""
+    """Best fit with one more mode, started at peaks of the last residual and at the pole that explains most of it."""
     so_far = [] if last is None else starts_of(last)
     candidates: list[Starts] = []
     for omega in problem.peaks_left(last):
@@ -142,7 +142,7 @@ def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None
         if len(chosen) > len(so_far):
             candidates.append([*so_far, pool[chosen[len(so_far)] - len(so_far)]])
     fits = [fit for starts in candidates if (fit := _attempt(problem, starts, quick=True)) is not None]
-    # The full fit may still run into twins: then the next best start has its turn.
+    # If the full fit ends in coinciding modes, try the next best start.
     for quick in sorted(fits, key=lambda fit: fit.sum_of_squares):
         if not _has_twins(quick, problem.duration_s):
             fit = _attempt(problem, starts_of(quick))
@@ -152,18 +152,18 @@ def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None
 
 
 def _has_twins(fit: Fit, record_s: float) -> bool:
-    """Whether two modes are one, drawn twice to make up for what is no mode: drift, hum, a delay between channels."""
+    """Whether two modes coincide, fitted to something that is no mode: drift, hum, a channel delay."""
     modes = sorted(starts_of(fit))
     return any(w2 - w1 < max(_TWINS * w1 * max(z1, z2), _APART / record_s) for (w1, z1), (w2, z2) in pairwise(modes))
 
 
 def starts_of(fit: Fit) -> Starts:
-    """The modes of a fit, for another one to begin with."""
+    """Modes of a fit, as starts of another one."""
     return [(float(omega), float(zeta)) for omega, zeta in zip(fit.omega_rad_s, fit.damping_ratio, strict=True)]
 
 
 def _attempt(problem: FitProblem, starts: Starts, **how: Any) -> Fit | None:
-    """A fit, or None where the start cannot be used (a mode at the end of the band, too few samples)."""
+    """A fit, or None for an unusable start (a mode at the end of the band, too few samples)."""
     try:
         fit = problem.fit(starts, **how)
     except (_core.ArgumentError, _core.NumericError):
@@ -171,35 +171,35 @@ def _attempt(problem: FitProblem, starts: Starts, **how: Any) -> Fit | None:
     return fit if np.isfinite(fit.sum_of_squares) else None
 
 
-ACCEPTED_PERCENT = 5.0  # A damping ratio or stiffness less certain is refused: 10 % are four standard deviations off
+ACCEPTED_PERCENT = 5.0  # Widest accepted half interval of damping ratio and stiffness: 10 % are then 4 sigma
 _FREQUENCY_PERCENT, _NOT_AT_ALL_PERCENT = 2.0, 1000.0
-_NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
-_LASTING = 0.8  # What has not fallen to this share at the end does not decay: mains hum, a pump, a turning spindle
-_RIVAL_PROBABILITY = 0.05  # A model with a mode more is a rival while chance alone would seldom make it fit better
-_UNKNOWN = 7.0  # half width of a logarithm that says nothing: a factor of a thousand
-SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
+_NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode for a shaper
+_LASTING = 0.8  # Not decayed: still above this ratio at the end (mains hum, a pump, a turning spindle)
+_RIVAL_PROBABILITY = 0.05  # Largest probability that a competing model with one more mode fits as well by chance
+_UNKNOWN = 7.0  # half width of the logarithm of an unknown value: a factor of a thousand
+SCATTER_PROBABILITY = 0.01  # probability that noise alone makes taps differ as much
 TURNED = (
-    "every mode goes against the push of the hammer: the sign is turned, as for a sensor at the same point that points "
+    "every mode is opposite to the hammer's force: the sign is reversed, as for a sensor at the same point that points "
     "the other way"
 )
-OPPOSED = "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
+OPPOSED = "moves opposite to the hammer's force: hammer and sensor are not at the same point, so no mass follows"
 
 
 @dataclass(frozen=True, eq=False)
 class Doubts:
     """Limits that a mode must meet."""
 
-    limit_percent: float  # least certainty of damping ratio and stiffness
+    limit_percent: float  # widest accepted half interval of damping ratio and stiffness
     band_hz: tuple[float, float]  # frequencies that were searched
     record_s: float  # length of the longest record
-    rival: Fit | None  # another model of nearly the same evidence
-    aliased: Callable[[float], float]  # share of the force at a frequency that may be folded down
-    white_share: float  # of the samples, how many are independent
-    least: tuple[float, float]  # half intervals of ln f and ln zeta that nothing falls below
+    rival: Fit | None  # competing model of nearly the same evidence
+    aliased: Callable[[float], float]  # fraction of the force at a frequency that may be aliased
+    white_share: float  # independent fraction of the samples
+    least: tuple[float, float]  # lower limits of the half intervals of ln f and ln zeta
 
 
 def _estimates(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Doubts) -> list[IdentifiedMode]:
-    """Values and 95 % intervals of each mode of a fit; one that moves against the push has that as its refusal."""
+    """Values and 95 % intervals of each mode of a fit; a mode opposite to the force is refused."""
     white_share = doubts.white_share
     freedom = max(white_share * fit.samples - fit.parameters, 1.0)
     quantile = float(stats.t.ppf(0.975, freedom)) / np.sqrt(white_share)
@@ -210,7 +210,7 @@ def _estimates(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Do
         spread[:2] = np.hypot(spread[:2], doubts.least)
         if len(row.values) > 2:
             spread[2:] = np.hypot(spread[2:], doubts.aliased(float(np.exp(row.values[0]))))
-        # What the force does between its samples is not known to the covariance.
+        # The covariance does not include the force's course between samples.
         for other in others:
             apart = _logarithms(other, mode)
             spread = np.maximum(spread, np.abs(apart.values - row.values) + _half_widths(apart, quantile))
@@ -221,7 +221,7 @@ def _estimates(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Do
 
 
 def mode_estimates(values: FloatArray, spread: FloatArray, refusal: str = "") -> IdentifiedMode:
-    """A mode from logarithms of f (Hz), damping ratio, m, c, k, or the first two, and half of their 95 % intervals."""
+    """A mode from logarithms of f (Hz), damping ratio, m, c, k, or f and damping ratio, and half 95 % intervals."""
     estimates = [
         Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
         for value, half in zip(np.exp(values), np.minimum(spread, _UNKNOWN), strict=True)
@@ -231,7 +231,7 @@ def mode_estimates(values: FloatArray, spread: FloatArray, refusal: str = "") ->
     return IdentifiedMode(frequency, damping, mass, viscous, stiffness, refusal)
 
 
-#: ln of f, zeta, m, c = 2 zeta omega m, k = omega² m from ln omega, ln zeta, ln 1/m, but for constants.
+#: ln of f, zeta, m, c = 2 zeta omega m, k = omega² m from ln omega, ln zeta, ln 1/m, apart from constants.
 LOGARITHMS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, -1], [2, 0, -1]], dtype=np.float64)
 
 
@@ -260,7 +260,7 @@ def _logarithms(fit: Fit, mode: int) -> _Logarithms:
 
 
 def _half_widths(row: _Logarithms, quantile: float) -> FloatArray:
-    """Half widths of the intervals; where the fit has no usable covariance, as wide as can be."""
+    """Half widths of the intervals; `_UNKNOWN` without a usable covariance."""
     usable = np.isfinite(row.variance) & (row.variance >= 0.0)
     return np.where(usable, quantile * np.sqrt(np.where(usable, row.variance, 0.0)), _UNKNOWN)
 
@@ -277,7 +277,7 @@ def _scatter(taps: Sequence[_Logarithms], white_share: float) -> FloatArray:
 
 
 def rival_of(order: int, fits: Sequence[Fit], white_share: float) -> Fit | None:
-    """The model with a mode more than the chosen one, if chance alone would seldom make it fit so much better."""
+    """The model with one more mode than the chosen one, if its better fit is unlikely to be chance."""
     if len(fits) <= order:
         return None
     chosen, larger = fits[order - 1 : order + 1]
@@ -288,7 +288,7 @@ def rival_of(order: int, fits: Sequence[Fit], white_share: float) -> Fit | None:
 
 
 def judged_modes(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Doubts) -> list[IdentifiedMode]:
-    """The modes by ascending frequency, each with its refusal if any, without drift and what lies outside the band."""
+    """The modes by ascending frequency, each with its refusal if any, without drift and modes outside the band."""
     low, high = doubts.band_hz
     found = [
         replace(mode, refusal=_refusal_of(mode, doubts))
@@ -303,7 +303,7 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
     frequency, damping, stiffness = mode.frequency_hz, mode.damping_ratio, mode.stiffness_n_per_m
     if frequency.value * doubts.record_s < MIN_SWINGS:
         return (
-            f"{frequency.value * doubts.record_s:.1f} swings in the record of {doubts.record_s:.3g} s: "
+            f"{frequency.value * doubts.record_s:.1f} cycles in the record of {doubts.record_s:.3g} s: "
             f"{MIN_SWINGS:g} or more are needed"
         )
     refusal = lasting_refusal(frequency.value, damping.value, doubts.record_s)[0]
@@ -312,7 +312,7 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
         return refusal
     if mode.refusal or doubts.rival is None:
         return mode.refusal
-    # A rival that splits the mode in two or lacks it disagrees as much as one can.
+    # A competing model that splits or lacks the mode disagrees completely.
     rows = [_logarithms(doubts.rival, i) for i in range(len(doubts.rival.omega_rad_s))]
     nearest = min(rows, key=lambda row: abs(row.values[0] - np.log(frequency.value)))
     compared = ("frequency", frequency, 0), ("damping ratio", damping, 1), ("stiffness", stiffness, 4)
@@ -328,7 +328,7 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
 
 
 def lasting_refusal(frequency_hz: float, damping_ratio: float, record_s: float) -> tuple[str, float]:
-    """Why what does not decay is refused, empty where it does; what is left at the end of the record."""
+    """Refusal of a vibration that does not decay (empty: it decays), and its remaining ratio at the record's end."""
     lasting = float(np.exp(-2.0 * np.pi * frequency_hz * damping_ratio * record_s))
     said = (
         f"still at {100.0 * lasting:.0f} % after {record_s:.3g} s: a steady disturbance (mains, pump, "
@@ -347,13 +347,13 @@ def interval_refusal(mode: IdentifiedMode, limit_percent: float, folded_percent:
     for name, estimate, limit in limits:
         if estimate is None or estimate.uncertainty_percent <= limit:
             continue
-        known = f"{name} is known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} %)"
+        known = f"{name} is known only to {estimate.uncertainty_percent:.2g} % (limit {limit:g} %)"
         if name == "stiffness" and folded_percent > 0.5 * limit:
             return (
-                f"{known}: the pulse has few samples, and without an anti-aliasing filter they do not tell its force "
+                f"{known}: the pulse has few samples, and without an anti-aliasing filter do not determine the force "
                 "at this frequency; sample faster or take a softer tip"
             )
         if estimate.uncertainty_percent > _NOT_AT_ALL_PERCENT:
-            known = f"{name} is known not at all (limit {limit:g} %)"
+            known = f"{name} is not known (limit {limit:g} %)"
         return f"{known}: more taps, a longer record or less noise"
     return ""

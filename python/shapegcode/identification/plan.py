@@ -19,8 +19,8 @@ class AxisRecording:
     """How to record the modes of an axis."""
 
     axis: str  # "X", "Y", "Z", or all of them
-    modes_hz: tuple[float, ...]  # those known, ascending; empty: the usual range is taken
-    highest_hz: float  # modes are looked for up to here
+    modes_hz: tuple[float, ...]  # known modes, ascending; empty: the usual range
+    highest_hz: float  # upper end of the searched band
     samples_per_s: float  # sampling rate
     duration_s: float  # of one tap, from the trigger on
     pre_trigger_s: float  # before it
@@ -33,9 +33,9 @@ class RapidStop:
     """How to let an axis decay without a hammer."""
 
     axis: str  # "X", "Y" or "Z"
-    distance_mm: float  # of each rapid
-    dwell_s: float  # rest after each, in which the decay is recorded
-    program: str  # that does it, in FANUC's dialect
+    distance_mm: float  # length of each rapid
+    dwell_s: float  # rest after each rapid, to record the decay
+    program: str  # program text, FANUC dialect
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -43,10 +43,10 @@ class TapPlan(Result):
     """How to do a tap test.
 
     Attributes:
-        machine: its name; null: no machine file was given.
-        recordings: for each axis.
-        stops: the decays after a rapid stop, for each axis.
-        instructions: the rest of it, for the operator: machine, sensor and hammer, recording, file, what is refused.
+        machine: name of the machine; null: no machine file was given.
+        recordings: how to record each axis.
+        stops: rapid-stop programs for each axis.
+        instructions: text for the operator: machine, sensor and hammer, recording, file, reasons for refusal.
         warnings: none.
     """
 
@@ -58,17 +58,17 @@ class TapPlan(Result):
 
     @property
     def ok(self) -> bool:
-        """There is a plan for every machine."""
+        """Always true: every machine has a plan."""
         return True
 
     @property
     def answer(self) -> str:
-        """Of which machine."""
+        """Names the machine."""
         return f"tap test of {self.machine or 'a machining centre'}: how to do it"
 
     @property
     def next_step(self) -> str:
-        """The one thing to do next."""
+        """Do the test, then identify each axis."""
         return "do the test, then for each axis: shapegcode identify x1.csv x2.csv x3.csv --axis x --update mine.toml"
 
     def tables(self) -> list[Table]:
@@ -76,7 +76,7 @@ class TapPlan(Result):
         columns = (
             Column("axis", text=True),
             Column("modes known", "Hz", lambda row: ", ".join(map("{:g}".format, row.modes_hz)) or "none", text=True),
-            Column("look up to", "Hz", "highest_hz", digits=0),
+            Column("search up to", "Hz", "highest_hz", digits=0),
             Column("samples/s", value="samples_per_s", digits=0),
             Column("record", "s", lambda row: f"{row.duration_s:g}"),
             Column("pre-trigger", "s", lambda row: f"{row.pre_trigger_s:.2g}"),
@@ -86,16 +86,16 @@ class TapPlan(Result):
         return [Table("recording", columns, self.recordings)]
 
 
-_USUAL_HZ = (20.0, 200.0)  # Modes of a machining centre that its own motion excites; for a plan without a machine file
-_USUAL_DAMPING = 0.02  # Damping ratio where none is known: welded and cast structures with guides have 0.01 to 0.05
-# Modes are looked for up to this multiple of the highest one known, and in any case up to so many Hz.
+_USUAL_HZ = (20.0, 200.0)  # Typical modes that a machining centre's own motion excites, without a machine file
+_USUAL_DAMPING = 0.02  # Damping ratio if unknown: welded and cast structures with guides have 0.01 to 0.05
+# Modes are searched up to this multiple of the highest known one, and at least up to this many Hz.
 _LOOK_ABOVE, _LOOK_LEAST_HZ = 2.0, 500.0
 _PULSE_SAMPLES = 10  # Samples in the pulse of the hammer: a half sine of ten is known to a percent
-_FALLEN_TO = 0.01  # The record lasts until the slowest mode has fallen to this share
-_PERIODS = 20  # ... and at least so many of its periods
+_FALLEN_TO = 0.01  # The record lasts until the slowest mode has decayed to this ratio
+_PERIODS = 20  # ... and at least this many of its periods
 _PRE_TRIGGER_SHARE, _PRE_TRIGGER_SAMPLES = 0.1, 100
 _RATES = (1.0, 2.0, 2.5, 5.0, 10.0)
-_TIPS = (  # Frequency up to which a tip excites at most, typically; its pulse is no shorter than that needs
+_TIPS = (  # Highest frequency that a tip typically excites, with the matching shortest pulse
     (300.0, "soft rubber"),
     (1000.0, "hard rubber or soft plastic"),
     (3000.0, "hard plastic (nylon)"),
@@ -156,13 +156,13 @@ def _instructions(about: str, recordings: tuple[AxisRecording, ...], stops: tupl
 
 
 def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
-    """How to do the test: where to tap, with what, how to record, how to write the file, and what is refused.
+    """How to do a tap test: where to tap, with what, how to record, the file, and reasons for refusal.
 
     Args:
-        machine: gives the axes and the modes known; None: the usual range of machining centres.
+        machine: source of the axes and known modes; None: the usual range of machining centres.
 
     Returns:
-        Rates and lengths by axis, programs for decays, and the instructions for the operator.
+        Rates and lengths by axis, rapid-stop programs, and the instructions for the operator.
 
     Source: this project; limits are those of `identification.checks`.
     """
@@ -172,7 +172,7 @@ def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
     if machine is None:
         recordings: tuple[AxisRecording, ...] = (recording_for("X Y Z", ()),)
         about = (
-            f"No machine file is given: lengths are for modes from {usual}, where the motion of its axes excites a "
+            f"No machine file is given: lengths are for modes from {usual}, in which the motion of its axes excites a "
             f"machining centre, rates for modes up to {_LOOK_LEAST_HZ:g} Hz. With -m MACHINE they follow from its "
             "modes."
         )
@@ -187,13 +187,13 @@ def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
             for axis in axes
         ]
         recordings = tuple(recording_for(name, tuple(each)) for name, each in zip(_AXES, modes, strict=True))
-        # Long enough to reach the rapid rate and to travel at it for as long as it takes to reach it.
+        # Long enough to reach the rapid rate and to hold it as long as the acceleration lasts.
         ramps_s = machine.controller.rapid_time_constant_s.as_tuple()
         reached = (axis.rapid_mm_per_min / 60.0 * ramp_s for axis, ramp_s in zip(axes, ramps_s, strict=True))
         distances_mm = [max(10.0, 10.0 * math.ceil(2.0 * each / 10.0)) for each in reached]
         about = (
             f"Lengths follow from the modes of the machine file (an axis without modes: {usual}); every axis is "
-            f"measured up to {_LOOK_LEAST_HZ:g} Hz or more, as there may be modes that the file does not state."
+            f"measured up to {_LOOK_LEAST_HZ:g} Hz or more, as the file may lack modes."
         )
     dwell_s = max(_LONG_STOP_S, 2.0 * max(how.duration_s for how in recordings))
     stops = tuple(

@@ -24,15 +24,15 @@ _MAX_TRACES, _SEEN, _ROOM = 3, 0.02, 2.5
 _FILE_TIME = "time in the file in s"
 _FAINT = 0.35  # opacity of poles that are not stable
 _MIN_SHOWN = 1e-5  # of the largest value, on a logarithmic axis
-_CLEAR = 3.0  # times the noise: down to here the model's envelope is the mode's
+_CLEAR = 3.0  # times the noise: above this the model's envelope is that of the mode
 _BELOW_NOISE = 0.3
-_BEYOND_NOISE = 1.25  # of the decay's duration, so that the noise is seen
+_BEYOND_NOISE = 1.25  # times the decay's duration is drawn, to show the noise
 _MAX_ENVELOPES = 4
 _MEASURED, _FITTED = plot.GREY, plot.COLOURS[0]
 
 
 def plots_of(found: Identification) -> dict[str, Plot]:
-    """Its pictures by name."""
+    """Pictures of an identification, by name."""
     if found.sweep is not None:
         names = ["sweep"]
     elif found.responses:
@@ -49,10 +49,10 @@ def plots_of(found: Identification) -> dict[str, Plot]:
 
 
 def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:
-    """Force and response over time, with the model's response; of many taps the first ones.
+    """Force and response over time, with the model's response; the first ones of many taps.
 
     Args:
-        found: what was identified.
+        found: the identification.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -90,7 +90,7 @@ def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
     """Frequency response, measured and of the model: magnitude, phase, coherence.
 
     Args:
-        found: what was identified, from taps or from frequency responses.
+        found: an identification from taps or from frequency responses.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -110,7 +110,7 @@ def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
     magnitude.set_yscale("log")
     lines = [each.response[seen] for each in (measured, model)]
     _draw_both(magnitude, measured.frequency_hz[seen], *(np.abs(ratio) for ratio in lines))
-    # From -90 to 270 degrees: below a mode the phase of an acceleration is 180 and noise would wrap it.
+    # From -90 to 270 degrees: the phase of an acceleration is 180 below a mode, where noise would wrap it.
     degrees = (90.0 + np.degrees(np.angle(-1j * ratio)) for ratio in lines)
     _draw_both(phase, measured.frequency_hz[seen], *degrees)
     if measured.coherence is not None:
@@ -127,10 +127,10 @@ def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
 
 
 def plot_stabilisation(found: Identification, ax: Axes | None = None) -> Axes:
-    """Poles by the order of the model over the spectrum, and the order that was chosen.
+    """Poles by the order of the model over the spectrum, and the chosen order.
 
     Args:
-        found: what was identified.
+        found: the identification.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -139,7 +139,7 @@ def plot_stabilisation(found: Identification, ax: Axes | None = None) -> Axes:
     frequency, amplitude = _spectrum(found)
     seen = _seen(frequency, found)
     panel = plot.axes(ax, size_inch=(9.0, 5.5))
-    # The legend stands between the panel and the title.
+    # The legend is between the panel and the title.
     panel.set_title("Stabilisation chart: poles by the order of the model", loc="left", fontsize=11, pad=26)
     background = panel.twinx()
     background.semilogy(frequency[seen], amplitude[seen], color="#c8c8c8", linewidth=1.0)
@@ -176,11 +176,11 @@ def plot_stabilisation(found: Identification, ax: Axes | None = None) -> Axes:
 def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
     """Envelope of each mode's band of the first record while it decays, measured and of the model.
 
-    The model is drawn down to the noise, which is what it leaves of the response in the band. Below it the curve would
-    show how the band's filter rings.
+    The model is drawn down to the noise, its residual in the band. Below it the curve would show the ringing of the
+    band's filter.
 
     Args:
-        found: what was identified, with a mode or more.
+        found: an identification with a mode or more.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -211,7 +211,7 @@ def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
         panel.set(ylim=(_BELOW_NOISE * noise, 2.0 * top), ylabel=unit)
     for panel in column:
         panel.set_xlim(time_s[0], time_s[min(round(_BEYOND_NOISE * longest), len(time_s) - 1)])
-    column[-1].set_xlabel(_FILE_TIME if found.decay else "time since the hit in s")
+    column[-1].set_xlabel(_FILE_TIME if found.decay else "time since the impact in s")
     plot.legend_above(column[0])
     return column[0]
 
@@ -220,7 +220,7 @@ def plot_spectrum(found: Identification, ax: Axes | None = None) -> Axes:
     """Amplitude spectrum of a decay with its peaks labelled.
 
     Args:
-        found: what was identified, from decays.
+        found: an identification from decays.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -243,10 +243,10 @@ def plot_spectrum(found: Identification, ax: Axes | None = None) -> Axes:
 
 
 def plot_sweep(found: Identification, ax: Axes | None = None) -> Axes:
-    """Amplitude of a sweep over the course of its command, measured and of the model.
+    """Amplitude of a sweep relative to its command, measured and modelled.
 
     Args:
-        found: what was identified, from a sweep.
+        found: an identification from a sweep.
         ax: where to draw; None: a new figure.
 
     Returns:

@@ -1,4 +1,4 @@
-"""What is fitted: taps with force, or free decays, each as the core's fits want them."""
+"""Data of a fit over time: taps with force, or free decays, in the form of the core's fits."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from shapegcode.io.units import FloatArray
 
 Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
 Fit = _core.ModalFit | _core.DecayFit
-MIN_SWINGS = 2.0  # Swings of a mode in the record: fewer do not tell its frequency
-HIGHEST_SHARE = 0.45  # Of the sampling rate: the force between samples is known up to there
-_STEPS, _QUICK_STEPS = 60, 15  # of a fit; of one that only shows where a mode may be
-_PEAKS = 2  # of the residual's spectrum that are tried
+MIN_SWINGS = 2.0  # Least cycles of a mode in the record to find its frequency
+HIGHEST_SHARE = 0.45  # Ratio to the sampling rate up to which the force between samples is known
+_STEPS, _QUICK_STEPS = 60, 15  # iterations of a fit; of one that only locates a mode
+_PEAKS = 2  # tried peaks of the residual's spectrum
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,16 +29,16 @@ class FitProblem:
     responses: list[FloatArray]  # (n,) each, in the unit of the quantity
     forces: list[FloatArray] | None  # (n,) each, N; None: decays
     period_s: float  # time between two samples
-    band_hz: tuple[float, float]  # modes are looked for in it
-    widened: float  # what intervals are multiplied with; see `Record`
-    quantity: str = "acceleration"  # what the sensor measured; of decays whatever it is: amplitudes are fitted
-    force_noise_n: float = 0.0  # RMS of the force off the pulse
+    band_hz: tuple[float, float]  # searched band
+    widened: float  # factor on intervals; see `Record`
+    quantity: str = "acceleration"  # what the sensor measured; any for decays, whose amplitudes are fitted
+    force_noise_n: float = 0.0  # RMS of the force outside the pulse
     hold: str = "band_limited"  # course of the force between samples: "band_limited", "linear" or "impulse"
-    thinned: Thinned | None = None  # what was thinned out before the fit; None: every sample is fitted
+    thinned: Thinned | None = None  # decimated records; None: every sample is fitted
     starts_in_pulse: bool = False  # the record begins within the pulse
 
     def fit(self, starts: Starts, *, left_by: Fit | None = None, coloured: bool = False, quick: bool = False) -> Fit:
-        """The best model near some modes, its residual white or coloured; or in a few steps, of what another leaves."""
+        """The best model near some modes, residual white or coloured; or in a few steps, of another one's residual."""
         omega, zeta = np.array(starts).T
         responses, steps = self.left(left_by), _QUICK_STEPS if quick else _STEPS
         if self.forces is None:
@@ -47,7 +47,7 @@ class FitProblem:
             )
         return _core.fit_modes(
             self.forces, responses, self.period_s, omega, zeta, quantity=self.quantity, hold=self.held,
-            # What is read after a blow lacks the force over the mass: so much of the force is fitted along.
+            # Readings after an impact lack force/mass, so a multiple of the force is fitted too.
             with_mass_line=self.hold == "impulse" and self.held != "impulse" and self.quantity == "acceleration",
             force_noise_n=0.0 if quick else self.force_noise_n, coloured_residuals=coloured, most_iterations=steps,
         )  # fmt: skip
@@ -61,37 +61,37 @@ class FitProblem:
 
     @property
     def samples(self) -> int:
-        """Of all records together."""
+        """Number of samples of all records."""
         return sum(map(len, self.responses))
 
     @property
     def squares(self) -> float:
-        """Sum over the responses, offsets taken out."""
+        """Sum of squares of the responses without offsets."""
         return sum(float(np.sum((response - response.mean()) ** 2)) for response in self.responses)
 
     @property
     def duration_s(self) -> float:
-        """Of the longest record."""
+        """Duration of the longest record, s."""
         return max(map(len, self.responses)) * self.period_s
 
     @property
     def white_share(self) -> float:
-        """Share of white noise that reaches the samples: so many of them are independent."""
+        """Fraction of white noise that passes the filter, which is the independent fraction of the samples."""
         return (1.0 if self.thinned is None else self.thinned.white_share) / self.widened**2
 
     @property
     def held(self) -> str:
-        """Course of the force that is fitted: what was thinned out is band-limited, whatever it was."""
+        """Intersample course of the fitted force: decimated records are always band-limited."""
         return self.hold if self.thinned is None else "band_limited"
 
     def left(self, last: Fit | None) -> list[FloatArray]:
-        """What a model leaves of the responses."""
+        """Residuals of the responses after a model."""
         if last is None:
             return self.responses
         return [response - np.real(model) for response, model in zip(self.responses, last.fitted, strict=True)]
 
     def peaks_left(self, last: Fit | None) -> list[float]:
-        """Frequencies (rad/s) of the highest peaks within the band of what a model leaves, the highest first."""
+        """Frequencies (rad/s) of the highest peaks within the band of a model's residual, the highest first."""
         residuals = self.left(last)
         length = 2 * max(map(len, residuals))
         power = np.zeros(length // 2 + 1)
@@ -104,13 +104,13 @@ class FitProblem:
         return [float(2.0 * np.pi * frequency[index]) for index in highest]
 
     def other_courses(self, near: Fit) -> list[FitProblem]:
-        """The same taps with every other course that the force may take between its samples."""
+        """The same taps with each other possible intersample course of the force."""
         if self.thinned is None:
             return [replace(self, hold="linear"), replace(self, hold="impulse")]
         if self.hold == "impulse":
             return []
         straight, responses = self.thinned.straight, self.responses
-        # An acceleration holds the force over the mass as it was at the samples, whatever its course between them.
+        # An acceleration contains force/mass at the samples, whatever the force's course between them.
         if self.quantity == "acceleration" and isinstance(near, _core.ModalFit) and self.forces is not None:
             free = float(np.sum(near.inverse_mass))
             parts = zip(responses, self.forces, straight, strict=True)
@@ -124,7 +124,7 @@ class FitProblem:
 
 
 def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: bool = False) -> FitProblem:
-    """The records of a fit, and the band to look in; a strong mode outside is part of what is measured within it."""
+    """The records of a fit, and the band to search; a strong mode outside also contributes within it."""
     first = ready.records[0]
     responses = [record.response for record in ready.records]
     longest_s = max(len(response) for response in responses) * first.period_s
@@ -156,36 +156,36 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
     )  # fmt: skip
 
 
-FLAT = 0.35  # Of the new sampling rate: the filter is flat up to here
+FLAT = 0.35  # Ratio to the new sampling rate up to which the filter is flat
 _STOP_DB = 80.0  # ... and has fallen to -80 dB at half of it, as the filters of recorders do
-_BAND = 0.34  # The band ends at this share of the new rate at most
-_FEW = 4096  # Fewer samples than this need no thinning
-_MARGIN = 1.25  # What stands out of the response above the band that the hit excites is looked at with this margin
+_BAND = 0.34  # Highest end of the band, relative to the new rate
+_FEW = 4096  # Fewer samples than this need no decimation
+_MARGIN = 1.25  # Margin for response peaks above the band that the impact excites
 _MARGIN_OF_BLOWS = 2.0
-_GRID = 8  # points of the filter's transform per tap
+_GRID = 8  # points of the filter's transform per coefficient
 
 
 @dataclass(frozen=True, eq=False)
 class Thinned:
-    """Taps with fewer samples."""
+    """Decimated tap records."""
 
     responses: list[FloatArray]  # (n,) each
-    forces: list[FloatArray]  # (n,) each, of a recorder's force
-    straight: list[FloatArray]  # (n,) each, of a force that runs straight from sample to sample
+    forces: list[FloatArray]  # (n,) each, force as from a recorder
+    straight: list[FloatArray]  # (n,) each, force linear between samples
     period_s: float  # time between two samples
-    # share of the band up to half the new rate that the filter lets pass, in power: what is left of white noise
+    # power of white noise after the filter, relative to the band up to half the new rate
     white_share: float
-    noise_correlation: float  # between two samples on end of white noise behind the filter
-    # noise per sample of the pulse, as a share of what it was: the pulse's momentum is known as before
+    noise_correlation: float  # correlation of consecutive samples of filtered white noise
+    # noise per sample of the pulse relative to the original; the pulse's impulse is known as before
     force_noise: float
-    first_s: list[float]  # time of the first new sample after that of the old first, per record; negative: before it
+    first_s: list[float]  # time of the first new sample relative to the first old one, per record
 
 
 def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
-    """Highest frequency at which an impact must be sampled; peaks of the response above the band are fitted, too."""
+    """Highest frequency to keep in an impact, Hz: that of the band and of response peaks above it."""
     excited = max(each.excited_hz or 0.0 for each in ready.usable)
     margin = _MARGIN
-    if are_blows(ready):  # they excite all that the rate holds
+    if are_blows(ready):  # they excite all up to half the rate
         excited, margin = 0.0, _MARGIN_OF_BLOWS
     peaks = [
         peak.frequency_hz
@@ -197,7 +197,7 @@ def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
 
 
 def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
-    """Leave out samples that the band does not need, behind one filter of linear phase for force and response."""
+    """Decimate to the rate that the band needs, with one linear-phase filter for force and response."""
     period = ready.records[0].period_s
     factor = int(_BAND / (highest_hz * period)) if highest_hz > 0.0 else 1
     longest = max(len(record.response) for record in ready.records)
@@ -211,7 +211,7 @@ def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
         force = record.force_n
         assert force is not None
         acts = np.flatnonzero(force)
-        # Samples at rest to put before the record, so that nothing of the pulse is spread beyond it.
+        # Samples at rest before the record, so that the filtered pulse stays within it.
         before = max(0, 2 * reach + factor - int(acts[0]))
         lead = np.zeros(before)
         places = slice(reach, before + len(force) - reach, factor)
@@ -231,13 +231,13 @@ def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
 
 
 def are_blows(ready: Prepared) -> bool:
-    """Whether the pulses are single blows of one or two samples."""
+    """Whether the pulses have only one or two samples."""
     forces = (record.force_n for record in ready.records)
     return any(np.count_nonzero(force) < MIN_PULSE for force in forces if force is not None)
 
 
 def _filters(factor: int) -> tuple[FloatArray, FloatArray]:
-    """The filter, and what it is of a force that runs straight between its samples: (sin x / x)² of its spectrum."""
+    """The filter, and the filter for a force linear between samples: its spectrum times (sin x / x)²."""
     count, beta = kaiserord(_STOP_DB, (0.5 - FLAT) * 2.0 / factor)
     count |= 1
     plain = firwin(count, (0.5 + FLAT) / factor, window=("kaiser", beta))

@@ -1,4 +1,4 @@
-"""What an identification found, with its uncertainty: figures, tables, the next step."""
+"""Result of an identification with uncertainties: figures, tables, the next step."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ class Estimate:
         """The estimate of a monotonic function of the value.
 
         Args:
-            function: of the value; rising or falling.
+            function: monotonic function of the value, rising or falling.
 
         Returns:
-            Its value and the ends of its interval.
+            Estimate of the function's value.
         """
         ends = sorted((function(self.low), function(self.high)))
         return Estimate(function(self.value), *ends)
@@ -69,10 +69,10 @@ class IdentifiedMode:
         damping_n_s_per_m: equivalent viscous damping; None for a free decay.
         stiffness_n_per_m: equivalent stiffness; None for a free decay.
         refusal: why the data do not support this mode; empty: they do.
-        left_out: refused, but no fault of the test: beyond what the hits excite, beyond the number asked for, or with a
-            peak below 2 % of the highest one; in a sweep or capture also narrower than the lines are apart.
-        moves: how far it moves X, Y and Z, as shares of its motion along the axis along which it was found; null for an
-            axis that was not measured. Only where other axes were measured too.
+        left_out: refused without a fault of the test: beyond the excited band or the requested number, or with a
+            peak below 2 % of the highest one; in a sweep or capture also narrower than the line spacing.
+        moves: mode shape: motion along X, Y and Z relative to that along the axis of the test; null for an
+            axis that was not measured. Only if other axes were measured too.
     """
 
     frequency_hz: Estimate
@@ -103,7 +103,7 @@ def mode_line(mode: IdentifiedMode) -> str:
 
 
 def estimate_cell(estimate: Estimate | None, factor: float) -> str:
-    """An estimate times a factor, ``46.02 ± 0.05``, as many digits as are known; both ends where it is skewed."""
+    """An estimate times a factor, ``46.02 ± 0.05``, with the significant digits; both ends if it is skewed."""
     if estimate is None:
         return ""
     value, low, high = (factor * each for each in (estimate.value, estimate.low, estimate.high))
@@ -122,9 +122,9 @@ def estimate_cell(estimate: Estimate | None, factor: float) -> str:
 class ChartPole:
     """A pole of the stabilisation chart."""
 
-    order: int  # number of modes of the model that it belongs to
+    order: int  # number of modes of its model
     frequency_hz: float  # undamped natural frequency
-    damping_ratio: float  # of the pole
+    damping_ratio: float  # damping ratio of the pole
     stable_frequency: bool  # the model one order lower has it too, within 1 %
     stable_damping: bool  # and within 5 % of the damping ratio
 
@@ -135,31 +135,31 @@ class MassCheck:
 
     closed_form_kg: float  # one simulation; the RMS of the response is proportional to 1/m
     bisection_kg: float  # the paper's search
-    halvings: int  # of the search
+    halvings: int  # halving steps of the search
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """What a sweep without force showed."""
+    """Spectrum and fit of a sweep without force."""
 
     source: str  # of the record
     axis: str | None  # "x", "y" or "z"; None: not known
-    samples: int  # that were recorded
+    samples: int  # number of recorded samples
     period_s: float  # time between two samples
     frequency_hz: FloatArray  # (n,) middles of the bins
-    amplitude: FloatArray  # (n,) of the response over the command's course, any unit
-    fitted: FloatArray  # (n,) of the model
-    command: str = ""  # program or capture whose command is known; empty: taken from the record
+    amplitude: FloatArray  # (n,) amplitude of the response relative to the command, any unit
+    fitted: FloatArray  # (n,) amplitude of the model
+    command: str = ""  # program or capture with the command; empty: command assumed from the record
     kind: str = "sweep without force"
 
 
 @dataclass(frozen=True)
 class MachineFile:
-    """A machine file that took the modes."""
+    """Machine file into which the modes were written."""
 
     path: str  # as named
     axis: str  # "x", "y" or "z"
-    notes: tuple[str, ...]  # what was replaced, kept, removed and added, one sentence each
+    notes: tuple[str, ...]  # replaced, kept, removed and added modes, one sentence each
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
@@ -169,27 +169,27 @@ class Identification(Result):
     Attributes:
         files: as named, or the sources of records.
         modes: those that the data support, by ascending frequency.
-        refused: those that stand out of the noise but are not supported, each with its refusal.
-        order: number of modes of the chosen model; 0: there is none.
+        refused: those above the noise that are not supported, each with its refusal.
+        order: number of modes of the chosen model; 0: no mode.
         evidence: information criterion (lower is better) by number of modes.
         fit_percent: 100 * (1 - |measured - fitted| / |measured|), over all records together; null without a model.
-        noise_rms: of the response's measurement noise in the band that is fitted, in the unit of the records; null
+        noise_rms: RMS measurement noise of the response in the fitted band, in the unit of the records; null
             without a model.
-        mass_check: where the model has one mode.
-        reason: why there is no mode; empty: there is.
-        doubt: why the modes should not be used although there are some; empty: they may.
-        machine_file: where the modes were put; null: nowhere.
-        warnings: what the user should know of the records and of the result.
-        notes: what was left out of the files and the like.
-        prepared: the records that were used, and those that were not; None: the files hold none that can be.
+        mass_check: check of the equivalent mass, if the model has one mode.
+        reason: why there is no mode; empty: there are modes.
+        doubt: why the modes found should not be used; empty: usable.
+        machine_file: where the modes were written; null: nowhere.
+        warnings: of the records and of the result.
+        notes: remarks, such as on ignored parts of the files.
+        prepared: used and refused records; None: the files contain no usable record.
         chart: poles of the stabilisation chart.
-        sweep: spectrum of a sweep without force; None: there is none.
-        responses: frequency responses without time record, as far as they were fitted.
-        turned: whether their sign was turned.
-        options: of the command line, for the next one.
-        fitted_lines: the model's lines of each, (n,) complex.
-        fitted_records: the records as they were fitted, thinned out to what the band needs.
-        fitted: response of the model per record, (n,), at the samples that were fitted.
+        sweep: spectrum of a sweep without force; None: no sweep.
+        responses: frequency responses without time record, in the fitted band.
+        turned: whether the responses' sign was reversed.
+        options: command-line options that the next step repeats.
+        fitted_lines: model response at the lines of each frequency response, (n,) complex.
+        fitted_records: the records as they were fitted, decimated for the band.
+        fitted: model response per record, (n,), at the fitted samples.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {
@@ -224,7 +224,7 @@ class Identification(Result):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Published methods of the fit that was made."""
+        """Published methods of the fit."""
         if self.sweep is not None and not self.sweep.command:
             return ("modes from a sweep",)
         over_time = self.evidence and not self.responses and self.sweep is None
@@ -232,12 +232,12 @@ class Identification(Result):
 
     @property
     def taps(self) -> tuple[Record, ...]:
-        """Taps or decays that were used."""
+        """Used taps or decays."""
         return () if self.prepared is None else self.prepared.records
 
     @property
     def axis(self) -> str | None:
-        """Axis along which it was measured, "x", "y" or "z"; null: the files do not say."""
+        """Measured axis, "x", "y" or "z"; null: not stated by the files."""
         if self.sweep is not None:
             return self.sweep.axis
         if self.responses:
@@ -251,7 +251,7 @@ class Identification(Result):
 
     @property
     def source(self) -> str:
-        """Where the modes come from, for the machine file."""
+        """Origin of the modes, for the machine file."""
         names = ", ".join(Path(file).name for file in self.files)
         if self.responses or self.sweep is not None:
             return f"{'frequency response' if self.sweep is None else self.sweep.kind} {names}"
@@ -266,7 +266,7 @@ class Identification(Result):
 
     @property
     def records(self) -> tuple[RecordUse, ...]:
-        """Each tap or decay: those that were used, then those that were not."""
+        """Each tap or decay: used ones, then refused ones."""
         if self.sweep is not None:
             sweep = self.sweep
             return (RecordUse(sweep.source, True, "", sweep.samples, sweep.period_s, quantity="acceleration"),)
@@ -288,17 +288,17 @@ class Identification(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether there are modes to use, and every peak above the noise is supported or left out."""
+        """Whether there are modes to use, and every peak above the noise is supported or may be ignored."""
         return bool(self.modes) and not self._unsupported and not self.doubt
 
     @property
     def exit_code(self) -> int:
-        """0: use all of it; 1: some of it is not supported, or better not used; 2: nothing is supported."""
+        """0: use all modes; 1: some are not supported, or use is doubtful; 2: no mode is supported."""
         return super().exit_code if self.modes else 2
 
     @property
     def light(self) -> tuple[Light, str]:
-        """Red: do not use; amber: some of it is not supported, or there are warnings."""
+        """Red: do not use; amber: some modes are not supported, or there are warnings."""
         if self.doubt or not self.modes:
             return "red", self.doubt or self.reason
         if self._unsupported:
@@ -307,7 +307,7 @@ class Identification(Result):
 
     @property
     def answer(self) -> str:
-        """Whether to use it or why not, the frequencies, and how well the model explains the records."""
+        """Whether to use the modes or why not, the frequencies, and the quality of the fit."""
         if not self.modes:
             peaks = "the peaks are not supported by the data, see the table for the reasons"
             return f"do not use: no mode in {', '.join(self.files)}: {peaks if self.refused else self.reason}"
@@ -321,13 +321,13 @@ class Identification(Result):
 
     @property
     def next_step(self) -> str:
-        """The one thing to do next."""
+        """Next command: repeat the test, or write the machine file."""
         if self.sweep is not None and self.sweep.command and (self._unsupported or self.doubt or not self.modes):
             return "sweep again, for longer or with more acceleration (shapegcode sweep), or tap"
         if not self.modes:
             return "shapegcode identify --tap-plan describes the test"
         if self._unsupported or self.doubt:
-            return "tap again, longer or more often, for what is not supported (shapegcode identify --tap-plan)"
+            return "tap again, longer or more often, for the unsupported modes (shapegcode identify --tap-plan)"
         if self.machine_file is not None:
             return f"shapegcode shaper -m {self.machine_file.path}"
         if self.sweep is not None and self.sweep.command not in ("", self.sweep.source):
@@ -343,7 +343,7 @@ class Identification(Result):
         return "\n".join(lines)
 
     def tables(self) -> list[Table]:
-        """Modes with their intervals; what is not supported; the records."""
+        """Tables of modes with intervals; refused modes; records."""
         check, caption = self.mass_check, ""
         if check is not None:
             caption = (
@@ -353,7 +353,7 @@ class Identification(Result):
         moving = self.modes if any(mode.moves is not None for mode in self.modes) else ()
         tables = (
             Table("modes, each ± 95 %", _MODE_COLUMNS, self.modes, caption=caption),
-            Table("what each mode moves, as shares of its motion along its axis", _MOVE_COLUMNS, moving),
+            Table("mode shapes, relative to the motion along the mode's axis", _MOVE_COLUMNS, moving),
             Table("not supported by the data" if self._unsupported else "left out", _REFUSAL_COLUMNS, self.refused),
             Table("records", _RECORD_COLUMNS, self.records),
         )
@@ -371,7 +371,7 @@ def as_sweep(
     found: Identification, notes: Iterable[str], source: str, samples: int, period_s: float, command: str,
     kind: str = Sweep.kind,
 ) -> Identification:  # fmt: skip
-    """Modes of a response to a known command as those of a sweep, which has no records of taps and no noise of them."""
+    """Result for a response to a known command, like that of a sweep: without tap records and their noise."""
     measured, fitted = found.responses[0], np.abs(found.fitted_lines[0])
     lines = measured.frequency_hz, np.abs(measured.response), fitted
     sweep = Sweep(source, measured.axis, samples, period_s, *lines, command, kind)
@@ -380,7 +380,7 @@ def as_sweep(
 
 
 def by_support(found: Sequence[IdentifiedMode]) -> dict[str, Any]:
-    """The modes that the data support, those that they do not, and why there is no mode (empty: there is)."""
+    """Fields for supported modes, refused modes, and the reason if there is no mode."""
     modes, refused = (tuple(mode for mode in found if bool(mode.refusal) == bad) for bad in (False, True))
     reason = "" if modes else "no mode exceeds the noise"
     if refused and not modes:

@@ -1,4 +1,4 @@
-"""Spectra: of taps and decays (FRF, peaks, envelopes), and of a command and what answers it, part by part."""
+"""Spectra: of taps and decays (FRF, peaks, envelopes), and of a command and its response, part by part."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.record import Record
 from shapegcode.io.units import FloatArray
 
-_PEAK_SHARE, _PEAK_RISES = 0.01, 2.0  # of the largest (-40 dB); by which a peak stands out of its surroundings
-_PEAK_NOISE = 6.0  # So many standard noise levels, of which the spectrum's median is a measure
+_PEAK_SHARE, _PEAK_RISES = 0.01, 2.0  # relative to the largest (-40 dB); factor of a peak over its surroundings
+_PEAK_NOISE = 6.0  # Least height in noise levels, estimated by the spectrum's median
 _MAX_PEAKS = 8
-_PADDING = 4  # The spectrum of a decay is drawn from so many times as many points as there are samples
-_BAND_SHARE = 0.25  # A mode's band reaches this share of its frequency to either side, at most half way to the next
+_PADDING = 4  # Zero padding of a decay's spectrum: points per sample
+_BAND_SHARE = 0.25  # Half width of a mode's band relative to its frequency, at most half way to the next
 _BAND_ORDER = 2
 
 
 def frf(records: Sequence[Record]) -> FrequencyResponse:
-    """Frequency response above 0 Hz, averaged over taps (H1); coherence: None of one tap, which has always 1."""
+    """Frequency response above 0 Hz, averaged over taps (H1); coherence None for a single tap (always 1)."""
     if not records:
         raise RecordError("no record: an FRF needs at least one tap")
     period = records[0].period_s
@@ -54,9 +54,9 @@ def frf(records: Sequence[Record]) -> FrequencyResponse:
 class Peak:
     """A peak of a spectrum."""
 
-    frequency_hz: float  # of its top, between the points of the spectrum
-    amplitude: float  # there
-    label: str  # for the picture, such as "46.0 Hz"
+    frequency_hz: float  # of its top, interpolated between points of the spectrum
+    amplitude: float  # at the top
+    label: str  # label in a picture, such as "46.0 Hz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +64,12 @@ class Spectrum:
     """Amplitude spectrum of a decay."""
 
     frequency_hz: FloatArray  # (m,), from 0 to half the sampling rate
-    amplitude: FloatArray  # (m,) in the unit of the response: the amplitude of a steady sine that would give the same
+    amplitude: FloatArray  # (m,) in the unit of the response: amplitude of an equivalent steady sine
     peaks: tuple[Peak, ...]  # the largest first
 
 
 def decay_spectrum(record: Record) -> Spectrum:
-    """Amplitude spectrum of the response of a decay behind half a Hann window, 1 at its first sample, and its peaks."""
+    """Amplitude spectrum of the response of a decay with half a Hann window, 1 at the first sample, and its peaks."""
     response = record.response - np.mean(record.response)
     samples = len(response)
     window = 0.5 * (1.0 + np.cos(np.pi * np.arange(samples) / samples))
@@ -100,7 +100,7 @@ def _peaks(frequency: FloatArray, amplitude: FloatArray, resolution_hz: float) -
 
 
 def mode_envelopes(record: Record, frequencies_hz: Sequence[float]) -> list[FloatArray]:
-    """The envelope of each mode in a band of its own: a Butterworth filter both ways, then a Hilbert transform."""
+    """Envelope of each mode in its own band: forward-backward Butterworth filter, then Hilbert transform."""
     half, response = 0.5 / record.period_s, record.response - np.mean(record.response)
     found = []
     for frequency in frequencies_hz:
@@ -119,15 +119,15 @@ def mode_envelopes(record: Record, frequencies_hz: Sequence[float]) -> list[Floa
 
 # --- command and response, part by part between rests -----------------------------------------------------------------
 
-REST_S = 0.5  # of a command, between two parts
-_EXCITED = 0.2  # of the median of the command's spectrum, in amplitude: lines below are not used
-_BESIDE = 0.3  # of the lines around, in power: weaker lines show noise
+REST_S = 0.5  # least rest of a command between two parts
+_EXCITED = 0.2  # least amplitude of a used line, relative to the median of the command's spectrum
+_BESIDE = 0.3  # least power relative to neighbouring lines: weaker lines show noise
 _SMOOTH_LINES, _COHERENT = 31, 0.9
 
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """Of each part, at the same lines and on the program's time."""
+    """Spectra of each part, at the same lines and on the program's time."""
 
     hertz: FloatArray  # (n,)
     command: ComplexArray  # (parts, n)
@@ -140,23 +140,23 @@ class Spectra:
 
     @cached_property
     def power(self) -> FloatArray:
-        """(n,) of the command."""
+        """Power of the command, (n,)."""
         return np.asarray(np.sum(np.abs(self.command) ** 2, axis=0), dtype=np.float64)
 
     def late(self, lags_s: FloatArray) -> Spectra:
-        """The same with the response of each part so much earlier."""
+        """Copy with the response of each part advanced by its lag."""
         return replace(self, response=self.response * np.exp(self.turn * lags_s[:, None]))
 
     def of(self, rows: npt.NDArray[np.intp]) -> Spectra:
-        """Some parts."""
+        """Select parts."""
         return replace(self, command=self.command[rows], response=self.response[rows])
 
     def ratio(self) -> ComplexArray:
-        """(n,) response over command, by least squares over the parts."""
+        """Response/command by least squares over the parts, (n,)."""
         return np.asarray(np.sum(np.conj(self.command) * self.response, axis=0) / np.maximum(self.power, 1e-300))
 
     def in_twos(self, rows: npt.NDArray[np.intp]) -> Spectra:
-        """Sums of the parts 0 and 1, 2 and 3, ...: what one leaves in the next is within one window."""
+        """Sums of the parts 0 and 1, 2 and 3, ...: ringing of one part in the next is then within one window."""
         first = [np.flatnonzero(rows // 2 == pair) for pair in np.unique(rows // 2)]
         return replace(
             self,
@@ -165,7 +165,7 @@ class Spectra:
         )
 
     def coherent(self) -> tuple[npt.NDArray[np.bool_], FloatArray]:
-        """Lines that the command excites, from the first to the last that the parts agree on, and coherence of all."""
+        """Excited lines from the first to the last on which the parts agree, and coherence of all."""
         ratio, power = self.ratio(), self.power
         left = np.sum(np.abs(self.response - ratio * self.command) ** 2, axis=0) / max(len(self.command) - 1, 1)
         noise = uniform_filter1d(left, _SMOOTH_LINES) / np.maximum(power, 1e-300)
@@ -180,7 +180,7 @@ class Spectra:
 
 
 def transforms(parts: list[FloatArray], begins_s: FloatArray, period_s: float, hertz: FloatArray) -> ComplexArray:
-    """Of each part the sum of its values times exp(-i omega t), at evenly spaced frequencies."""
+    """Fourier sum over each part, values times exp(-i omega t), at evenly spaced frequencies."""
     values = np.zeros((len(parts), max(1, *(len(each) for each in parts))))
     for row, part in zip(values, parts, strict=True):
         row[: len(part)] = part
@@ -190,7 +190,7 @@ def transforms(parts: list[FloatArray], begins_s: FloatArray, period_s: float, h
 
 
 def moving_parts(x_mm: FloatArray, period_s: float) -> list[tuple[int, int]]:
-    """First sample and end of each part of a motion between rests of half a second or more."""
+    """First and last + 1 sample of each part of a motion between rests of half a second or more."""
     rows = np.flatnonzero(np.diff(x_mm))
     if not len(rows):
         return []

@@ -1,4 +1,4 @@
-"""Frequency and damping from a resonance sweep without force, as the firmware Klipper drives and records it.
+"""Frequency and damping from a resonance sweep without force, as run and recorded by the Klipper firmware.
 
 The command's spectrum grows as f; the sensor shows the magnitude of 1 - sum of G s²/(s² + 2 zeta omega s + omega²).
 """
@@ -17,22 +17,22 @@ from shapegcode.identification.result import Identification, IdentifiedMode, Swe
 from shapegcode.io.record import Record
 from shapegcode.io.units import FloatArray
 
-SWEPT_HZ = (10.0, 130.0)  # What Klipper sweeps unless told otherwise is 5 to 133 Hz; its ends are no steady sweep
-_BIN_HZ = 0.5  # over which the spectrum is averaged: interference of the harmonics ripples faster
-_BIN_NOISE = 0.05  # of the logarithm of a bin's power
+SWEPT_HZ = (10.0, 130.0)  # Klipper's default sweep is 5 to 133 Hz; its ends are not a steady sweep
+_BIN_HZ = 0.5  # averaging width of the spectrum, wider than the ripple from interfering harmonics
+_BIN_NOISE = 0.05  # standard deviation of the logarithm of a bin's power
 _MIN_S = 10.0
-_APART_HZ = 8.0  # two peaks that are tried
+_APART_HZ = 8.0  # least distance of two tried peaks
 _MAX_MODES = 4
-_WIDENED = 2.0  # The covariance is widened: the command's course, friction and play are no noise
-_MIN_FREQUENCY, _MIN_DAMPING = 0.005, 0.1  # shares: no interval is narrower
-_FREQUENCY_LIMIT, _DAMPING_LIMIT = 2.0, 30.0  # percent
+_WIDENED = 2.0  # Factor on intervals for the command's spectrum, friction and backlash, which are not noise
+_MIN_FREQUENCY, _MIN_DAMPING = 0.005, 0.1  # narrowest half intervals, relative
+_FREQUENCY_LIMIT, _DAMPING_LIMIT = 2.0, 30.0  # widest accepted half intervals, %
 _NO_VIBRATION = 0.5
-_MIN_SHARE = 0.02  # of the motion: less is no mode that counts
+_MIN_SHARE = 0.02  # least ratio to the axis' motion of a significant mode
 
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """Logarithm of the power: level, slope beyond that of the command, and share, omega, zeta of each mode."""
+    """Model of the log power: level, slope beyond the command's, and share, omega, zeta of each mode."""
 
     parameters: FloatArray
     covariance: FloatArray
@@ -43,12 +43,12 @@ class _Model:
         return [tuple(row) for row in np.exp(self.parameters[2:].reshape(-1, 3))]
 
     def evidence(self, bins: int) -> float:
-        """Bayes' criterion; bins are known to some percent at best, since the harmonics of the command interfere."""
+        """Bayes' criterion; a bin's error is some percent at least, since harmonics of the command interfere."""
         return float(bins * np.log(self.squares / bins + _BIN_NOISE**2) + len(self.parameters) * np.log(bins))
 
 
 def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> Identification:
-    """Find the modes that a sweep of Klipper's resonance tester shows; see `identify.identify`."""
+    """Find the modes from a sweep of Klipper's resonance tester; see `identify.identify`."""
     band, modes = sought.band_hz or SWEPT_HZ, sought.modes
     frequency, power = _spectrum(record, band)
     fits = [_fit(frequency, power, [], free=False)]
@@ -60,7 +60,7 @@ def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> 
             break
     order = modes if modes is not None else int(np.argmin(evidence))
     best = fits[order]
-    # What a free slope of the command's spectrum changes is not known.
+    # Differences due to a free slope of the command's spectrum widen the intervals.
     other = _fit(frequency, power, best.starts, free=True)
     found = [_judge_mode(best, other, index, len(power)) for index in range(order)]
     found = [mode for mode in found if band[0] <= mode.frequency_hz.value <= band[1]]
@@ -75,16 +75,16 @@ def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> 
         fit_percent=100.0 * (1.0 - float(np.linalg.norm(fitted - amplitude) / np.linalg.norm(amplitude))),
         warnings=(
             *record.warnings,
-            "a sweep without force gives no mass and no stiffness, and its command is taken to grow evenly with the "
+            "a sweep without force gives no mass and no stiffness, and its command is assumed to grow linearly with "
             "frequency: intervals are wide; a mode near the ends of the band, or of another axis, may be missed",
         ),
-        notes=(*record.notes, f"looked at from {band[0]:g} to {band[1]:g} Hz (--frequencies LOW:HIGH)"),
+        notes=(*record.notes, f"searched from {band[0]:g} to {band[1]:g} Hz (--frequencies LOW:HIGH)"),
         sweep=Sweep(record.source, record.axis, len(record.response), record.period_s, frequency, amplitude, fitted),
     )
 
 
 def _spectrum(record: Record, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Middles of the bins, and their mean power divided by that of the command's course, f²."""
+    """Middles of the bins, and their mean power divided by the command's, f²."""
     duration = len(record.response) * record.period_s
     half = 0.5 / record.period_s
     if not 0.0 < band[0] < band[1] - 10.0 * _BIN_HZ:
@@ -119,7 +119,7 @@ def _log_power(parameters: FloatArray, frequency: FloatArray) -> FloatArray:
 
 
 def _fit(frequency: FloatArray, power: FloatArray, starts: list[tuple[float, ...]], *, free: bool) -> _Model:
-    """Fit the logarithm; a few bins that are far off do not count for more."""
+    """Fit the logarithm; robust against a few outlying bins."""
     goal = np.log(power)
     first = np.concatenate(([float(np.median(goal)), 0.0], np.log(np.array(starts, dtype=np.float64)).ravel()))
     slope = 1.0 if free else 1e-9
@@ -134,7 +134,7 @@ def _fit(frequency: FloatArray, power: FloatArray, starts: list[tuple[float, ...
     residual, squares = left(found.x), float(2.0 * found.cost)
     jacobian = np.asarray(found.jac, dtype=np.float64)
     freedom = max(len(goal) - len(first), 1)
-    # Neighbouring bins share what the model lacks.
+    # Model errors are correlated between neighbouring bins.
     rho = float(np.clip(residual[1:] @ residual[:-1] / max(float(residual @ residual), 1e-300), 0.0, 0.95))
     covariance = np.linalg.pinv(jacobian.T @ jacobian) * squares / freedom * (1.0 + rho) / (1.0 - rho)
     return _Model(found.x, covariance, max(squares, 1e-300))
@@ -156,7 +156,7 @@ def _next(frequency: FloatArray, power: FloatArray, last: _Model) -> _Model:
 
 
 def _judge_mode(best: _Model, other: _Model, index: int, bins: int) -> IdentifiedMode:
-    """One mode with its intervals, and why it is refused if it is."""
+    """One mode with its intervals, and its refusal, if any."""
     place = 2 + 3 * index
     quantile = _WIDENED * float(student.ppf(0.975, max(bins - len(best.parameters), 1)))
     halves = []
@@ -168,15 +168,15 @@ def _judge_mode(best: _Model, other: _Model, index: int, bins: int) -> Identifie
     mode = mode_estimates(logarithms, np.array(halves))
     refusal = ""
     if share < _MIN_SHARE:
-        refusal = f"{100.0 * share:.2g} % of the axis' motion only (limit {100.0 * _MIN_SHARE:g} %)"
+        refusal = f"{100.0 * share:.2g} % of the axis' motion (limit {100.0 * _MIN_SHARE:g} %)"
     elif zeta > _NO_VIBRATION:
-        refusal = f"damping ratio {zeta:.2g}: no vibration that stands out (limit {_NO_VIBRATION:g})"
+        refusal = f"damping ratio {zeta:.2g}: no distinct vibration (limit {_NO_VIBRATION:g})"
     for name, estimate, limit in (
         ("frequency", mode.frequency_hz, _FREQUENCY_LIMIT), ("damping ratio", mode.damping_ratio, _DAMPING_LIMIT),
     ):  # fmt: skip
         if not refusal and not estimate.uncertainty_percent <= limit:
             refusal = (
-                f"{name} is known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} % of a sweep): a "
+                f"{name} is known only to {estimate.uncertainty_percent:.2g} % (limit {limit:g} % of a sweep): a "
                 "slower sweep, more acceleration, or a tap"
             )
     return replace(mode, refusal=refusal)

@@ -1,4 +1,4 @@
-"""A program that shakes one axis with rising and falling frequency, planned on the control's own model."""
+"""A program that shakes one axis with rising and falling frequency, planned on the model of the control."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from shapegcode.program import Program
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
-_PAUSE_S = 1.0, 2.5  # behind each rise, and behind each fall: what both excited decays
+_PAUSE_S = 1.0, 2.5  # after each rise, and after each fall, for the vibration to decay
 _BEFORE_S = 2.0  # at rest, before the first
 _BANDS_PER_OCTAVE = 2.0
-_DESIGNED_PER_OCTAVE = 3.0  # frequencies whose strokes are planned; between them they are interpolated
+_DESIGNED_PER_OCTAVE = 3.0  # planned frequencies per octave, interpolated between
 _FEEDS = 9
-_TRIED = 8, 24  # strokes of a trial, and of a longer one
+_TRIED = 8, 24  # moves of a trial, and of a longer one
 _LONGEST = 1 << 20
 _ROUNDS = 6
-_OF_STEP = 0.4  # of the corner speed difference, which a reversal has twice: the control's may be 20 % smaller
-_LEAST_AT_ONCE = 100.0  # mm/min; slower strokes excite too little: those with ramps are taken
-_SPARE = 1.15  # Strokes are rounded to increments: none lasts less than the least block time
+_OF_STEP = 0.4  # of the corner speed difference: a reversal has twice this; the control's may be 20 % smaller
+_LEAST_AT_ONCE = 100.0  # mm/min; below it moves excite too little, and moves with ramps are used
+_SPARE = 1.15  # Margin to the shortest block time, for rounding of moves to increments
 _HALVINGS = 14
-_ENOUGH = 0.98  # of the largest amplitude: a higher feed gains no more
-_MIN_INCREMENTS = 4  # a stroke is no shorter
+_ENOUGH = 0.98  # of the largest amplitude: a higher feed gains nothing
+_MIN_INCREMENTS = 4  # of the shortest move
 _LEAST_MM_S2 = 20.0  # a sensor of 12 bits and ± 2 g resolves 10 mm/s²
 _LOW_HZ, _HIGH_HZ = 8.0, 200.0
-_MIN_CYCLES = 3.0  # of the lowest frequency in its rise: with fewer there is no rise
+_MIN_CYCLES = 3.0  # least cycles of the lowest frequency in its rise
 _MIN_BAND = 1.5  # upper end over lower end
 
 
@@ -47,13 +47,13 @@ class SweptBand:
     """A part of the program, once up and once down.
 
     Attributes:
-        low_hz: lowest frequency of the strokes there and back.
+        low_hz: lowest frequency of the back-and-forth moves.
         high_hz: highest one.
-        travel_mm: longest stroke.
+        travel_mm: longest move.
         feed_mm_per_min: highest feed.
         acceleration_mm_s2: amplitude of the commanded acceleration between these frequencies, as simulated.
-        blocks: strokes.
-        duration_s: with its pauses.
+        blocks: number of moves.
+        duration_s: duration with pauses.
     """
 
     low_hz: float
@@ -72,13 +72,13 @@ class SweepProgram(Result):
     Attributes:
         machine: name of the machine.
         axis: "x", "y" or "z".
-        file: of the program.
-        bands: ascending.
-        limit: why the band ends where it does.
-        acceleration_percent: the stated limit of the amplitude, of the axis' largest acceleration.
-        duration_s: of the program, as simulated.
-        size_bytes: of the program.
-        warnings: what to know before it runs.
+        file: file of the program.
+        bands: parts of the program, ascending.
+        limit: reason for the upper end of the band.
+        acceleration_percent: stated limit of the amplitude, relative to the axis' largest acceleration.
+        duration_s: simulated duration of the program.
+        size_bytes: size of the program.
+        warnings: read before the program runs.
     """
 
     machine: str
@@ -93,12 +93,12 @@ class SweepProgram(Result):
 
     @property
     def ok(self) -> bool:
-        """It can be run."""
+        """Always true: the program can be run."""
         return True
 
     @property
     def answer(self) -> str:
-        """Which axis, which band, how long, how far, and what limits it."""
+        """Axis, band, duration, travel, size, and the limit of the band."""
         travel = max(band.travel_mm for band in self.bands)
         return (
             f"{self.axis.upper()} axis of {self.machine}: {self.bands[0].low_hz:.4g} to {self.bands[-1].high_hz:.4g} "
@@ -107,9 +107,9 @@ class SweepProgram(Result):
 
     @property
     def next_step(self) -> str:
-        """To run it beside a logger, and to identify the record."""
+        """Run the program with a logger, then identify the record."""
         return (
-            f"run {self.file} beside a logger on what the {self.axis.upper()} axis moves, then shapegcode identify "
+            f"run {self.file} with a logger on what the {self.axis.upper()} axis moves, then shapegcode identify "
             f"--sweep {self.file} RECORD.csv -m MACHINE"
         )
 
@@ -118,7 +118,7 @@ class SweepProgram(Result):
         columns = (
             Column("from", "Hz", "low_hz", digits=1),
             Column("to", "Hz", "high_hz", digits=1),
-            Column("stroke up to", "mm", "travel_mm", digits=3),
+            Column("move up to", "mm", "travel_mm", digits=3),
             Column("feed up to", "mm/min", "feed_mm_per_min", digits=0),
             Column("acceleration", "mm/s²", "acceleration_mm_s2", digits=0),
             Column("blocks"),
@@ -140,26 +140,26 @@ def write_sweep(
 ) -> SweepProgram:
     """Write a program that shakes one axis over a band of frequencies, for `identify` with `sweep`.
 
-    Strokes there and back (G91, G01), whose frequency rises, then falls, band by band, each behind a pause. Their
+    Back-and-forth moves (G91, G01), whose frequency rises, then falls, band by band, each after a pause. Their
     lengths and feeds are planned on the controller's model: the amplitude of the commanded acceleration stays within
-    the stated share of the axis' limit, the strokes within the travel, the feed within the largest one. The program
-    ends where it begins, and feed hold may stop it at any time.
+    the stated ratio to the axis' limit, the moves within the travel, the feed within the maximum. The program
+    ends where it begins, and may be stopped by feed hold at any time.
 
     Args:
-        file: of the program.
-        machine: whose controller runs it.
-        axis: that is shaken.
-        band_hz: lowest and highest frequency of the strokes; None: from 8 Hz up to what the control reaches.
-        travel_mm: longest stroke, from the start point in the positive direction.
-        acceleration_share: of the axis' largest acceleration that the amplitude may have.
-        seconds: all strokes together last about so long.
-        number: of the program, O.
+        file: program file to write.
+        machine: the machine whose controller runs it.
+        axis: axis to shake.
+        band_hz: lowest and highest frequency of the moves; None: from 8 Hz to the highest that the control reaches.
+        travel_mm: longest move, from the start point in the positive direction.
+        acceleration_share: largest amplitude relative to the axis' largest acceleration.
+        seconds: approximate duration of all moves.
+        number: program number (O word).
 
     Returns:
-        The band that is reached, what limits it, and the excitation of each part, simulated from the written program.
+        The band reached, its limit, and the excitation of each part, simulated from the written program.
 
     Raises:
-        ArgumentError: the control does not reach the band within these limits; what it reaches is said.
+        ArgumentError: the control does not reach the band within these limits; the message gives what it reaches.
         OSError: the file cannot be written.
     """
     found, text = plan_sweep(file, machine, axis, band_hz, travel_mm, acceleration_share, seconds, number)
@@ -171,7 +171,7 @@ def plan_sweep(
     file: str | Path, machine: Machine | str | Path, axis: Literal["x", "y", "z"], band_hz: tuple[float, float] | None,
     travel_mm: float, acceleration_share: float, seconds: float, number: int = 7201,
 ) -> tuple[SweepProgram, str]:  # fmt: skip
-    """Plan what `write_sweep` writes: the same, and the text, which is not written."""
+    """Plan the program of `write_sweep`; returns its result and the text, which is not written."""
     machine = Machine.of(machine)
     for name, value in (("travel_mm", travel_mm), ("acceleration_share", acceleration_share), ("seconds", seconds)):
         if not (math.isfinite(value) and value > 0.0):
@@ -199,13 +199,13 @@ def plan_sweep(
         over = max(band.acceleration_mm_s2 for band in swept) / planner.allowed
         if over <= 1.0:
             break
-        planner.wanted *= 0.99 / over  # What lies between the planned frequencies, and rounding, ask for more
+        planner.wanted *= 0.99 / over  # Interpolated frequencies and rounding may exceed the plan
     else:
-        raise ArgumentError(f"the acceleration stays {over:.2g} times what is allowed: state less (--acceleration)")
+        raise ArgumentError(f"the acceleration stays {over:.2g} times the limit: state less (--acceleration)")
     warnings = []
     if len(text) > machine.controller.program_memory_bytes:
         warnings.append(
-            f"{len(text)} bytes are more than the memory of {machine.controller.program_memory_bytes} bytes holds "
+            f"{len(text)} bytes are more than the memory of {machine.controller.program_memory_bytes} bytes "
             "(controller.program_memory_bytes): run it from a card, or state less time (--seconds)"
         )
     sizes = 100.0 * acceleration_share, len(command) * period_s, len(text)
@@ -213,14 +213,14 @@ def plan_sweep(
 
 
 def commanded(program: Program, machine: Machine) -> tuple[FloatArray, float]:
-    """Set-points of a program behind every filter of the control, (n, 3) mm, and their period in s."""
+    """Set-points of a program after all filters of the control, (n, 3) mm, and their period in s."""
     command = [chunk.command_mm for chunk in stream(program, machine)]
     return np.concatenate(command), machine.controller.interpolation_period_s
 
 
 @dataclass(frozen=True)
 class _Stroke:
-    hertz: float  # of there and back
+    hertz: float  # of one move back and forth
     length_mm: float
     feed_mm_per_min: float
 
@@ -232,7 +232,7 @@ class _Planner:
         self._axis = "xyz".index(axis)
         self._feed, controller = limits.max_feed_mm_per_min, machine.controller
         if controller.motion == "look_ahead" and controller.corner_rule == "speed_difference":
-            # Such a reversal needs no ramp: strokes last length over feed, whatever the time constants really are.
+            # Such a reversal needs no ramp: a move takes length/feed whatever the time constants.
             at_once = _OF_STEP * getattr(controller.corner_speed_difference_mm_per_min, axis)
             if at_once >= _LEAST_AT_ONCE:
                 self._feed = min(self._feed, at_once)
@@ -241,12 +241,12 @@ class _Planner:
         self._least_mm = _MIN_INCREMENTS * controller.least_increment_mm
 
     def plan(self, low: float, high: float) -> tuple[list[_Stroke], str]:
-        """Strokes from the lowest frequency to the highest that can be reached, and what limits it."""
+        """Moves from the lowest frequency to the highest reachable one, and its limit."""
         most = 0.5 / (_SPARE * self._block_s)
-        spare = f"with {100.0 * (_SPARE - 1.0):.0f} % to spare"
-        limit = f"a block lasts {1e3 * self._block_s:g} ms or more, {spare} strokes reach {most:.4g} Hz"
+        spare = f"with {100.0 * (_SPARE - 1.0):.0f} % margin"
+        limit = f"a block lasts {1e3 * self._block_s:g} ms or more, {spare} moves reach {most:.4g} Hz"
         if high <= most:
-            limit = f"strokes could reach {most:.4g} Hz, with blocks of {1e3 * self._block_s:g} ms"
+            limit = f"moves could reach {most:.4g} Hz, with blocks of {1e3 * self._block_s:g} ms"
         top = min(high, most)
         if not top >= _MIN_BAND * low:
             raise ArgumentError(f"band of {low:g} to {high:g} Hz: must ascend by {_MIN_BAND:g} times or more; {limit}")
@@ -257,9 +257,9 @@ class _Planner:
             short = stroke.length_mm < self._least_mm
             if short or amplitude < _LEAST_MM_S2:
                 limit = f"at {hertz:.4g} Hz " + (
-                    f"a stroke would be {1e3 * stroke.length_mm:.2g} µm, less than {1e3 * self._least_mm:g} µm"
+                    f"a move would be {1e3 * stroke.length_mm:.2g} µm, less than {1e3 * self._least_mm:g} µm"
                     if short
-                    else f"the control commands {amplitude:.2g} mm/s² only, less than {_LEAST_MM_S2:g} mm/s²"
+                    else f"the control commands only {amplitude:.2g} mm/s², less than {_LEAST_MM_S2:g} mm/s²"
                 )
                 break
             found.append(stroke)
@@ -268,7 +268,7 @@ class _Planner:
         return found, limit
 
     def _stroke(self, hertz: float) -> tuple[_Stroke, float]:
-        """The stroke with the wanted amplitude, or the largest there is, and its amplitude in mm/s²."""
+        """The move with the wanted amplitude, or the largest possible one, and its amplitude in mm/s²."""
         top = min(self._feed, 60.0 * self._travel_mm / (0.5 / hertz))
         tried = [self._tried(hertz, float(feed)) for feed in np.geomspace(top / 100.0, top, _FEEDS)]
         largest = max(amplitude for _, amplitude in tried)
@@ -279,12 +279,12 @@ class _Planner:
             share = (math.log(goal) - math.log(low)) / (math.log(high) - math.log(low))
             tried[place] = self._tried(hertz, below.feed_mm_per_min ** (1.0 - share) * above.feed_mm_per_min**share)
         stroke, size = tried[place]
-        if size > self.wanted:  # The lowest feed asks for too much: shorter strokes would be faster ones
+        if size > self.wanted:  # Too much even at the lowest feed: shorter moves would be faster ones
             return self._tried(hertz, stroke.feed_mm_per_min * (self.wanted / size))
         return stroke, size
 
     def _tried(self, hertz: float, feed: float) -> tuple[_Stroke, float]:
-        """The stroke that lasts half a cycle, and its amplitude."""
+        """The move that takes half a cycle, and its amplitude."""
         half_s = 0.5 / hertz
         low, high = 0.0, min(feed / 60.0 * half_s, self._travel_mm)
         for _ in range(_HALVINGS):
@@ -297,7 +297,7 @@ class _Planner:
         return _Stroke(hertz, high, feed), size
 
     def _motion(self, length_mm: float, feed: float, count: int) -> FloatArray:
-        """Set-points of strokes there and back, (n,) mm."""
+        """Set-points of moves back and forth, (n,) mm."""
         step = np.zeros(3)
         step[self._axis] = length_mm
         ends = [np.zeros(3), step]
@@ -307,7 +307,7 @@ class _Planner:
 
 
 def amplitude(command_mm: FloatArray, period_s: float, band_hz: tuple[float, float], lasts_s: float) -> float:
-    """Amplitude of the commanded acceleration in a band, as of a sine that lasts so long, mm/s²."""
+    """Amplitude of the commanded acceleration in a band, as of an equivalent sine of this duration, mm/s²."""
     acceleration = np.diff(command_mm, 2) / period_s**2
     size = 2 * len(acceleration)
     hertz = np.fft.rfftfreq(size, period_s)
@@ -317,7 +317,7 @@ def amplitude(command_mm: FloatArray, period_s: float, band_hz: tuple[float, flo
 
 
 def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[list[_Stroke]]:
-    """Strokes there and back of each rise and each fall, on increments and digits of the control."""
+    """Back-and-forth moves of each rise and each fall, on increments and digits of the control."""
     hertz, length, feed = np.array([astuple(each) for each in strokes]).T
     octaves = math.log2(hertz[-1] / hertz[0])
     edges = np.geomspace(hertz[0], hertz[-1], 1 + math.ceil(_BANDS_PER_OCTAVE * octaves))
@@ -344,7 +344,7 @@ def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[lis
 
 
 def plain_name(name: str) -> str:
-    """A name as a comment of any control may hold it."""
+    """A name in the characters that a comment of any control may contain."""
     return "".join(sign for sign in name.upper() if sign.isalnum() or sign in " -.")[:30]
 
 
@@ -356,7 +356,7 @@ def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) 
         f"(SHAKES {axis.upper()}: 0 TO +{reach:.{decimals}f} MM FROM THE START POINT)",
         "(AIR ONLY: NO SPINDLE, NO OTHER AXIS MOVES, ENDS WHERE IT BEGAN)",
         "(START THE LOGGER FIRST, STOP IT LAST. OVERRIDE 100 PERCENT)",
-        "(FEED HOLD STOPS IT AT ANY TIME: THE PART BEFORE REMAINS GOOD)",
+        "(FEED HOLD STOPS IT AT ANY TIME: THE RECORD BEFORE REMAINS USABLE)",
         "G21 G17 G91 G94 G64", f"G04 P{round(1e3 * _BEFORE_S)}",
     ]  # fmt: skip
     for count, band in enumerate(bands):

@@ -1,4 +1,4 @@
-"""Identified modes put into a machine file: the modes of one axis change, everything else stays byte for byte."""
+"""Writes identified modes of one axis into a machine file; everything else stays byte for byte."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from shapegcode.settings.load import read_text
 
 @dataclass(frozen=True)
 class MachineUpdate:
-    """A machine file with identified modes in it; nothing is written yet.
+    """A machine file with identified modes, not yet written.
 
     Attributes:
-        text: the file, to be written as UTF-8 without translating line ends.
-        machine: what it says.
-        notes: what was replaced, kept, removed and added, one sentence each.
+        text: content of the file, to be written as UTF-8 without translating line ends.
+        machine: the machine of this text.
+        notes: replaced, kept, removed and added modes, one sentence each.
     """
 
     text: str
@@ -41,34 +41,34 @@ class MachineUpdate:
     notes: tuple[str, ...]
 
     def noted_in(self, found: Identification, path: str | Path) -> Identification:
-        """The identification that says where its modes were put.
+        """Set `machine_file` in the identification.
 
         Args:
-            found: whose modes are in the text.
-            path: of the file that was written.
+            found: identification whose modes are in the text.
+            path: path of the written file.
 
         Returns:
-            The same with `machine_file`.
+            A copy with `machine_file`.
         """
         assert found.axis is not None
         return replace(found, machine_file=MachineFile(str(path), found.axis, self.notes))
 
 
 def update_machine(path: str | Path, found: Identification, *, keep_modes: str = "", rigid: str = "") -> MachineUpdate:
-    """A machine file with the modes of an identification in it.
+    """Insert the modes of an identification into a machine file.
 
     Args:
-        path: of the machine file, which is not touched.
+        path: of the machine file, which is not changed.
         found: with modes, and the axis along which they were measured.
-        keep_modes: other axes whose modes stay though nobody measured them on this machine: "yz".
-        rigid: other axes that have no mode that counts; theirs are taken out.
+        keep_modes: other axes whose modes stay although not measured on this machine, such as "yz".
+        rigid: other axes without a significant mode; their modes are deleted.
 
     Returns:
-        The text to write, what it says, and notes of what changed.
+        The text to write, its machine, and notes of the changes.
 
     Raises:
-        ArgumentError: no axis, no mode that the data support, or a built-in machine.
-        MachineError: the file is bad, or would be.
+        ArgumentError: no axis, no supported mode, or a built-in machine.
+        MachineError: the file is invalid, or would become so.
         OSError: it cannot be read.
     """
     if found.axis is None:
@@ -82,7 +82,7 @@ def update_machine(path: str | Path, found: Identification, *, keep_modes: str =
 
 
 def check_updatable(path: str | Path) -> Machine:
-    """Check, before the calculation, what would make `update_machine` fail whatever the modes."""
+    """Check before the calculation for faults that make `update_machine` fail whatever the modes."""
     if isinstance(path, str) and path in Machine.builtin_names():
         raise ArgumentError(
             f"{path} is a built-in machine, which stays as it is: shapegcode machine init {path} -o mine.toml makes a "
@@ -102,29 +102,29 @@ def update_modes(
     rigid: str = "",
     file: str = "<text>",
 ) -> MachineUpdate:
-    """The text of a machine file with the modes of one axis replaced by identified ones; twice gives the same text.
+    """Replace the modes of one axis in the text of a machine file by identified ones; idempotent.
 
-    A mode within 10 % of one in the file takes its table, in which everything that was not measured stays, as does a
-    mode that the test shows, but does not support. Other tables of the axis' modes go, other modes get their own.
+    A mode within 10 % of one in the file overwrites its table; unmeasured keys stay. A mode that appears in the
+    test but is refused stays unchanged. The axis' other tables are deleted, other modes get new ones.
     """
     if axis not in ("x", "y", "z"):
         raise ArgumentError(f"axis {axis!r}: must be x, y or z")
     if not modes:
-        raise ArgumentError(f"no mode that the data support: {file} stays as it is")
+        raise ArgumentError(f"no supported mode: {file} is unchanged")
     for mode in modes:
         if mode.refusal:
             raise ArgumentError(f"the mode at {mode.frequency_hz.value:g} Hz is not supported: {mode.refusal}")
     mark = "\ufeff" if text.startswith("\ufeff") else ""
     body = text.removeprefix(mark)
     if axis in rigid:
-        raise ArgumentError(f"{axis.upper()}: it cannot be rigid, a mode of it was measured")
+        raise ArgumentError(f"{axis.upper()}: it cannot be rigid, as a mode of it was measured")
     require_decisions(open_modes(Machine.from_toml(body, file), axis), keep_modes, rigid, file)
     tables = ModeTables(body, axis, source, file)
     new, notes = decide_axes(tables.put(modes, refused), keep_modes, rigid, file)
     machine = Machine.from_toml(new, file)
     named = zip("XYZ", machine.axes.as_tuple(), strict=True)
     if unknown := [name for name, each in named if not each.modes and not each.rigid]:
-        say = f"say --rigid {''.join(unknown)}; until then taken as rigid"
+        say = f"add --rigid {''.join(unknown)}; until then assumed rigid"
         notes.append(f"no mode of {', '.join(unknown)} is known: tap, or {say}")
     return MachineUpdate(mark + new, machine, (*tables.notes, *notes))
 
@@ -134,7 +134,7 @@ _ORIGIN = re.compile(r"^(from [^:]*|assumed|not known|not measured)")
 
 
 def open_modes(machine: Machine, measured: str | None) -> dict[str, str]:
-    """Modes of the other axes that were not measured on this machine, and over which nobody decided."""
+    """Modes of the other axes that were neither measured on this machine nor decided on."""
     found: dict[str, list[str]] = {}
     for value in machine.values():
         parts = value.key.split(".")
@@ -158,7 +158,7 @@ def require_decisions(open_axes: Mapping[str, str], keep: str, rigid: str, file:
 
 
 def decide_axes(text: str, keep: str, rigid: str, file: str) -> tuple[str, list[str]]:
-    """Delete the modes of rigid axes from a file, and mark those of other axes as kept."""
+    """Delete the modes of rigid axes from a file, and mark the modes kept on other axes."""
     notes: list[str] = []
     for axis in rigid:
         tables = ModeTables(text, axis, "", file)
@@ -180,7 +180,7 @@ def decide_axes(text: str, keep: str, rigid: str, file: str) -> tuple[str, list[
 
 _MEASURED = "half of the 95 % interval"
 _DIGITS = 7
-_SUM_SLACK = 1e-3  # of the participations: rounding
+_SUM_SLACK = 1e-3  # tolerance of the participations' sum, for rounding
 _KEYS = (
     *("frequency_hz", "damping_ratio", "frequency_uncertainty_percent", "damping_uncertainty_percent"),
     *("mass_kg", "mass_uncertainty_percent", "source"),
@@ -198,12 +198,12 @@ class ModeTables:
         self.document = edit.parse_exactly(text + self._last_end, file)
         self.data: dict[str, Any] = tomllib.loads(text)
         self.axis, self.source, self.file = axis, source, file
-        self.notes: list[str] = []  # what was replaced, kept, removed and added, one sentence each
-        self._gap: list[edit.Entry] = []  # the blank line behind the first table, if that went
+        self.notes: list[str] = []  # replaced, kept, removed and added modes, one sentence each
+        self._gap: list[edit.Entry] = []  # the blank line after a deleted first table
         self.name = f"axes.{self.axis}.modes"
         self.old: list[dict[str, Any]] = list(self.data["axes"][self.axis].get("modes", []))
         self.expected: list[dict[str, Any]] = []
-        self._said: dict[int, dict[str, str]] = {}  # by identity of a table: origins of values that were put into it
+        self._said: dict[int, dict[str, str]] = {}  # by identity of a table: origins of the values written into it
         self.home = self._axis_table()
         held = (item.body for key, item in self.home.value.body if isinstance(item, AoT) and _is_modes(key, item))
         self.tables: list[Table] = next(held, [])
@@ -224,11 +224,11 @@ class ModeTables:
 
     def _no_place(self) -> ArgumentError:
         return ArgumentError(
-            f"{self.file}: no place for a table [[{self.name}]]: write the axis as a table [axes.{self.axis}]"
+            f"{self.file}: no position for a table [[{self.name}]]: write the axis as a table [axes.{self.axis}]"
         )
 
     def put(self, modes: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
-        """The text with modes in it; see `update.update_modes`."""
+        """Write modes into the text; see `update.update_modes`."""
         old_hz = [each["frequency_hz"] for each in self.old]
         taken = matches(modes, old_hz)
         kept = {old: modes[mode] for mode, old in taken.items()}
@@ -244,17 +244,17 @@ class ModeTables:
             listed = ", ".join(f"{share:g}" for share in shares)
             self.notes.append(
                 f"warning: the participations of the {self.axis.upper()} axis sum to {total:.4g}: those of all modes "
-                f"of one point sum to 1 when the axis moves; by the shares of the modes found they would be {listed}"
+                f"of one point sum to 1 when the axis moves; in the ratios of the modes found they would be {listed}"
             )
         said = self.data["axes"][self.axis].get("rigid")
         if said:
-            self.notes.append("it was marked as rigid: the mark is removed")
+            self.notes.append("the mark as rigid is removed")
         if said or (said is False and self._remarks.get(f"axes.{self.axis}.rigid", "").startswith("assumed")):
             self._say_rigid(False, "a mode was measured")
         return self._finished([*stay, *added])
 
     def make_rigid(self) -> str:
-        """The file without modes of the axis, which is marked as rigid."""
+        """Delete the modes of the axis and mark it as rigid."""
         _, left = self._old_tables({}, {}, "it is taken as rigid")
         entries = self.home.value.body
         place = next((n for n, (key, item) in enumerate(entries) if _is_modes(key, item)), len(entries))
@@ -263,7 +263,7 @@ class ModeTables:
         return self._finished([], rigid=True)
 
     def _finished(self, tables: Sequence[Table], *, rigid: bool = False) -> str:
-        """The new text, checked, with the origins of the modes where they are now."""
+        """The new text, checked, with the origins of the modes at their new places."""
         text = self.document.as_string()
         self._check(text, rigid)
         found = {key: remark for key, remark in self._remarks.items() if not key.startswith(self.name)}
@@ -292,7 +292,7 @@ class ModeTables:
             elif number in seen:
                 old_hz, new_hz = toml(old["frequency_hz"]), seen[number].frequency_hz.value
                 self.expected.append(old)
-                self.notes.append(f"kept {old_hz} Hz as it is: the test shows it at {new_hz:.6g} Hz, not well enough")
+                self.notes.append(f"kept {old_hz} Hz unchanged: the test shows it at {new_hz:.6g} Hz, not well enough")
             else:
                 self.notes.append(f"removed {toml(old['frequency_hz'])} Hz, {why}: {toml(old)}")
                 tail = edit.take_tail(table)
@@ -352,7 +352,7 @@ class ModeTables:
         )
 
     def _put(self, entries: list[edit.Entry], values: Mapping[str, tuple[Any, str]]) -> None:
-        """Values in place of those that a table has, or of its commented keys, else behind them."""
+        """Set values in place of a table's keys or commented keys, else after them."""
         below = next((n for n, (_, item) in enumerate(entries) if isinstance(item, Table)), len(entries))
         places = {edit.commented_key(entry): place for place, entry in enumerate(entries[:below])}
         places |= {key.key: place for place, (key, _) in enumerate(entries[:below]) if key is not None}
@@ -379,7 +379,7 @@ class ModeTables:
         values["source"] = self.source, ""
         values = {key: values[key] for key in _KEYS if key in values}
         told = {letter: each for letter, each in told_moves(mode).items() if abs(each.value) >= LEAST_MOVE}
-        if len(told) > 1:  # its motion along other axes was measured and is significant
+        if len(told) > 1:  # motion along other axes is significant
             others = (f"{axis} {each.low:.3g} ... {each.high:.3g}" for axis, each in told.items() if axis != self.axis)
             moves = {axis: _rounded(each.value, 4) for axis, each in told.items()}
             values["moves"] = moves, f"95 %: {', '.join(others)}"
@@ -389,8 +389,8 @@ class ModeTables:
         values = self._values(mode) | {"participation": (share, f"{meaning}, not measured")}
         self.expected.append({key: value for key, (value, _) in values.items()})
         self.notes.append(
-            f"{toml(values['frequency_hz'][0])} Hz is new: participation {share:g} ({meaning}); how much of the "
-            "axis' motion goes into it was not measured"
+            f"{toml(values['frequency_hz'][0])} Hz is new: participation {share:g} ({meaning}); the ratio of the "
+            "axis' motion in it was not measured"
         )
         lines = ["[[modes]]", *(_line(key, value, remark) for key, (value, remark) in values.items())]
         (_, tables), *_ = tomlkit.parse("".join(line + self.newline for line in lines)).body
@@ -399,7 +399,7 @@ class ModeTables:
         return tables.body[0]
 
     def _insert(self, stay: list[Table], added: list[Table], left: list[edit.Entry]) -> None:
-        """Put new tables behind the last one that stays, or where the first one was, or where the axis ends."""
+        """Insert new tables after the last remaining one, at the first one's place, or at the end of the axis."""
         for table in added:
             table.trivia.indent = self.newline
         if self.tables:
@@ -409,7 +409,7 @@ class ModeTables:
             self.tables[:] = [*stay, *added]
             self.tables[-1].value.body.extend(behind)
             return
-        # Where a commented table of modes makes room for them, or behind the axis.
+        # At a commented table of modes, or after the axis.
         entries = self.home.value.body
         modes = (SingleKey("modes"), AoT(added, "modes", parsed=True))
         for place, entry in enumerate(entries):
@@ -432,7 +432,7 @@ def _rounded(value: float, digits: int = _DIGITS) -> float:
 
 
 def _rounded_up(value: float) -> float:
-    """To four digits, never less than it was; rounding the value itself is covered too."""
+    """Round up to four digits; covers rounding of the value itself."""
     if not math.isfinite(value):
         return value
     value += 100.0 * 0.5 * 10.0 ** (1 - _DIGITS)
@@ -444,12 +444,12 @@ def _line(key: str, value: object, remark: str) -> str:
     return f"{key} = {toml(value)}" + (f"  # {remark}" if remark else "")
 
 
-SAME_MODE = 0.1  # Two frequencies, relative to the old one, within which a mode is taken as the one that the file has
+SAME_MODE = 0.1  # Two frequencies, relative to the old one, up to which a mode is that of the file
 _NO_PAIR, _SHARE_DIGITS = 1e3, 4
 
 
 def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
-    """Participations that sum to 1, and what they are: shares of the residues 1/m, or of the number of modes."""
+    """Participations that sum to 1, and their meaning: ratios of the residues 1/m, or equal."""
     masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
     if len(masses) < len(modes):
         return [_rounded(1.0 / len(modes), _SHARE_DIGITS)] * len(modes), "equal shares"
@@ -458,7 +458,7 @@ def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
 
 
 def matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:
-    """Number of the old mode by that of the new: as many pairs within 10 % as there can be, the nearest ones."""
+    """Index of the old mode by that of the new: the most pairs within 10 %, nearest first."""
     if not old_hz or not modes:
         return {}
     new_hz = np.array([mode.frequency_hz.value for mode in modes])

@@ -1,8 +1,8 @@
-"""Read the label of a column or channel: its unit and, by the names of the kind of file, what it measures.
+"""Reads labels of columns and channels: the unit and, by the names of the file type, the measured quantity.
 
-`read_label` divides every label in the same way: ``Acc_X [m/s^2]``, ``time_ms``, ``Kraft / N``, or a name with its unit
-in the row below. What the names mean differs: ``x`` is an acceleration along X in a tap file, a position in a record of
-forces. So each kind of file brings its own `meaning`; that of tap files is here, since universal files share it.
+`read_label` splits every label in the same way: ``Acc_X [m/s^2]``, ``time_ms``, ``Kraft / N``, or a name with its unit
+in the row below. Meanings of names differ: ``x`` is an acceleration along X in a tap file, a position in a record of
+forces. So each file type has its own names; those of tap files are here, since universal files share them.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ from shapegcode.io.units import Measured, Unit, find_unit, is_foreign_unit, unit
 class Meaning:
     """The meaning of a column name."""
 
-    what: str  # the quantity under the name that the reader of the file gives it, such as "fx"
+    what: str  # quantity, by the name in the file's reader, such as "fx"
     measures: Measured | Literal["response"]  # its kind; "response" for a response of unknown kind
     axis: str | None = None  # "x", "y" or "z"; None: no axis
 
 
 Names = Callable[[str], Meaning | None]
-"""The names of one kind of file: a name without its unit to what it stands for; None: another column."""
+"""Names of one file type: maps a name without unit to its meaning; None: not used."""
 
 
 @dataclass(frozen=True)
 class Label:
-    """What a column's or a channel's label says."""
+    """Parsed label of a column or channel."""
 
     text: str  # the label
-    meaning: Meaning | None  # None where it says nothing
-    unit: Unit | None  # where it is known
-    unknown_unit: str = ""  # text where a unit stands that is not known
+    meaning: Meaning | None  # None: unknown name
+    unit: Unit | None  # None: unknown or not stated
+    unknown_unit: str = ""  # text of an unknown unit
 
     @property
     def measures(self) -> Measured | Literal["response"] | None:
-        """Kind of the quantity; None where the label says nothing."""
+        """Kind of the quantity; None: unknown."""
         return None if self.meaning is None else self.meaning.measures
 
     @property
@@ -66,7 +66,7 @@ def read_label(text: str, unit_text: str, names: Names) -> Label:
 
 
 def _split_unit(text: str, names: Names) -> tuple[str, Unit | None, str]:
-    """(name, unit, text of an unknown unit) of a label."""
+    """Split a label into name, unit, text of an unknown unit."""
     if names(text) is None and not _is_in(text) and (unit := find_unit(text)):
         return "", unit, ""
     unknown = ""
@@ -99,7 +99,7 @@ def _split_unit(text: str, names: Names) -> tuple[str, Unit | None, str]:
 
 
 def _is_in(text: str) -> bool:
-    """Whether it is "in": inches behind a length, else a word."""
+    """Whether it is "in", a unit after a length, else a word."""
     return text.strip().lower() == "in"
 
 
@@ -109,12 +109,12 @@ def _kind(name: str, names: Names) -> str | None:
 
 
 def _is_name(text: str, names: Names) -> bool:
-    """Whether it is one word, and a name."""
+    """Whether it is a single word and a known name."""
     return words_of(text) == [text.lower()] and names(text) is not None and find_unit(text) is None
 
 
 def unit_of(where: str, label: Label, allowed: tuple[Measured, ...], remedy: str = "") -> Unit | None:
-    """The unit that a label states for a quantity; None: it states none."""
+    """Unit of a label for a quantity; None: not stated."""
     needed = f"needed is one of {units_of(*allowed)}"
     if label.unit is None and label.unknown_unit:
         raise RecordError(
@@ -123,7 +123,7 @@ def unit_of(where: str, label: Label, allowed: tuple[Measured, ...], remedy: str
         )
     if label.unit is not None and label.unit.measures not in allowed:
         raise RecordError(
-            f"{where}: {label.text!r} has the unit {label.unit.name} of {label.unit.measures}, it should be "
+            f"{where}: {label.text!r} has the unit {label.unit.name} of {label.unit.measures}, but must be of "
             f"{' or '.join(allowed)}: name and unit must agree; {needed}"
         )
     return label.unit
@@ -147,7 +147,7 @@ _WITH_AXIS = re.compile(r"(a|acc|accel|acceleration|v|vel|velocity|d|u|disp|disp
 
 
 def tap_label(text: str, unit_text: str = "") -> Label:
-    """Read a label of a tap file: where its name says nothing, or "response" only, its unit says what it is."""
+    """Read a label of a tap file: if its name is unknown, or only "response", the quantity follows from the unit."""
     label = read_label(text, unit_text, _tap_names)
     if label.unit is None or label.measures not in {None, "response"}:
         return label

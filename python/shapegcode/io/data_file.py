@@ -1,8 +1,8 @@
-"""Files read and written. What a data file may be: a regular file, with limits of size, unpacked size, depth and text;
-and files that are written whole, or stay as they were.
+"""Reads and writes files. Data files must be regular, with limits of size, unpacked size, depth and text length;
+files are written completely or remain unchanged.
 
-Whoever reads a file that came from elsewhere opens it here: settings, records, logs, dumps, results, programs. So no
-file of a few megabytes takes gigabytes, and none that is no file keeps a command waiting.
+All files from outside are opened here: settings, records, logs, dumps, results, programs. So no
+file of a few megabytes takes gigabytes of memory, and no pipe or device blocks a command.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ from typing import Any, BinaryIO, Self, cast
 
 from shapegcode.errors import ArgumentError, RecordError, ShapegcodeError
 
-MAX_DEPTH = 64  # lists and tables within each other
+MAX_DEPTH = 64  # nesting of lists and tables
 MAX_TEXT_BYTES = 1 << 20  # of one text, key, or line
 MAX_SETTINGS_BYTES = 4 << 20  # of a TOML file
 _MAX_BYTES = 2 << 30
 _MAX_INTEGER = 2**63 - 1
-#: Unpacked over packed: numbers of a log come to 5 to 15. Up to some size any ratio will do.
+#: Unpacked over packed: numbers of a log reach 5 to 15. Up to some size any ratio is accepted.
 _MAX_RATIO, _ANY_RATIO_BYTES = 50, 16 << 20
-#: Bytes that the values of a JSON file may take over its own bytes, and what a small one may take anyway.
+#: Memory limit of a JSON file's values, relative to its bytes, and the limit for small files.
 _MAX_GROWTH, _ANY_GROWTH_BYTES = 60, 600 << 20
 _PIECE_BYTES = 1 << 20
 _GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
 _PACKED_FAULTS = (EOFError, NotImplementedError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error)
 _KINDS = {stat.S_IFIFO: "a pipe", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device", stat.S_IFSOCK: "a socket"}
-#: What a value takes in memory at most, by the character that makes it: objects with one key are the dearest.
+#: Upper bound on a value's memory, by its JSON character; objects with one key need most.
 _MEMORY = {b"{": 240, b"[": 100, b":": 100, b'"': 30, b",": 40}
 _NOT_STRUCTURE = bytes(set(range(256)) - set(b'[]{}"'))
 _STRING = re.compile(rb'"[^"]*+"')
 _ONE_KIND = bytes.maketrans(b"{}", b"[]")
 _KEY_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
-#: tomllib takes the square of the length of such a key.
+#: tomllib's time grows with the square of such a key's length.
 _LONG_KEY = re.compile(rf"(?<![\w.-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{MAX_DEPTH}}}")
 
 Fault = Callable[[str], Exception]
@@ -53,10 +53,10 @@ Fault = Callable[[str], Exception]
 def open_file(path: str | Path) -> BinaryIO:
     """Open a regular file to read it; a pipe or device is refused at once, without waiting for it."""
     if not isinstance(path, str | os.PathLike):
-        raise ArgumentError(f"a file's name is needed, not {type(path).__name__}")
+        raise ArgumentError(f"a file name is needed, not {type(path).__name__}")
     wanted = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_NONBLOCK", 0)
     try:
-        mode = os.stat(path).st_mode  # before it is opened: that alone can wind a tape back
+        mode = os.stat(path).st_mode  # before opening, which can rewind a tape
         if stat.S_ISREG(mode):
             descriptor = os.open(path, wanted)
             mode = os.fstat(descriptor).st_mode
@@ -72,11 +72,11 @@ def open_file(path: str | Path) -> BinaryIO:
 
 
 def _readable(file: BinaryIO, path: str | Path) -> BinaryIO:
-    """The file itself; a node of the kernel that only looks regular says at its first byte that it cannot be read."""
+    """Check the first byte, since kernel files may look regular but be unreadable."""
     try:
         with named_errors(path):
             if file.read(1) is None:
-                raise OSError(errno.EAGAIN, "there is nothing to read at once", str(path))
+                raise OSError(errno.EAGAIN, "no data is available at once", str(path))
             file.seek(0)
     except OSError:
         file.close()
@@ -85,16 +85,16 @@ def _readable(file: BinaryIO, path: str | Path) -> BinaryIO:
 
 
 def read_file(path: str | Path, most: int = _MAX_BYTES) -> bytes:
-    """The bytes of a regular file."""
+    """Read the bytes of a regular file."""
     with open_file(path) as file:
         if os.fstat(file.fileno()).st_size > most:
-            raise OSError(errno.EFBIG, f"more than {most} bytes: no more is read at once", str(path))
+            raise OSError(errno.EFBIG, f"more than {most} bytes, the limit for reading at once", str(path))
         with named_errors(path):
             return file.read()
 
 
 class DataFile:
-    """One file that is read, plain or packed, and how much of its limits is used up."""
+    """A plain or packed file being read, with its use of the limits."""
 
     def __init__(self, path: str | Path, fault: Fault = RecordError) -> None:
         self.path, self._fault = Path(path), fault
@@ -112,7 +112,7 @@ class DataFile:
         self._file.close()
 
     def pieces(self) -> Iterator[bytes]:
-        """Its content in pieces, unpacked by gzip where it is packed so."""
+        """Yield its content in pieces, unpacked if gzip."""
         if self.kind != "gzip":
             while piece := self._file.read(_PIECE_BYTES):
                 yield piece
@@ -121,13 +121,13 @@ class DataFile:
             yield from self._checked(cast(BinaryIO, packed))
 
     def read(self) -> bytes:
-        """Its whole content, unpacked; see `pieces`."""
+        """Read its whole content, unpacked; see `pieces`."""
         if self.kind != "gzip" and self.size > _MAX_BYTES:
             raise self._fault(f"{self.path}: {self.size} bytes: at most {_MAX_BYTES} are read at once")
         return b"".join(self.pieces())
 
     def members(self, suffix: str) -> Iterator[tuple[str, bytes]]:
-        """Files in a zip archive."""
+        """Yield the files in a zip archive."""
         try:
             with zipfile.ZipFile(self._file) as archive:
                 for each in archive.infolist():
@@ -140,7 +140,7 @@ class DataFile:
             raise self._fault(f"{self.path}: the packed file is cut off or damaged: {error}") from error
 
     def _checked(self, packed: BinaryIO) -> Iterator[bytes]:
-        """Pieces of what is unpacked, whatever sizes the file states."""
+        """Yield unpacked pieces and check their size, not trusting sizes in the file."""
         most = min(max(_MAX_RATIO * self.size, _ANY_RATIO_BYTES), _MAX_BYTES if self.kind == "zip" else 2**63)
         while True:
             try:
@@ -158,24 +158,24 @@ class DataFile:
             yield piece
 
     def json(self, where: str, data: bytes, constant: Callable[[str], Any] | None = None) -> Any:
-        """The value of a JSON text of this file, within the limits."""
+        """Parse JSON of this file within the limits."""
         self._memory += len(data) * (3 if data.isascii() else 6)
         self._memory += sum(count * data.count(mark) for mark, count in _MEMORY.items())
         most = max(_MAX_GROWTH * self.size, _ANY_GROWTH_BYTES)
         if self._memory > most:
             raise self._fault(
-                f"{where}: its values would take some {self._memory} bytes of memory: at most {most} for a file of "
+                f"{where}: its values would take about {self._memory} bytes of memory: at most {most} for a file of "
                 f"{self.size} bytes"
             )
         structure = data.replace(b"\\\\", b"").replace(b'\\"', b"")
         longest = max((each.end() - each.start() for each in _STRING.finditer(structure)), default=0)
         if longest > MAX_TEXT_BYTES:
-            raise self._fault(f"{where}: a text of {longest} bytes: at most {MAX_TEXT_BYTES} are read")
+            raise self._fault(f"{where}: a string of {longest} bytes: at most {MAX_TEXT_BYTES} are read")
         structure = _STRING.sub(b"", structure.translate(None, _NOT_STRUCTURE)).translate(_ONE_KIND)
-        for _ in range(MAX_DEPTH):  # the innermost pairs
+        for _ in range(MAX_DEPTH):  # remove innermost pairs
             structure = structure.replace(b"[]", b"")
         if structure.count(b"[") > MAX_DEPTH or b"[]" in structure:
-            raise self._fault(f"{where}: nested too deeply: at most {MAX_DEPTH} lists and objects within each other")
+            raise self._fault(f"{where}: nested too deeply: at most {MAX_DEPTH} levels of lists and objects")
 
         def integer(digits: str) -> int:
             if len(digits) > 20 or abs(int(digits)) > _MAX_INTEGER:
@@ -189,9 +189,9 @@ class DataFile:
 
 
 def toml_tables(text: str) -> dict[str, Any]:
-    """The tables of a TOML text, within the limits."""
+    """Parse TOML within the limits."""
     if len(text) > MAX_SETTINGS_BYTES:
-        raise ValueError(f"more than {MAX_SETTINGS_BYTES} characters: no more is read of a TOML file")
+        raise ValueError(f"more than {MAX_SETTINGS_BYTES} characters, the limit of a TOML file")
     if found := _LONG_KEY.search(text):
         line = text.count("\n", 0, found.start()) + 1
         raise ValueError(f"a key of more than {MAX_DEPTH} parts (at line {line}, column 1)")
@@ -209,7 +209,7 @@ def toml_tables(text: str) -> dict[str, Any]:
             if isinstance(value, dict) and any(len(key) > MAX_TEXT_BYTES for key in value):
                 raise ValueError(f"a key of more than {MAX_TEXT_BYTES} characters")
         elif isinstance(value, str) and len(value) > MAX_TEXT_BYTES:
-            raise ValueError(f"a text of {len(value)} characters: at most {MAX_TEXT_BYTES} are read")
+            raise ValueError(f"a string of {len(value)} characters: at most {MAX_TEXT_BYTES} are read")
         elif isinstance(value, int) and abs(value) > _MAX_INTEGER:
             digits = str(value) if abs(value) < 10**40 else f"of some {value.bit_length() * 3 // 10} digits"
             raise ValueError(f"the whole number {digits}: must be from -{_MAX_INTEGER} to {_MAX_INTEGER}")
@@ -217,21 +217,21 @@ def toml_tables(text: str) -> dict[str, Any]:
 
 
 _passing = False
-_LONGEST_NAME = 200  # of a file, so that more has room behind it
+_LONGEST_NAME = 200  # longest used part of a file name, to leave space for a suffix
 
 
 def write_in_passing() -> None:
-    """Do without fsync in this process from now on: its files are read at once and kept by another process."""
+    """Disable fsync in this process, whose files another process reads at once and stores."""
     global _passing  # noqa: PLW0603 - of the whole process, which has no other use
     _passing = True
 
 
-_TEMPORARY = re.compile(r"\..+\.[0-9a-f]+\.tmp")  # digits alone: of versions before
+_TEMPORARY = re.compile(r"\..+\.[0-9a-f]+\.tmp")  # digits only: from earlier versions
 
 
 @contextlib.contextmanager
 def named_errors(path: str | Path) -> Iterator[None]:
-    """Errors of the file system get the name of *path*: a failed write() has none, a temporary file another."""
+    """Set *path* in file system errors: a failed write() has no name, a temporary file another."""
     try:
         yield
     except OSError as error:
@@ -242,7 +242,7 @@ def named_errors(path: str | Path) -> Iterator[None]:
 def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
     """A stream whose content replaces a file when the block ends without an error; otherwise the file is unchanged.
 
-    A symbolic link is followed, but not round in a circle; a device or pipe is written to directly.
+    A symbolic link is followed, except in a loop; a device or pipe is written directly.
     """
     target = _target_of(path)
     if target.exists() and not stat.S_ISREG(target.stat().st_mode):
@@ -250,7 +250,7 @@ def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
             yield stream
         return
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
-    # No number of a process: a container counts from 1 again, and threads have the same one. See is_temporary.
+    # No process ID: it repeats in containers and is shared by threads. See is_temporary.
     temporary = target.with_name(f".{target.name[:_LONGEST_NAME]}.{secrets.token_hex(8)}.tmp")
     stream = open(temporary, "xb")  # noqa: SIM115 - what another one has written is not removed below
     try:
@@ -268,9 +268,9 @@ def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
 
 
 def _target_of(path: str | Path) -> Path:
-    """The file that a symbolic link leads to."""
+    """Target of a symbolic link."""
     target = Path(os.path.realpath(path))
-    if target.is_symlink():  # realpath gives up only where links lead to each other
+    if target.is_symlink():  # realpath fails only for a loop of links
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
     return target
 
@@ -281,17 +281,17 @@ def is_temporary(path: str | Path) -> bool:
 
 
 def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
-    """Write a UTF-8 file so that it is either complete or as it was before; line ends as they are."""
+    """Write a UTF-8 file atomically: complete or unchanged; line ends as given."""
     write_bytes(path, _encoded(text), overwrite=overwrite)
 
 
 def _encoded(text: str) -> bytes:
-    """As UTF-8; of names of files that are none JSON understands what then stands there."""
+    """Encode as UTF-8; undecodable bytes of file names become JSON escapes."""
     return text.encode(errors="backslashreplace")
 
 
 def write_lines(path: str | Path, lines: Iterable[str]) -> None:
-    """As `write_text`, line by line, without holding all of them; ``-`` is standard output."""
+    """Like `write_text`, from an iterator of lines; ``-`` is standard output."""
     if path == "-":
         sys.stdout.writelines(lines)
         return
@@ -301,7 +301,7 @@ def write_lines(path: str | Path, lines: Iterable[str]) -> None:
 
 
 def write_bytes(path: str | Path, data: bytes | memoryview, *, overwrite: bool = True) -> None:
-    """As :func:`write_text`, for bytes."""
+    """Like :func:`write_text`, for bytes."""
     with named_errors(path):
         if overwrite:
             with replaced_file(path) as stream:

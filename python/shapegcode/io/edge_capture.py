@@ -1,4 +1,4 @@
-"""What a Sinumerik control recorded of itself: signals of the axes in every position control cycle, and its blocks."""
+"""Capture of a Sinumerik control: axis signals in every position control cycle, and executed blocks."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class EdgeAxis:
     """An axis or spindle of the capture.
 
     Attributes:
-        number: behind the bar of its signals: 3 of "DES_POS|3".
-        name: as the header labels it, such as "X1"; the number where it has no label. A label is set in the
-            recorder: it is not what the control calls the axis.
-        signals: what was recorded of it, such as "DES_POS".
+        number: axis number, after the bar of its signals: 3 in "DES_POS|3".
+        name: label in the header, such as "X1"; the number if it has no label. A label is set in the
+            recorder and may differ from the control's name of the axis.
+        signals: recorded signals, such as "DES_POS".
     """
 
     number: int
@@ -41,15 +41,15 @@ class EdgeBlock:
 
     Attributes:
         counter: position control cycle.
-        time_s: of it, from the first sample on; may lie before it, behind the last one, or in a gap.
-        text: of the block, as the control holds it after its preprocessing.
-        line: number of the line in its program ("SeekOffset").
-        path: of its program, from the last call event; empty before the first one.
-        selected_tool: number of the tool that is programmed.
+        time_s: its time since the first sample; may be before it, after the last sample, or in a gap.
+        text: text of the block after the control's preprocessing.
+        line: line number in its program ("SeekOffset").
+        path: path of its program, from the last call event; empty before the first one.
+        selected_tool: number of the programmed tool.
         active_tool: number of the tool in the spindle.
         motion: G code of the first group, such as "G1".
         buffered: blocks in the look-ahead buffer.
-        channel: of the control.
+        channel: channel of the control.
     """
 
     counter: int
@@ -66,15 +66,15 @@ class EdgeBlock:
 
 @dataclass(frozen=True)
 class EdgeCall:
-    """A program that was called, or to which the control came back.
+    """A program that was called or returned to.
 
     Attributes:
         counter: position control cycle.
-        time_s: of it, from the first sample on.
-        path: of the program.
-        line: number of the line in it.
+        time_s: its time since the first sample.
+        path: path of the program.
+        line: line number in it.
         level: depth of the call.
-        channel: of the control.
+        channel: channel of the control.
     """
 
     counter: int
@@ -91,9 +91,9 @@ class EdgeValue:
 
     Attributes:
         counter: position control cycle.
-        time_s: of it, from the first sample on.
+        time_s: its time since the first sample.
         address: such as "/Channel/State/actTNumber".
-        value: as text, as the file has it.
+        value: text in the file.
     """
 
     counter: int
@@ -107,11 +107,11 @@ class EdgeGap:
     """Cycles without a sample.
 
     Attributes:
-        index: of the first sample behind the gap.
-        counter: of the last sample before it.
-        missing: cycles that were not recorded.
+        index: index of the first sample after the gap.
+        counter: counter of the last sample before it.
+        missing: number of missing cycles.
         start_s: time of the last sample before it.
-        duration_s: until the first sample behind it.
+        duration_s: from there to the first sample after it.
     """
 
     index: int
@@ -123,25 +123,25 @@ class EdgeGap:
 
 @dataclass(frozen=True, eq=False)
 class EdgeCapture:
-    """A capture of a Sinumerik control, as `read_edge_json` reads it.
+    """A capture of a Sinumerik control, from `read_edge_json`.
 
     Units are those of the control: positions in mm (rotary axes in degrees), speeds per second, torques in Nm (N for a
-    linear motor). DES_POS is the command behind the fine interpolator, ENC_POS the active encoder, CONT_DEV the lag
-    less the lag that the control's own model of the axis expects, VEL_FFW the speed that is fed forward.
+    linear motor). DES_POS is the command after the fine interpolator, ENC_POS the active encoder, CONT_DEV the lag
+    minus that of the control's axis model, VEL_FFW the velocity feed-forward.
 
     Attributes:
         source: file.
-        version: of the format, such as "1.0".
+        version: version of the format, such as "1.0".
         cycle_s: position control cycle.
-        counter: (n,) cycle of each sample, rising.
-        time_s: (n,) time of each sample from the first one on: counter times cycle, gaps counted.
-        columns: (n,) values by address, such as "DES_POS|1"; NaN where the file has no value.
+        counter: (n,) cycle of each sample, ascending.
+        time_s: (n,) time of each sample since the first: counter times cycle, including gaps.
+        columns: (n,) values by address, such as "DES_POS|1"; NaN if the file has no value.
         axes: in the order of their numbers.
         blocks: in the order of their counters.
         calls: in the order of their counters.
         values: slow values in the order of their counters.
         gaps: where samples are missing.
-        notes: what reading had to leave out or to assume.
+        notes: parts ignored and assumptions made on reading.
     """
 
     source: str
@@ -164,7 +164,7 @@ class EdgeCapture:
         return tuple(slice(start, stop) for start, stop in itertools.pairwise(ends) if stop > start)
 
     def axis(self, axis: int | str) -> EdgeAxis:
-        """An axis.
+        """Find an axis.
 
         Args:
             axis: its number, or its label ("X1").
@@ -173,7 +173,7 @@ class EdgeCapture:
             The axis.
 
         Raises:
-            RecordError: there is none, or the label stands for several.
+            RecordError: no such axis, or a label of several.
         """
         wanted = str(axis).strip().lower()
         found = [each for each in self.axes if wanted == str(each.number)]
@@ -185,7 +185,7 @@ class EdgeCapture:
         return found[0]
 
     def column(self, signal: str, axis: int | str) -> FloatArray:
-        """The values of one signal of one axis, as they stand in the file.
+        """Values of one signal of one axis, as in the file.
 
         Args:
             signal: such as "DES_POS".
@@ -195,7 +195,7 @@ class EdgeCapture:
             (n,) values.
 
         Raises:
-            RecordError: the file does not have it; the message says what it has.
+            RecordError: the signal is not in the file; the message lists those in it.
         """
         found = self.axis(axis)
         if signal not in found.signals:
@@ -206,12 +206,12 @@ class EdgeCapture:
         return self.columns[f"{signal}|{found.number}"]
 
     def position(self, axis: int | str, *, actual: bool = False) -> FloatArray:
-        """Position of an axis without the jumps of whole turns with which a control keeps a rotary axis small.
+        """Position of an axis, with a rotary axis' wraps by whole turns removed.
 
-        A step of more than half a turn within one cycle is taken as such a jump where whole turns less it goes on as
-        the steps before: no axis moves that fast (90 m/s, 15 000 rpm at 2 ms). How many turns a gap holds
-        is not known: behind it the value is that of the file again. Command and actual position are straightened with
-        the same turns, so that their difference stays.
+        A step of more than half a turn within one cycle is a wrap if, less whole turns, it continues the steps before,
+        since no axis moves that fast (90 m/s, 15 000 rpm at 2 ms). The number of turns in a gap
+        is unknown: after it the file's value is used unchanged. Command and actual position are unwrapped by
+        the same turns, so that their difference is unchanged.
 
         Args:
             axis: number or label.
@@ -221,7 +221,7 @@ class EdgeCapture:
             (n,) in mm or degrees.
 
         Raises:
-            RecordError: the file does not have it.
+            RecordError: the signal is not in the file.
         """
         number = self.axis(axis).number
         values = self.column("ENC_POS" if actual else "DES_POS", number)
@@ -230,7 +230,7 @@ class EdgeCapture:
         for stretch in self.stretches:
             steps = np.diff(reference[stretch], prepend=reference[stretch][:1])
             turns = np.where(np.abs(steps) > TURN_DEG / 2.0, np.round(steps / TURN_DEG), 0.0)
-            # Without the turns the axis goes on as before: else the coordinates were changed.
+            # A wrap continues the motion before; otherwise the coordinates changed.
             beyond = steps - TURN_DEG * turns
             before = np.concatenate([beyond[:1], beyond[:-1]])
             turns[~(np.abs(beyond - before) < _EVEN_DEG)] = 0.0
@@ -238,33 +238,33 @@ class EdgeCapture:
         return out
 
     def is_rotary(self, axis: int | str) -> bool:
-        """Whether the command of an axis makes jumps of whole turns: only a rotary axis does.
+        """Whether the command of an axis wraps by whole turns, which proves a rotary axis.
 
-        False says nothing: a rotary axis may have stayed within one turn.
+        False proves nothing: a rotary axis may have stayed within one turn.
 
         Args:
             axis: number or label.
 
         Returns:
-            Whether such a jump was seen.
+            True if a wrap was found.
 
         Raises:
-            RecordError: the file does not have its command.
+            RecordError: its command is not in the file.
         """
         return bool(np.any(np.abs(self.position(axis) - self.column("DES_POS", axis)) > TURN_DEG / 2.0))
 
     def speed(self, axis: int | str, *, actual: bool = False) -> FloatArray:
-        """Speed of an axis: differences of its position over two cycles, over one at the ends of a section.
+        """Speed of an axis: differences of its position over two cycles, over one cycle at the ends of a section.
 
         Args:
             axis: number or label.
-            actual: of the encoder, else of the command.
+            actual: speed of the encoder, else of the command.
 
         Returns:
-            (n,) in mm/s or degrees/s; NaN for a sample alone between gaps.
+            (n,) in mm/s or degrees/s; NaN for a single sample between gaps.
 
         Raises:
-            RecordError: the file does not have its position.
+            RecordError: its position is not in the file.
         """
         position_of = self.position(axis, actual=actual)
         out = np.full(len(position_of), np.nan)

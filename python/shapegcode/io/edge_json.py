@@ -1,4 +1,4 @@
-"""Reads what the SINUMERIK Data Recorder (Edge) writes: JSON of Header, Payload and Footer, plain, gzip or zip.
+"""Reads files of the SINUMERIK Data Recorder (Edge): JSON of Header, Payload and Footer, plain, gzip or zip.
 
 Source of the format: Siemens, SINUMERIK Data Recorder, "Data output format"; of the signals: SINUMERIK Connector,
 "Which HF data can be collected".
@@ -28,8 +28,8 @@ from shapegcode.io.units import FloatArray
 _MIN_ROWS = 2
 _MAX_VALUE = 1e12
 _NUMBERS = {int, float, type(None)}
-_EVENTS = ("HFBlockEvent", "HFCallEvent", "HFTimestamp")  # entries of a payload that are one event each
-_COUNTER_RANGE = 1 << 31  # after its last number the counter starts again at 0
+_EVENTS = ("HFBlockEvent", "HFCallEvent", "HFTimestamp")  # entries of a payload with a single event
+_COUNTER_RANGE = 1 << 31  # the counter restarts at 0 after its last number
 _APART_S = 0.5
 _VERSIONS = ((0, 6), (1, 1))
 _MAX_GAPS = 10
@@ -39,10 +39,10 @@ _END = re.compile(r"\s*(?:/?\s*N\d+\s*)?(?:M0?2|M30)\b", re.IGNORECASE)
 
 
 def _joined_rows(path: Path, parts: list[_Part]) -> tuple[IntArray, dict[str, FloatArray], list[str]]:
-    """Counters, values by address, and notes of the rows of all entries "HFData"."""
+    """Join the rows of all entries "HFData": counters, values by address, and notes."""
     addresses = parts[0].addresses
     pieces: list[FloatArray] = []
-    sources: list[str] = []  # of each piece, for messages
+    sources: list[str] = []  # source of each piece, for messages
     for part in parts:
         for index, entry in enumerate(part.payload):
             where = f"{part.where}: Payload[{index}].HFData"
@@ -51,7 +51,7 @@ def _joined_rows(path: Path, parts: list[_Part]) -> tuple[IntArray, dict[str, Fl
                 sources.append(where)
     starts = np.cumsum([0, *map(len, pieces)])
     if starts[-1] < _MIN_ROWS:
-        raise RecordError(f"{path}: the Payload holds {starts[-1]} rows of HFData: at least 2 are needed")
+        raise RecordError(f"{path}: the Payload has {starts[-1]} rows of HFData: at least 2 are needed")
     values = np.concatenate(pieces)
     counter, kept, notes = _counters(values[:, addresses.index("CYCLE")], values, sources, starts)
     columns: dict[str, FloatArray] = {}
@@ -67,14 +67,14 @@ def _joined_rows(path: Path, parts: list[_Part]) -> tuple[IntArray, dict[str, Fl
 
 
 def _numbers(where: str, rows: Any, addresses: tuple[str, ...]) -> FloatArray:
-    """(rows, signals) numbers of one entry; NaN for null."""
+    """Numbers of one entry, (rows, signals); NaN for null."""
     if not isinstance(rows, list):
         raise RecordError(f"{where} = {str(rows)[:40]!r}: must be a list of rows")
     for index, row in enumerate(rows):
         if not isinstance(row, list) or len(row) != len(addresses):
             found = f"{len(row)} values" if isinstance(row, list) else repr(str(row)[:40])
             raise RecordError(
-                f"{where}[{index}] has {found}: SignalListHFData lists {len(addresses)} signals, and each row has one "
+                f"{where}[{index}] has {found}: SignalListHFData lists {len(addresses)} signals, each row needs one "
                 "value of each"
             )
         if not set(map(type, row)) <= _NUMBERS:
@@ -96,7 +96,7 @@ def _numbers(where: str, rows: Any, addresses: tuple[str, ...]) -> FloatArray:
 def _counters(
     raw: FloatArray, values: FloatArray, sources: list[str], starts: IntArray
 ) -> tuple[IntArray, npt.NDArray[np.bool_], list[str]]:
-    """Counter of each row that is kept, which rows these are, and notes."""
+    """Counter and index of each row used, and notes."""
 
     def at(row: int) -> str:
         piece = int(np.searchsorted(starts, row, side="right")) - 1
@@ -109,7 +109,7 @@ def _counters(
     steps = np.diff(raw)
     over = steps < -_COUNTER_RANGE / 2
     if over.any():
-        notes.append(f"the counter starts again at 0 after {int(raw[np.flatnonzero(over)[0]])}: counted on")
+        notes.append(f"the counter starts again at 0 after {int(raw[np.flatnonzero(over)[0]])}: continued")
     counter = raw.astype(np.int64)
     counter[1:] += _COUNTER_RANGE * np.cumsum(over)
     repeated = np.flatnonzero(np.diff(counter) == 0) + 1
@@ -117,19 +117,19 @@ def _counters(
     kept = np.ones(len(counter), dtype=bool)
     kept[repeated[same]] = False
     if same.any():
-        notes.append(f"{same.sum()} rows stand there twice and were taken once, the first at {at(repeated[same][0])}")
+        notes.append(f"{same.sum()} rows are repeated and were used once, the first at {at(repeated[same][0])}")
     back = np.flatnonzero((np.diff(counter) <= 0) & kept[1:])
     if back.size:
         row = int(back[0]) + 1
         fault = "other values under the same counter" if counter[row] == counter[row - 1] else "the counter goes back"
         raise RecordError(
-            f"{at(row)}: CYCLE = {raw[row]:.0f} behind {raw[row - 1]:.0f}: {fault}; it must rise from row to row"
+            f"{at(row)}: CYCLE = {raw[row]:.0f} after {raw[row - 1]:.0f}: {fault}; it must rise from row to row"
         )
     return counter[kept], kept, notes
 
 
 def _key_of(table: Mapping[str, Any], name: str) -> Any:
-    """A value by its key in whatever case: versions differ ("HfProbeCounter"); None where there is none."""
+    """Value by a key in any case, since versions differ ("HfProbeCounter"); None if missing."""
     if name in table:
         return table[name]
     return next((value for key, value in table.items() if key.lower() == name.lower()), None)
@@ -137,7 +137,7 @@ def _key_of(table: Mapping[str, Any], name: str) -> Any:
 
 @dataclass
 class _Events:
-    """Blocks, calls, slow values and time stamps of the files, in their order there."""
+    """Blocks, calls, slow values and time stamps of the files, in file order."""
 
     start: int
     cycle_s: float
@@ -149,7 +149,7 @@ class _Events:
     path: str = ""
 
     def read(self, name: str, payload: list[dict[str, Any]]) -> None:
-        """Take the events of a file."""
+        """Read the events of a file."""
         for index, entry in enumerate(payload):
             for kind, content in entry.items():
                 where = f"{name}: Payload[{index}].{kind}"
@@ -166,8 +166,8 @@ class _Events:
                         self.values.append(EdgeValue(*when, str(each.get("address", "")), str(each.get("value", ""))))
 
     def notes(self) -> list[str]:
-        """What was left out, and where the clock does not go with the counter."""
-        left = [f"{count} entries {kind} in the payload were left out" for kind, count in self.others.items()]
+        """Notes on ignored entries, and where clock and counter disagree."""
+        left = [f"{count} entries {kind} in the payload were ignored" for kind, count in self.others.items()]
         return left + _clock_notes(self.stamps, self.cycle_s)
 
     def _event(self, where: str, kind: str, event: dict[str, Any]) -> None:
@@ -186,7 +186,7 @@ class _Events:
                 _integer(where, event, "SelectedTool"), _integer(where, event, "ActiveTool"),
                 str(event.get("IpoGC") or ""), _integer(where, event, "laBuf"), channel,
             )  # fmt: skip
-            # A file of a chain begins with the last block of the file before it.
+            # A continued file begins with the last block of the file before.
             if not self.blocks or self.blocks[-1] != block:
                 self.blocks.append(block)
 
@@ -195,7 +195,7 @@ class _Events:
         if counter is None:
             raise RecordError(f"{where}.HFProbeCounter is missing: the time is unknown")
         if self.start - counter > _COUNTER_RANGE // 2:
-            counter += _COUNTER_RANGE  # it began anew at 0 after the first sample
+            counter += _COUNTER_RANGE  # it restarted at 0 after the first sample
         return counter, (counter - self.start) * self.cycle_s
 
 
@@ -206,7 +206,7 @@ def _object(where: str, value: Any) -> dict[str, Any]:
 
 
 def _integer(where: str, table: Mapping[str, Any], name: str) -> int | None:
-    """A whole number, which versions write as number or as text; None where there is none."""
+    """A whole number, written as number or text depending on the version; None if missing."""
     value = _key_of(table, name)
     if value is None or value == "":
         return None
@@ -220,7 +220,7 @@ def _integer(where: str, table: Mapping[str, Any], name: str) -> int | None:
 
 
 def _clock_notes(stamps: Sequence[tuple[int, str]], cycle_s: float) -> list[str]:
-    """Where the clock and the counter go apart between two stamps, or a stamp is no time."""
+    """Notes where clock and counter disagree between two stamps, or a stamp is invalid."""
     notes: list[str] = []
     jumps: list[tuple[int, float, float]] = []
     before: tuple[int, datetime] | None = None
@@ -228,7 +228,7 @@ def _clock_notes(stamps: Sequence[tuple[int, str]], cycle_s: float) -> list[str]
         try:
             now = datetime.fromisoformat(text.replace("Z", "+00:00"))
         except ValueError:
-            notes.append(f"the time stamp {text[:40]!r} at counter {counter} is no time")
+            notes.append(f"the time stamp {text[:40]!r} at counter {counter} is not a time")
             continue
         if before is not None and (now.tzinfo is None) == (before[1].tzinfo is None):
             clock, counted = (now - before[1]).total_seconds(), (counter - before[0]) * cycle_s
@@ -237,16 +237,16 @@ def _clock_notes(stamps: Sequence[tuple[int, str]], cycle_s: float) -> list[str]
         before = counter, now
     if jumps:
         counter, clock, counted = jumps[0]
-        more = f", and {len(jumps) - 1} times more" if len(jumps) > 1 else ""
+        more = f", and {len(jumps) - 1} more times" if len(jumps) > 1 else ""
         notes.append(
             f"the clock and the counter disagree before counter {counter}{more}: {clock:.3f} s passed by the time "
-            f"stamps, {counted:.3f} s by the counter, which is taken"
+            f"stamps, {counted:.3f} s by the counter, which is used"
         )
     return notes
 
 
 def is_edge_json(head: bytes) -> bool:
-    """Whether a file may be such a capture, by its first bytes."""
+    """Whether a file may be a capture, by its first bytes."""
     text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
     return head[:2] == b"\x1f\x8b" or head[:4] == b"PK\x03\x04" or (text[:1] == b"{" and text[1:].lstrip()[:1] == b'"')
 
@@ -256,14 +256,14 @@ def read_edge_json(path: str | Path) -> EdgeCapture:
 
     Args:
         path: of the file: .json as recorded, packed by gzip, or the recorder's .zip; the files of one recording in a
-            zip are joined in the order of their counters.
+            zip are joined by counter.
 
     Returns:
-        Its samples, blocks, calls and slow values; what is missing or doubtful is in `notes`.
+        Its samples, blocks, calls and slow values; `notes` list missing and doubtful data.
 
     Raises:
-        RecordError: not such a file, cut off, of another version, or with values that cannot be; the message says
-            where, what stands there and what must.
+        RecordError: not such a file, truncated, of another version, or with impossible values; the message gives
+            the place, what was found and what is required.
         OSError: the file cannot be read.
     """
     path = Path(path)
@@ -272,7 +272,7 @@ def read_edge_json(path: str | Path) -> EdgeCapture:
         contents = zipped if file.kind == "zip" else [(str(path), file.read())]
         parts = [_Part(where, _parsed(file, where, data)) for where, data in contents]
     if not parts:
-        raise RecordError(f"{path}: the archive holds no .json file")
+        raise RecordError(f"{path}: the archive contains no .json file")
     parts.sort(key=lambda each: each.first_counter)
     if len({(part.cycle_s, part.addresses) for part in parts}) > 1:
         raise RecordError(f"{path}: the files in it differ in signals or cycle: one recording has one header")
@@ -288,10 +288,10 @@ def _parsed(file: DataFile, where: str, data: bytes) -> dict[str, Any]:
         raise RecordError(f"{where}: not UTF-8 text: byte {error.start} is {error.object[error.start]:#04x}") from error
     except json.JSONDecodeError as error:
         length = len(error.doc)
-        cut = "it is cut off there; record it again or mend it"
+        cut = "it is truncated there; record it again or repair it"
         cut = cut if error.pos >= len(error.doc.rstrip()) - 1 else error.msg
         raise RecordError(
-            f"{where}:{error.lineno}: not whole JSON: column {error.colno}, character {error.pos} of {length}: {cut}"
+            f"{where}:{error.lineno}: not complete JSON: column {error.colno}, character {error.pos} of {length}: {cut}"
         ) from error
     if not isinstance(found, dict) or not isinstance(found.get("Header"), dict):
         raise RecordError(f"{where}: no Header: not a file of the SINUMERIK Data Recorder (Header, Payload, Footer)")
@@ -313,20 +313,20 @@ class _Part:
         if isinstance(cycle, bool) or not isinstance(cycle, int | float) or not low <= cycle <= high:
             raise RecordError(
                 f"{self.where}: Header.CycleTimeMs = {cycle!r}: must be the position control cycle, {low:g} to "
-                f"{high:g} ms; without it counters are no times"
+                f"{high:g} ms; without it counters give no times"
             )
         self.cycle_s = cycle / 1000.0
         self.signals = self._signals(header)  # address, label of the axis
         self.addresses = tuple(address for address, _ in self.signals)
         payload = data.get("Payload")
         if not isinstance(payload, list):
-            raise RecordError(f"{self.where}: Payload is missing or no list: the file holds no data")
+            raise RecordError(f"{self.where}: Payload is missing or not a list: the file has no data")
         self.payload: list[dict[str, Any]] = [_object(f"{where}: Payload[{k}]", each) for k, each in enumerate(payload)]
         self._footer(data)
 
     @property
     def first_counter(self) -> float:
-        """Of the first event or sample, to put files in order."""
+        """Counter of the first event or sample, to sort files."""
         for entry in self.payload:
             for kind in _EVENTS:
                 found = _key_of(entry[kind], "HFProbeCounter") if isinstance(entry.get(kind), dict) else None
@@ -349,9 +349,9 @@ class _Part:
         except ValueError:
             raise RecordError(f"{key} = {text}: must be {first} to {last}") from None
         if number < _VERSIONS[0] or number[0] > _VERSIONS[1][0]:
-            raise RecordError(f"{key} = {text}: must be {first} to {last}: the format may mean something else there")
+            raise RecordError(f"{key} = {text}: must be {first} to {last}: the format may differ")
         if number > _VERSIONS[1]:
-            self.notes.append(f"format {text} is newer than {last}, the newest that is known")
+            self.notes.append(f"format {text} is newer than {last}, the newest known one")
         return text
 
     def _signals(self, header: dict[str, Any]) -> tuple[tuple[str, str], ...]:
@@ -365,7 +365,7 @@ class _Part:
             if not isinstance(address, str) or not address.strip():
                 raise RecordError(f"{key}[{index}] has no Address: needed is for example 'DES_POS|1'")
             if address in dict(found):
-                raise RecordError(f"{key}[{index}]: {address} is listed twice: which one holds is not known")
+                raise RecordError(f"{key}[{index}]: {address} is listed twice: it is unclear which one is valid")
             found.append((address.strip(), str(each.get("Axis") or "")))
         if "CYCLE" not in dict(found):
             raise RecordError(
@@ -376,13 +376,13 @@ class _Part:
     def _footer(self, data: dict[str, Any]) -> None:
         footer = data.get("Footer")
         if not isinstance(footer, dict):
-            self.notes.append("no Footer: the recorder did not end the file")
+            self.notes.append("no Footer: the recorder did not complete the file")
             return
         errors = footer.get("ErrorMessages") or []
         for text in errors if isinstance(errors, list) else [errors]:
             self.notes.append(f"the recorder reports an error: {str(text)[:200]}")
         chain = footer.get("FilePathChain")
-        for name, words in (("Previous", "began in"), ("Next", "goes on in")):
+        for name, words in (("Previous", "began in"), ("Next", "continues in")):
             if isinstance(chain, dict) and chain.get(name):
                 self.notes.append(f"the recording {words} {str(chain[name])[:200]}")
 
@@ -397,12 +397,12 @@ def _capture(path: Path, parts: list[_Part]) -> EdgeCapture:
     ]
     notes = [note for part in parts for note in part.notes] + notes
     notes += [
-        f"{gap.missing} cycles ({gap.missing * first.cycle_s:.3f} s) are missing at {gap.start_s:.3f} s, behind "
+        f"{gap.missing} cycles ({gap.missing * first.cycle_s:.3f} s) are missing at {gap.start_s:.3f} s, after "
         f"counter {gap.counter}"
         for gap in gaps[:_MAX_GAPS]
     ]
     if len(gaps) > _MAX_GAPS:
-        notes.append(f"{sum(gap.missing for gap in gaps)} cycles are missing in {len(gaps)} places altogether")
+        notes.append(f"{sum(gap.missing for gap in gaps)} cycles are missing in {len(gaps)} places in total")
     events = _Events(int(counter[0]), first.cycle_s)
     for part in parts:
         events.read(part.where, part.payload)
@@ -433,10 +433,10 @@ def _axes(signals: tuple[tuple[str, str], ...]) -> tuple[EdgeAxis, ...]:
 
 
 def edge_runs(path: Path) -> Iterator[RunLog]:
-    """The run of a capture.
+    """Yield the run of a capture.
 
-    The blocks are those of the program that has most of them in the capture; those of cycles and subprograms stand in
-    the texts only, since their lines count in other files.
+    The blocks are those of the program with most blocks in the capture; those of cycles and subprograms are in
+    the texts only, since their line numbers are of other files.
     """
     capture = read_edge_json(path)
     count = Counter(block.path for block in capture.blocks if block.line is not None)
@@ -448,8 +448,8 @@ def edge_runs(path: Path) -> Iterator[RunLog]:
     blocks = [block for block in capture.blocks if block.path == program and block.line is not None]
     notes = list(capture.notes)
     if len(count) > 1:
-        others = ", ".join(f"{name or 'without a name'} ({number})" for name, number in count.most_common()[1:6])
-        notes.append(f"line numbers are those of {program or 'no name'}; left out are blocks of {others}")
+        others = ", ".join(f"{name or 'unnamed'} ({number})" for name, number in count.most_common()[1:6])
+        notes.append(f"line numbers are those of {program or 'no name'}; blocks of {others} are ignored")
     end = next((block.time_s for block in capture.blocks if _END.match(block.text)), None)
     tools = [block for block in capture.blocks if block.active_tool is not None and block.active_tool < 65535]
     yield RunLog(

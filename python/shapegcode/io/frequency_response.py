@@ -1,4 +1,4 @@
-"""A frequency response without its time record: lines of response over force, in SI units, from any file."""
+"""A frequency response without its time record: lines of response over force, in SI units."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from shapegcode.io.units import FloatArray, Unit, find_unit
 
 ComplexArray = npt.NDArray[np.complex128]
 
-FEWEST_LINES = 16  # fewer lines hold no mode with its damping
+FEWEST_LINES = 16  # fewer lines do not determine a mode with its damping
 _RESPONSES: tuple[Quantity, ...] = ("acceleration", "velocity", "displacement")
 _NAMES: dict[str, Quantity] = {
     "receptance": "displacement", "compliance": "displacement", "flexibility": "displacement",
@@ -30,13 +30,13 @@ class FrequencyResponse:
     Attributes:
         source: file and dataset or column, for messages.
         frequency_hz: (n,), ascending, above 0; evenly spaced or not.
-        response: (n,) complex, in m/s², m/s or m per N, see `quantity`.
-        quantity: what was divided by the force.
+        response: (n,) complex, in m/s², m/s or m per N by `quantity`.
+        quantity: response quantity, which was divided by the force.
         coherence: (n,) 0 to 1; None: not in the file.
-        axis: "x", "y" or "z" where the file says it.
-        warnings: what reading the file had to assume.
-        notes: what reading the file left out.
-        scaled: False: of the force only the course is known (a motor's torque), so that no mass follows.
+        axis: "x", "y" or "z" None if the file does not state it.
+        warnings: assumptions made on reading.
+        notes: parts ignored on reading.
+        scaled: False: the force is known only up to a factor (a motor's torque), so that no mass follows.
     """
 
     source: str
@@ -59,7 +59,7 @@ class FrequencyResponse:
             if bad.size:
                 raise RecordError(f"{self.source}: line {bad[0] + 1} of the {what} is {values[bad[0]]}: must be finite")
             if np.ndim(values) != 1 or len(values) != count:
-                raise RecordError(f"{self.source}: {len(values)} {what} for {count} frequencies: must be as many")
+                raise RecordError(f"{self.source}: {len(values)} {what} for {count} frequencies: must be equally many")
         if count < FEWEST_LINES:
             raise RecordError(
                 f"{self.source}: {count} lines of a frequency response: needed are {FEWEST_LINES} or more"
@@ -71,17 +71,17 @@ class FrequencyResponse:
 
     @property
     def resolution_hz(self) -> float:
-        """Usual distance of two lines."""
+        """Usual line spacing, Hz."""
         return float(np.median(np.diff(self.frequency_hz)))
 
 
-_SIZES = 1e-50, 1e50  # whose fourth powers are numbers
+_SIZES = 1e-50, 1e50  # whose fourth powers are finite
 
 
 def checked_lines(
     where: str, frequency_hz: FloatArray, response: ComplexArray, coherence: FloatArray | None
 ) -> tuple[FloatArray, ComplexArray, FloatArray | None, list[str]]:
-    """Lines as `FrequencyResponse` wants them: the one at 0 Hz left out."""
+    """Check lines for a `FrequencyResponse`, without the line at 0 Hz."""
     steps = np.diff(frequency_hz)
     if np.any(steps <= 0.0):
         row = int(np.flatnonzero(steps <= 0.0)[0]) + 1
@@ -104,12 +104,12 @@ def checked_lines(
         )
     if len(frequency_hz) and frequency_hz[0] == 0.0:
         kept = None if coherence is None else coherence[1:]
-        return frequency_hz[1:], response[1:], kept, [f"{where}: the line at 0 Hz is left out"]
+        return frequency_hz[1:], response[1:], kept, [f"{where}: the line at 0 Hz is ignored"]
     return frequency_hz, response, coherence, []
 
 
 def frequency_factor(text: str) -> float:
-    """To Hz, by what a label says."""
+    """Factor to Hz, from a label."""
     return 1.0 / (2.0 * np.pi) if "rad" in text.lower() else 1000.0 if "khz" in text.lower() else 1.0
 
 
@@ -147,20 +147,20 @@ def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, fl
         if named not in {None, measures}:
             raise RecordError(f"{where}: --response-unit {stated.name} is of {measures}, the response is {named}")
         return measures, stated.factor / over, []
-    # In brackets, behind the name, or the whole text.
+    # In brackets, after the name, or the whole text.
     inside = re.findall(r"\[([^\]]*)\]", label) + re.findall(r"\(((?:[^()]|\([^()]*\))*)\)", label)
     behind = [label[at.end() :] for at in re.finditer(r"[\s_]+", label)]
     found = next((unit for part in (*inside, *behind, label) if (unit := ratio_unit(part)) is not None), None)
     if found is not None:
         measures = next(each for each in _RESPONSES if each == found[0].measures)
         if options.quantity not in {None, measures}:
-            raise RecordError(f"{where}: {label!r} is of {measures}, --quantity says {options.quantity}: must agree")
+            raise RecordError(f"{where}: {label!r} is of {measures}, --quantity is {options.quantity}: must agree")
         return measures, found[1], []
     if named is not None:
         si = {"acceleration": "(m/s²)/N", "velocity": "(m/s)/N", "displacement": "m/N"}[named]
-        return named, 1.0 / over, [f"{where}: the response has no unit: {si} is taken"]
+        return named, 1.0 / over, [f"{where}: the response has no unit: {si} is assumed"]
     raise RecordError(
-        f"{where}: cannot tell whether it is displacement, velocity or acceleration over force: needed is a unit such "
+        f"{where}: unclear whether it is displacement, velocity or acceleration over force: needed is a unit such "
         "as m/N, µm/N, (m/s)/N, (m/s²)/N or g/N in the header, or --response-unit (of the response, over N), or "
         "--quantity"
     )

@@ -38,18 +38,18 @@ _PARTS = {
 }
 _WORDS = {word: part for part, words in _PARTS.items() for word in words.split()}
 _DB = 20.0
-_BARE_COLUMNS = (3, 4)  # without a header: frequency, real and imaginary part, in this order, of so many columns
+_BARE_COLUMNS = (3, 4)  # without a header: frequency, real and imaginary part, in this order, for so many columns
 
 
 def part_of(text: str) -> str | None:
-    """Which part of a frequency response a column holds, by its header."""
+    """Part of a frequency response in a column, by its header."""
     if re.search(r"\|[^|]+\|", text):
         return "magnitude"
     return next((_WORDS[word] for word in words_of(text) if word in _WORDS), None)
 
 
 def is_frf_text(path: Path, options: ReadOptions) -> bool:
-    """Whether a text file holds a frequency response: its header names a frequency and its parts, and no time."""
+    """Whether a text file is a frequency response: its header names a frequency and parts, but no time."""
     if options.time_column is not None or options.period_s is not None:
         return False
     if path.suffix.lower() == ".frf":
@@ -84,7 +84,7 @@ def read_frf_text(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
     preamble = (line.strip(" #%/*\t;,") for line in above)
     text = next((each for each in (label, other, *preamble) if _says(each)), label)
     if path.suffix.lower() == ".frf" and not _says(text) and options.quantity is None and options.response_unit is None:
-        warnings.append(f"{path}: no unit: displacement over force in m/N is taken, as CutPro has it")
+        warnings.append(f"{path}: no unit: displacement over force in m/N is assumed, as in CutPro")
         text = "receptance m/N"
     quantity, factor, told = scale_of(table.where, text, options)
     warnings += told
@@ -99,7 +99,7 @@ def read_frf_text(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
         )
     lines, response, coherence, notes = checked_lines(str(path), frequency, values_of, column.get("coherence"))
     if not table.layout.header:
-        warnings.append(f"{path}: no header: the columns are taken for frequency in Hz, real and imaginary part")
+        warnings.append(f"{path}: no header: the columns are assumed to be frequency in Hz, real and imaginary part")
     return [
         FrequencyResponse(
             str(path), lines, response * factor, quantity, coherence, options.axis, tuple(warnings), tuple(notes)
@@ -108,14 +108,14 @@ def read_frf_text(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
 
 
 def _blank_cells(path: Path, table: TextTable) -> list[str]:
-    """Cells of a header between blanks, each with the unit behind it: ``Frequency [Hz] Real [m/N]``."""
+    """Header cells separated by blanks, each with the unit after it: ``Frequency [Hz] Real [m/N]``."""
     line = utf8_text(path).split(b"\n")[table.layout.header_line - 1].decode("utf-8", "replace")
     cells = re.findall(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])]+)?", line.strip(" #%/*\r\n"))
     return cells if len(cells) == table.layout.columns else []
 
 
 def _says(text: str) -> bool:
-    """Whether a text says quantity or unit of a response over force."""
+    """Whether a text states quantity or unit of a response over force."""
     try:
         scale_of("", text, ReadOptions())
     except RecordError:
@@ -152,7 +152,7 @@ def _places(table: TextTable, header: list[str], options: ReadOptions) -> dict[s
     for part in wanted:
         if len(found[part]) > 1:
             raise RecordError(
-                f"{table.where}: {len(found[part])} columns of the {part}: one response a file, or one for each axis "
+                f"{table.where}: {len(found[part])} columns of the {part}: one response per file, or one for each axis "
                 f"chosen with --axis; the header names {listed}"
             )
     return {part: found[part][0] for part in wanted}
@@ -165,14 +165,14 @@ def _polar(column: dict[str, FloatArray], said: dict[str, str], warnings: list[s
     degrees = "rad" not in unit
     if degrees and not re.search(r"deg|grad|°", unit):
         degrees = bool(np.ptp(phase) > 4.0 * np.pi)
-        warnings.append(f"the phase has no unit: {'degrees' if degrees else 'radians'} are taken")
+        warnings.append(f"the phase has no unit: {'degrees' if degrees else 'radians'} are assumed")
     return np.asarray(magnitude * np.exp(1j * (np.radians(phase) if degrees else phase)), dtype=np.complex128)
 
 
 _FREQUENCIES = ("f", "freq", "frequency", "freqs", "frequencies", "f_hz", "freq_hz", "hz")
 _ANGULAR = ("w", "omega", "om")
 _COHERENCES = ("coh", "coherence", "gamma2", "c")
-#: Runs in a process of its own, with limits: SciPy's reader crashes on damaged files, and takes what sizes they state.
+#: Runs in a separate process with limits: SciPy's reader crashes on damaged files and trusts their sizes.
 _READER = """
 import os, sys, io, warnings
 try:
@@ -221,7 +221,7 @@ def read_frf_mat(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
     name = next((each for each in held if each.lower() in (*_FREQUENCIES, *_ANGULAR)), None)
     if name is None:
         raise RecordError(
-            f"{path}: no vector of frequencies (f, freq, frequency, or w in rad/s); the file holds {listed}"
+            f"{path}: no vector of frequencies (f, freq, frequency, or w in rad/s); the file contains {listed}"
         )
     frequency = np.ravel(np.asarray(held[name], dtype=np.float64))
     if name.lower() in _ANGULAR:
@@ -242,16 +242,16 @@ def read_frf_mat(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
 
 
 def _variables(path: Path) -> dict[str, Any]:
-    """The variables of the file; those of a structure by the names of their fields."""
+    """Read the variables of the file; those of a structure by field name."""
     with open_file(path) as file:
         head = file.read(1024)
         if b"MATLAB 7.3" in head[:128] or b"\x89HDF" in head:
             raise RecordError(
-                f"{path}: a MATLAB file of version 7.3 (HDF5), which is not read: in MATLAB save it again with "
+                f"{path}: a MATLAB file of version 7.3 (HDF5), which is not supported: in MATLAB save it again with "
                 "save('file.mat', 'f', 'H', '-v7'), or export frequency, real and imaginary part as text"
             )
         file.seek(0)
-        # -P: no module of the folder in which the command happens to run.
+        # -P: import no module from the current folder.
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
         done = subprocess.run(
             [sys.executable, "-P", "-c", _READER], stdin=file, capture_output=True, check=False, env=environment
@@ -287,20 +287,20 @@ def _response(path: Path, held: dict[str, Any], lines: int, options: ReadOptions
         if len(complex_ones) != 1:
             what = "no complex variable" if not complex_ones else f"{len(complex_ones)} complex variables"
             raise RecordError(
-                f"{path}: {what} of {lines} lines: name one with --response-column NAME (or NAME:2 for its 2nd "
-                f"column); the file holds {listed}"
+                f"{path}: {what} of {lines} lines: choose one with --response-column NAME (or NAME:2 for its 2nd "
+                f"column); the file contains {listed}"
             )
         wanted = complex_ones[0]
     name, _, column = wanted.partition(":")
     if name not in held or isinstance(held[name], str):
-        raise RecordError(f"{path}: --response-column {name!r}: no such variable; the file holds {listed}")
+        raise RecordError(f"{path}: --response-column {name!r}: no such variable; the file contains {listed}")
     values = np.asarray(held[name], dtype=np.complex128)
     if values.ndim == 1 and not column:
         columns = values[:, None]
     else:
         columns = values if values.ndim == 2 and values.shape[0] == lines else values.reshape(-1, lines).T
     if columns.shape[0] != lines:
-        raise RecordError(f"{path}: {name} has {values.size} values for {lines} frequencies: must be as many")
+        raise RecordError(f"{path}: {name} has {values.size} values for {lines} frequencies: must be equally many")
     if not column and columns.shape[1] > 1:
         raise RecordError(
             f"{path}: {name} has {columns.shape[1]} columns: choose one with --response-column {name}:1 "
@@ -313,6 +313,6 @@ def _response(path: Path, held: dict[str, Any], lines: int, options: ReadOptions
 
 
 def _is_pair(real: str, imaginary: str) -> bool:
-    """Whether two names are of a real and an imaginary part: Re and Im, H_real and H_imag."""
+    """Whether two names are a real and an imaginary part: Re and Im, H_real and H_imag."""
     one, other = re.sub(r"(?i)real|re", "@", real), re.sub(r"(?i)imag|im", "@", imaginary)
     return real != imaginary and "@" in one and one == other

@@ -7,14 +7,14 @@ import re
 from shapegcode.io.units import MM_PER_INCH
 
 UNITS_MM = {"mm": 1.0, "metric": 1.0, "inch": MM_PER_INCH, "in": MM_PER_INCH, "imperial": MM_PER_INCH}
-"""What [TRAJ] LINEAR_UNITS may be, in small letters."""
+"""Values of [TRAJ] LINEAR_UNITS, in lower case."""
 
 _SECTION = re.compile(r"\[\s*([^\]]+?)\s*\]")
 _ENTRY = re.compile(r"([A-Za-z0-9_]+)\s*=\s*(.*?)\s*(?:[;#].*)?")
 
 
 def ini_entries(text: str) -> dict[tuple[str, str], tuple[str, int]]:
-    """By section and name in capitals the value and its line, from 1; the first of a name counts, as in LinuxCNC."""
+    """Value and line number by section and name (capitals); of equal names the first counts, as in LinuxCNC."""
     entries: dict[tuple[str, str], tuple[str, int]] = {}
     section = ""
     for number, raw in enumerate(text.splitlines(), start=1):

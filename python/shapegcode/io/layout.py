@@ -1,4 +1,4 @@
-"""Finds out how a text file with columns is written: delimiter, decimal comma, preamble, header, units, rows."""
+"""Finds the layout of a text file with columns: delimiter, decimal comma, preamble, header, units, rows."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LOG_HEAD_BYTES = 65_536
 
 
 def chunks(path: Path) -> Iterator[bytes]:
-    """Pieces of a file as UTF-8, without a byte order mark."""
+    """Yield pieces of a file as UTF-8, without a byte order mark."""
     decoder: codecs.IncrementalDecoder | None = None
     first = True
     with DataFile(path) as file:
@@ -35,13 +35,13 @@ def chunks(path: Path) -> Iterator[bytes]:
 
 
 def line_chunks(path: Path) -> Iterator[list[bytes]]:
-    """The lines of a file, many at a time, without their ends."""
+    """Yield the lines of a file in batches, without line ends."""
     rest = b""
     for piece in chunks(path):
         lines = (rest + piece).split(b"\n")
         rest = lines.pop()
         if len(rest) > MAX_TEXT_BYTES:
-            raise RecordError(f"{path}: a line of more than {MAX_TEXT_BYTES} bytes: no text with lines")
+            raise RecordError(f"{path}: a line of more than {MAX_TEXT_BYTES} bytes: not a text file with lines")
         yield lines
     if rest:
         yield [rest]
@@ -59,7 +59,7 @@ def head_of(path: Path) -> bytes:
 
 _TEXT_BYTES = frozenset(range(32, 256)) | {9, 10, 12, 13}
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
-#: Behind a point for thousands stand three digits; the comma behind them makes it no decimal point.
+#: A thousands point is followed by three digits; a comma after them shows that it is no decimal point.
 _THOUSANDS = r"\d{1,3}(?:\.\d{3})+(?=,\d)"
 _COMMA_NUMBER = re.compile(
     rf"[+-]?({_THOUSANDS},\d+|\d+(,\d+)?|,\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE
@@ -67,7 +67,7 @@ _COMMA_NUMBER = re.compile(
 
 
 def utf8_text(path: Path) -> bytes:
-    """The text as ASCII-compatible bytes with line feeds."""
+    """Read text as ASCII-compatible bytes with line feeds."""
     data = read_file(path)
     if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         data = data.decode("utf-16", errors="replace").encode("utf-8")
@@ -79,7 +79,7 @@ def utf8_text(path: Path) -> bytes:
 
 
 def refuse_binary(path: Path, head: bytes, needed: str) -> None:
-    """Refuse a file that is no text."""
+    """Refuse a file that is not text."""
     strange = sorted(set(head) - _TEXT_BYTES)
     if strange:
         position = head.index(bytes([strange[0]]))
@@ -91,7 +91,7 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
     if '"' in line:
-        line = line.replace("\r", " ")  # which ends lines for the reader
+        line = line.replace("\r", " ")  # the reader takes it for a line end
         row = next(iter(csv.reader([line], delimiter=delimiter, skipinitialspace=True)), [])
         return [cell.strip() for cell in row]
     return [cell.strip() for cell in line.split(delimiter)]
@@ -113,16 +113,16 @@ def has_thousands(cell: str) -> bool:
 
 
 def without_thousands(data: bytes) -> bytes:
-    """Text of numbers with decimal commas, points for thousands left out."""
+    """Remove thousands points from numbers with decimal commas."""
     if b"." not in data:
         return data
     return re.sub(rb"(?<![\d.,])" + _THOUSANDS.encode(), lambda found: found[0].replace(b".", b""), data)
 
 
-_HEAD_BYTES = 262_144  # the header of loggers with long preambles stays within this
+_HEAD_BYTES = 262_144  # covers headers of loggers with long preambles
 _HEAD_LINES = 400
-_ROWS_TO_KNOW = 3  # so many rows of numbers on end are data; a preamble may hold one or two
-_MARK = re.compile(r"^\s*(#+|%+|//+|\*+)\s*")  # of a comment
+_ROWS_TO_KNOW = 3  # consecutive rows of numbers that count as data; a preamble may have one or two
+_MARK = re.compile(r"^\s*(#+|%+|//+|\*+)\s*")  # comment mark
 _NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
 _RATE = re.compile(
     r"(?:sampl\w*[ _-]*(?:rate|freq\w*)|abtast(?:rate|frequenz)|sample_rate|\bfs\b)"
@@ -138,13 +138,13 @@ _STEP = re.compile(
 
 @dataclass(frozen=True)
 class Layout:
-    """How the file is written."""
+    """Layout of a file."""
 
-    delimiter: str  # between cells; " " stands for any run of blanks
-    decimal_comma: bool  # numbers have a comma for the point
-    header: list[str]  # cells of the header; empty: there is none
+    delimiter: str  # between cells; " " for any run of blanks
+    decimal_comma: bool  # numbers have a decimal comma
+    header: list[str]  # cells of the header; empty: no header
     header_line: int  # its line, from 1
-    units: list[str]  # cells of the row of units below it; empty: there is none
+    units: list[str]  # cells of the row of units below it; empty: no such row
     first_row: int  # line of the first row of numbers, from 1
     columns: int  # cells of that row
     skipped: int  # lines of text before the header
@@ -158,7 +158,7 @@ class Layout:
 
 @dataclass
 class _Rows:
-    """Where the numbers begin under one delimiter."""
+    """Start of the numbers under one delimiter."""
 
     delimiter: str
     start: int
@@ -234,13 +234,13 @@ def _labels_known(cells: list[str]) -> int:
 
 
 def find_layout(path: Path, head: bytes, by_number: bool) -> Layout:
-    """Find out how a text file is written."""
+    """Find the layout of a text file."""
     lines = _head_lines(head)
     rows = _find_rows(lines)
     if rows is None:
         shown = next((line for line in lines if line.strip()), "")
         raise RecordError(
-            f"{path}:1: no rows of numbers among the first {len(lines)} lines; needed are columns of numbers divided "
+            f"{path}:1: no rows of numbers among the first {len(lines)} lines; needed are columns of numbers separated "
             f"by comma, semicolon, tab or blanks below a header such as 'time_s,force_N,acc_m/s^2'; the first line is "
             f"{shown[:80]!r}"
         )
@@ -255,17 +255,17 @@ def find_layout(path: Path, head: bytes, by_number: bool) -> Layout:
             f"{path}:1: no header: the first line is {lines[rows.start][:80]!r}; needed is a line that names the "
             "columns, such as 'time_s,force_N,acc_m/s^2', or columns named by number (--time-column 1 ...)"
         )
-    # Cells of the rows without a name, other than empty ones behind the last delimiter.
+    # Cells without a name in the header, except empty ones after the last delimiter.
     is_short = bool(header[1]) and any(any(row[len(header[1]) :]) for row in rows.numbers)
     if _labels_known(header[1][rows.columns :]) or is_short:
         hint = (
-            "; decimal commas cannot be told from commas between columns: export with semicolons or decimal points"
+            "; decimal commas look like commas between columns: export with semicolons or decimal points"
             if rows.delimiter == "," and rows.columns == 2 * len(header[1])
             else ""
         )
         raise RecordError(
-            f"{path}:{header[0]}: cells of the header, divided by {_NAMES[rows.delimiter]}: {len(header[1])}; of line "
-            f"{rows.start + 1}: {rows.columns}; must be as many, divided by the same character{hint}; the header is "
+            f"{path}:{header[0]}: header cells, separated by {_NAMES[rows.delimiter]}: {len(header[1])}; of line "
+            f"{rows.start + 1}: {rows.columns}; must be equally many, with the same delimiter{hint}; the header is "
             f"{lines[header[0] - 1][:80]!r}"
         )
     return Layout(
@@ -287,7 +287,7 @@ def _choose_header(
     if not above:
         return (0, []), []
     number, cells = above[-1]
-    if cells[0].lower() == "x_value":  # LabVIEW says the units of the signals, not of the time, in its preamble
+    if cells[0].lower() == "x_value":  # LabVIEW's preamble states the units of the signals, not of the time
         units = next((line[1:] for _, line in reversed(above) if line[0].lower() == "y_unit_label"), [])
         return above[-1], ["", *units] if units else []
     filled = [cell for cell in cells if cell.strip(" -[]()")]
@@ -312,10 +312,10 @@ def _refuse_between(path: Path, between: list[tuple[int, list[str]]], rows: _Row
             if not (is_number(cell, False) or (rows.delimiter != "," and is_number(cell, True))):
                 raise RecordError(
                     f"{path}:{number}: column {at}: {cell!r} is not a number; below the header only a row of units and "
-                    f"rows of numbers may stand; the line is {lines[number - 1][:80]!r}"
+                    f"rows of numbers are allowed; the line is {lines[number - 1][:80]!r}"
                 )
     number, cells = between[0]
-    raise RecordError(f"{path}:{number}: {len(cells)} cells, the rows below have {rows.columns}: must be as many")
+    raise RecordError(f"{path}:{number}: {len(cells)} cells, the rows below have {rows.columns}: must be equally many")
 
 
 def _head_lines(head: bytes) -> list[str]:

@@ -1,4 +1,4 @@
-"""Reads what MTConnect agents answer to `sample` and `current` (MTConnectStreams), and what adapters send (SHDR).
+"""Reads answers of MTConnect agents to `sample` and `current` (MTConnectStreams), and data of adapters (SHDR).
 
 Sources of the formats: MTConnect Institute, MTConnect Standard, Part 1 and Part 3 (streams), versions 1.0 to 2.x;
 C++ Agent, "Adapter Agent Protocol Version 2.0": ``time|item|value``, also several ``|item|value`` in a line.
@@ -17,13 +17,13 @@ from shapegcode.io.data_file import MAX_DEPTH, MAX_TEXT_BYTES
 from shapegcode.io.layout import chunks, line_chunks
 from shapegcode.io.run_items import Event, FileNotes, Item, ItemTable, Stamps
 
-_MAX_OBSERVATIONS = 1_000_000  # an agent sends no more at once: its largest buffers hold a million
+_MAX_OBSERVATIONS = 1_000_000  # the size of an agent's largest buffer
 _MAX_ITEMS = 100_000
-#: Sub-types of which the value is not what the machine does, by kind of item.
+#: Sub-types whose value is not the machine's actual one, by kind of item.
 _LEFT_OUT = {"COMMANDED", "PROGRAMMED", "JOG", "TARGET", "PROBE", "INCREMENTAL", "SCHEDULE", "OVERRIDE"}
 _AXES = ("X", "Y", "Z")
 _BEGIN = re.compile(rb"<\?xml\s|<(?:\w+:)?MTConnect(?:Streams|Devices|Error|Assets)\b")
-_OVERLAP = 80  # bytes that the declaration of a document, or the beginning of its root, may need
+_OVERLAP = 80  # bytes for a document's declaration, or the beginning of its root
 _FEED_UNIT = "mm/s"
 _SEQUENCE = re.compile(r"\d{1,20}", re.ASCII)
 
@@ -31,16 +31,16 @@ _Observation = tuple[int, int, float, bytes, Item, bytes]  # sequence, line, tim
 
 
 def mtconnect_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Event]:
-    """The values of the items that are used."""
+    """Yield the values of the used items."""
     reader = _Documents(path, table, notes)
-    notes.feed_unit = _FEED_UNIT  # of PathFeedrate by the standard, whatever the control counts in
+    notes.feed_unit = _FEED_UNIT  # unit of PathFeedrate by the standard, whatever the control's unit
     for piece in chunks(path):
         yield from reader.feed(piece)
     yield from reader.close()
 
 
 class _Documents:
-    """Divides a file into documents, and gives the observations of each as soon as it ends."""
+    """Splits a file into documents, and yields the observations of each at its end."""
 
     def __init__(self, path: Path, table: ItemTable, notes: FileNotes) -> None:
         self._path, self._table, self._notes = path, table, notes
@@ -49,7 +49,7 @@ class _Documents:
         self._sent: dict[str, int] = {}  # last sequence number by instance of the agent
 
     def feed(self, piece: bytes) -> Iterator[Event]:
-        """Read on."""
+        """Parse a piece; yield the events of completed documents."""
         data = self._rest + piece
         self._rest = b""
         while data:
@@ -80,9 +80,9 @@ class _Documents:
     def close(self) -> Iterator[Event]:
         if self._document is not None:
             raise RecordError(
-                f"{self._path}:{self._line}: the document that begins in line {self._document.line} is cut off within "
-                f"<{self._document.open_element}>: its observations are sorted by component, so that some are missing "
-                "from its whole time; save it again"
+                f"{self._path}:{self._line}: the document begun in line {self._document.line} is truncated within "
+                f"<{self._document.open_element}>: its observations are sorted by component, so some are missing "
+                "over its whole time; save it again"
             )
         if not self._count:
             raise RecordError(f"{self._path}:1: no MTConnectStreams document in the file")
@@ -103,7 +103,7 @@ class _Document:
         self._now: tuple[Item, dict[str, str], int] | None = None
         self._text: list[str] = []
         self._text_length = self._fed = 0
-        # A file in UTF-16 was turned into UTF-8 before it comes here, its declaration was not.
+        # A file in UTF-16 was converted to UTF-8 before, but not its declaration.
         self._parser = expat.ParserCreate("UTF-8" if transcoded else None, namespace_separator="}")
         self._parser.buffer_text = True
         self._parser.StartElementHandler, self._parser.EndElementHandler = self._start, self._end
@@ -112,11 +112,11 @@ class _Document:
 
     @property
     def open_element(self) -> str:
-        """The innermost element that has not ended."""
+        """The innermost open element."""
         return self._open[-1] if self._open else "?xml"
 
     def feed(self, data: bytes) -> int:
-        """Read on; the bytes that belong to this document."""
+        """Parse data; returns the number of bytes of this document."""
         try:
             self._parser.Parse(data, False)
         except LookupError as error:
@@ -124,7 +124,7 @@ class _Document:
         except expat.ExpatError as error:
             if not self.ended:
                 raise RecordError(
-                    f"{self._path}:{self.line + error.lineno - 1}: no whole XML: {expat.ErrorString(error.code)}, "
+                    f"{self._path}:{self.line + error.lineno - 1}: incomplete XML: {expat.ErrorString(error.code)}, "
                     f"column {error.offset + 1}, within <{self.open_element}>"
                 ) from error
             return max(0, self._parser.ErrorByteIndex - self._fed)
@@ -149,7 +149,7 @@ class _Document:
         self._text_length = 0
 
     def _refuse_entity(self, *_: object) -> None:
-        raise RecordError(f"{self._path}:{self._here}: an entity is declared: no MTConnectStreams document has one")
+        raise RecordError(f"{self._path}:{self._here}: a declared entity: MTConnectStreams documents have none")
 
     @property
     def _here(self) -> int:
@@ -183,7 +183,7 @@ class _Document:
             self._now = None if item is None else (item, attributes, self._here)
 
     def _item(self, name: str, kind: str, given: str, identity: str) -> Item | None:
-        """What a data item is: chosen by its id or name, else by its element, and by its sub-type."""
+        """Identify a data item by id or name, else by element and sub-type."""
         chosen = {one.strip().lower() for one in self._table.chosen.values()}
         if {given.lower(), identity.lower()} & chosen:
             return self._table.find(given or identity, identity)
@@ -207,7 +207,7 @@ class _Document:
             try:
                 time = self._stamps.seconds(stamp)
             except ValueError:
-                self._notes.add("stamp", line, f"{attributes['timestamp'][:40]!r} is no time stamp, left out")
+                self._notes.add("stamp", line, f"{attributes['timestamp'][:40]!r} is not a time stamp, ignored")
             else:
                 sequence = attributes.get("sequence", "")
                 number = int(sequence) if _SEQUENCE.fullmatch(sequence) else -1
@@ -227,7 +227,7 @@ _MARK = b"--multiline--"
 
 
 def shdr_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Event]:
-    """The values of the items that are used."""
+    """Yield the values of the used items."""
     known: dict[bytes, Item | None] = {}
     seconds = Stamps().seconds
     number, readable = 0, False
@@ -239,7 +239,7 @@ def shdr_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Even
                 pairs = odd.pairs(number, line, fields)
             elif fields[1] in known:
                 item = known[fields[1]]
-                if item is not None:  # nearly every line: kept short
+                if item is not None:  # nearly every line, so kept fast
                     try:
                         time = seconds(fields[0])
                     except ValueError:
@@ -262,43 +262,43 @@ def shdr_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Even
 
 
 class _Odd:
-    """Lines that are not one item and its value."""
+    """Lines other than one item with its value."""
 
     def __init__(self, path: Path, table: ItemTable, notes: FileNotes, known: dict[bytes, Item | None]) -> None:
         self._path, self._table, self._notes, self._known = path, table, notes, known
-        self.until = b""  # ends what goes over several lines
+        self.until = b""  # end mark of a multi-line entry
         self._began, self._unreadable = 0, ""
 
     def one(self, fields: list[bytes]) -> tuple[tuple[Item, bytes], ...]:
-        """(item, value) of a line with an item that was not met so far; none of one of no use."""
+        """(item, value) of a line with a new item; empty if it is not used."""
         item = self._find(fields[1])
         return () if item is None else ((item, fields[2]),)
 
     def leave_out(self, number: int, stamp: bytes) -> None:
-        """A line of which the time stamp cannot be read."""
+        """Ignore a line with an unreadable time stamp."""
         shown = stamp[:40].decode("latin-1")
-        self._unreadable = self._unreadable or f"{self._path}:{number}: {shown!r} is no time stamp"
-        self._notes.add("stamp", number, f"{shown!r} is no time stamp, the line is left out")
+        self._unreadable = self._unreadable or f"{self._path}:{number}: {shown!r} is not a time stamp"
+        self._notes.add("stamp", number, f"{shown!r} is not a time stamp, the line is ignored")
 
     def end(self, readable: bool) -> None:
-        """The end of the file; *readable*: some time stamp could be read."""
+        """The end of the file; *readable*: at least one time stamp was readable."""
         if self._unreadable and not readable:
             raise RecordError(f"{self._unreadable}; needed is for example 2017-02-10T18:33:01.138Z")
         if self.until:
             raise RecordError(
                 f"{self._path}:{self._began}: the asset that begins here does not end: no line is "
-                f"{self.until[:40].decode('latin-1')!r}, so that nothing behind it can be read; take it out"
+                f"{self.until[:40].decode('latin-1')!r}, so that nothing after it can be read; remove it"
             )
 
     def _find(self, name: bytes) -> Item | None:
-        """What an item is; kept for the next time, with a limit for what is no log."""
+        """Identify an item and cache it, with a limit for files that are no log."""
         item = self._table.find(name.decode("utf-8", errors="replace").strip())
         if len(self._known) < 10_000:
             self._known[name] = item
         return item
 
     def pairs(self, number: int, line: bytes, fields: list[bytes]) -> tuple[tuple[Item, bytes], ...]:
-        """(item, value) of a line with several of them; none of everything else, which is noted."""
+        """(item, value) pairs of a line; empty for other lines, which are noted."""
         if self.until:
             if line.strip() == self.until:
                 self.until = b""
@@ -309,11 +309,11 @@ class _Odd:
         if rest and rest[0].strip().startswith(b"@"):  # @ASSET@, @REMOVE_ASSET@
             if _MARK in line:
                 self.until, self._began = line[line.index(_MARK) :].strip(), number
-            self._notes.add("asset", number, "an asset, left out")
+            self._notes.add("asset", number, "an asset, ignored")
         elif len(rest) == _CONDITION_FIELDS and rest[1].strip().lower() in _CONDITION and self._find(rest[2]) is None:
-            self._notes.add("condition", number, f"the condition {rest[0].decode('latin-1')}, left out")
+            self._notes.add("condition", number, f"the condition {rest[0].decode('latin-1')}, ignored")
         elif len(rest) < 2 or len(rest) % 2:
-            self._notes.add("odd", number, f"{line[:60].strip().decode('latin-1')!r} is not time|item|value, left out")
+            self._notes.add("odd", number, f"{line[:60].strip().decode('latin-1')!r} is not time|item|value, ignored")
         else:
             found = ((self._find(name), text) for name, text in zip(rest[::2], rest[1::2], strict=True))
             return tuple((item, text) for item, text in found if item is not None)

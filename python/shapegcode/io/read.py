@@ -1,4 +1,4 @@
-"""Reads the record of a tap test or of a decay, whatever file it is in; WAV files are read here."""
+"""Reads records of tap tests and decays from any supported file; WAV files are read here."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
     if head[:4] in _WAV:
         if options.force_sensitivity or options.response_sensitivity:
             raise RecordError(
-                f"{path}: a WAV file does not say what its full scale is in volts: state N and m/s² at full scale "
+                f"{path}: a WAV file does not state its full scale in volts: specify N and m/s² at full scale "
                 "(--force-scale, --response-scale)"
             )
         return read_wav(path, options)
     if is_xml(head):
-        raise RecordError(f"{path}: XML, which holds a frequency response at best: needed is a record over time")
+        raise RecordError(f"{path}: XML can only contain a frequency response: needed is a record over time")
     if _is_uff(head):
         return read_uff(path, options)
     if path.suffix.lower() in _NO_TEXT:
@@ -51,7 +51,7 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
 
 
 def read_measurement(path: str | Path, options: ReadOptions | None = None) -> list[Record] | list[FrequencyResponse]:
-    """Read a file, whether it holds records over time or a frequency response without them."""
+    """Read a file with records over time or a frequency response."""
     path = Path(path)
     options = options or ReadOptions()
     head = _head(path)
@@ -67,7 +67,7 @@ def read_measurement(path: str | Path, options: ReadOptions | None = None) -> li
 
 
 def _head(path: Path) -> bytes:
-    """The first bytes of a file that is one."""
+    """The first bytes of a non-empty file."""
     with open_file(path) as file:
         head = file.read(_BYTES_TO_KNOW)
     if not head.strip():
@@ -81,18 +81,18 @@ def _is_uff(head: bytes) -> bool:
 
 
 def _channels(path: Path) -> tuple[int, FloatArray, bool]:
-    """(samples per second, (n, channels), whether the values are shares of full scale)."""
+    """Samples per second, values (n, channels), and whether these are ratios of full scale."""
     from scipy.io import wavfile
 
     try:
         with warnings.catch_warnings():
-            # Chunks with titles and the like, which measuring programs add, are of no interest.
+            # Ignore chunks with titles and the like from measuring programs.
             warnings.simplefilter("ignore", wavfile.WavFileWarning)
-            # From memory: of a file SciPy takes the memory for as many samples as its header states.
+            # Read from memory: for a file SciPy allocates as many samples as its header states.
             rate, data = wavfile.read(io.BytesIO(read_file(path)))
     except OSError:
         raise
-    except Exception as error:  # SciPy raises what its parts do
+    except Exception as error:  # SciPy raises errors of any kind
         raise RecordError(
             f"{path}: the WAV file cannot be read ({error}); needed is PCM of 16, 24 or 32 bits, or float of 32 or 64"
         ) from error
@@ -106,15 +106,15 @@ def _channels(path: Path) -> tuple[int, FloatArray, bool]:
             f"{path}: 8 bits per sample resolve 1/128 of full scale, too coarse for a decay; needed are 16, 24 or 32 "
             "bits, or float"
         )
-    # SciPy puts 24 bits into the upper three bytes of 32, so that full scale is that of the type.
+    # SciPy puts 24 bits into the upper three bytes of 32, so full scale is that of the type.
     return rate, data.astype(np.float64) / -float(np.iinfo(data.dtype).min), True
 
 
 def read_wav(path: Path, options: ReadOptions) -> list[Record]:
     """Read a WAV file.
 
-    Float samples are in N and m/s² (or times the scales); integers are shares of full scale, which mean N and m/s² by
-    the scales only.
+    Float samples are in N and m/s² (or times the scales); integers are ratios of full scale, converted to N and m/s² by
+    the scales.
     """
     rate, data, shares = _channels(path)
     count, channels = data.shape
@@ -124,11 +124,11 @@ def read_wav(path: Path, options: ReadOptions) -> list[Record]:
             "write CSV or UFF for more"
         )
     if rate <= 0 or count < 16:
-        raise RecordError(f"{path}: {count} samples at {rate} Hz: a record has at least 16, a good one some 1000")
+        raise RecordError(f"{path}: {count} samples at {rate} Hz: a record needs at least 16, better about 1000")
     period = 1.0 / rate
     if options.period_s is not None and abs(options.period_s / period - 1.0) > STATED_RATE_TOLERANCE:
         raise RecordError(
-            f"{path}: {rate} samples per second, a period of {options.period_s:g} s is stated: must agree within "
+            f"{path}: {rate} samples per second, but a stated period of {options.period_s:g} s: must agree within "
             f"{100 * STATED_RATE_TOLERANCE:g} %"
         )
     bad = np.argwhere(~np.isfinite(data))
@@ -148,17 +148,17 @@ def read_wav(path: Path, options: ReadOptions) -> list[Record]:
             missing = [name for name, scale in scales.items() if scale is None]
             if shares and missing:
                 raise RecordError(
-                    f"{path}: integer samples are shares of full scale; a mass needs {' and '.join(missing)} (N, m/s² "
+                    f"{path}: integer samples are ratios of full scale; a mass needs {' and '.join(missing)} (N, m/s² "
                     "at full scale); frequencies and damping only: --ignore-force"
                 )
             force_n = np.ascontiguousarray(force * (options.force_scale or 1.0))
             if not shares and options.force_scale is None:
-                notes.append("no unit in a WAV file: force is taken in N")
+                notes.append("no unit in a WAV file: force is assumed in N")
     if options.response_scale is None:
         notes.append(
-            "integer samples without a scale: the response is a share of full scale, good for frequencies and damping"
+            "integer samples without a scale: the response is a ratio, which gives frequencies and damping"
             if shares
-            else f"no unit in a WAV file: response is taken in SI ({options.quantity or 'acceleration'})"
+            else f"no unit in a WAV file: response is assumed in SI ({options.quantity or 'acceleration'})"
         )
     return [
         Record(

@@ -1,4 +1,4 @@
-"""One tap, or one decay: what the sensors gave, in SI units; and what the user says of its file."""
+"""Record of one tap or decay, in SI units; and the user's options for reading its file."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ class Record:
     """Samples of one tap (with force) or of one free decay (without).
 
     Attributes:
-        source: file, and which hit or channel of it, for messages.
+        source: file, with the number of the impact or the channel, for messages.
         period_s: time between two samples.
         response: (n,) in the unit of `quantity`.
         quantity: what the sensor measured.
         force_n: (n,) force of the hammer at the same instants; None: a free decay.
-        axis: "x", "y" or "z" where the file says it.
+        axis: "x", "y" or "z" None if the file does not state it.
         start_s: time of the first sample in the file.
-        warnings: what reading the file had to assume.
-        notes: what reading the file left out.
-        widened: what intervals are multiplied with: samples that were not evenly spaced tell less.
+        warnings: assumptions made on reading.
+        notes: parts ignored on reading.
+        widened: factor on confidence intervals (uneven samples carry less information).
     """
 
     source: str
@@ -75,24 +75,24 @@ def _check_samples(source: str, what: str, values: FloatArray) -> None:
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What the user says about a file, over what the file says itself.
+    """User's statements about a file, which override the file.
 
     Attributes:
-        axis: use the response along this axis only ("x", "y" or "z"); where the file names no axis, it is this one.
+        axis: use only the response along this axis ("x", "y" or "z"); a file without axes is assumed to have this one.
         time_column: header or number (from 1) of the column with the time.
-        force_column: the same for the force of the hammer.
-        response_columns: the same for the responses; empty: all that the header names.
-        time_unit: unit of the time column, whatever the header says.
-        force_unit: of the force.
-        response_unit: of the response.
-        period_s: time between two samples, where the file has no time, or to check it.
-        quantity: what the sensor measured, where the file does not say.
-        force_scale: N for 1 in the file; of an integer WAV, N at full scale.
-        response_scale: m/s², m/s or m (see *quantity*) for 1 in the file; of an integer WAV, at full scale.
+        force_column: header or number of the column with the hammer's force.
+        response_columns: headers or numbers of the response columns; empty: all named by the header.
+        time_unit: unit of the time column, overrides the header.
+        force_unit: unit of the force.
+        response_unit: unit of the response.
+        period_s: time between two samples, if the file has no time, or to check it.
+        quantity: measured quantity, if the file does not state it.
+        force_scale: N per unit in the file; integer WAV: N at full scale.
+        response_scale: m/s², m/s or m (see *quantity*) per unit in the file; integer WAV: at full scale.
         response_first: in a WAV file, the response is the first channel and the force the second.
-        force_sensitivity: of the hammer, such as "2.25 mV/N", where the force is in volts.
-        response_sensitivity: of the sensor, such as "100 mV/g", where the response is in volts.
-        ignore_force: read the response only, as a free decay.
+        force_sensitivity: sensitivity of the hammer, such as "2.25 mV/N", for a force in volts.
+        response_sensitivity: sensitivity of the sensor, such as "100 mV/g", for a response in volts.
+        ignore_force: read only the response, as a free decay.
         exponential_window_s: time constant of an exponential window that the analyser applied to the response.
     """
 
@@ -138,20 +138,20 @@ class ReadOptions:
             if text is not None:
                 per_volt(f"{kind}_sensitivity", text, kinds[kind])
                 if getattr(self, f"{kind}_scale") is not None:
-                    raise RecordError(f"{kind}_sensitivity {text!r} and {kind}_scale: state one of both")
+                    raise RecordError(f"{kind}_sensitivity {text!r} and {kind}_scale: specify only one")
 
 
 _VOLTS = {"v": 1.0, "mv": 1e-3, "µv": 1e-6, "uv": 1e-6}
 
 
 def volts_of(unit_text: str) -> float | None:
-    """What a value in V, mV or µV is multiplied with to give volts."""
+    """Factor from V, mV or µV to volts."""
     plain = unit_text.strip().lower().replace("μ", "µ")
     return 1.0 if plain in {"", "volt", "volts"} else _VOLTS.get(plain)
 
 
 def per_volt(option: str, text: str, allowed: tuple[Measured, ...]) -> tuple[Unit, float]:
-    """What one volt means by a sensitivity."""
+    """Unit and value of one volt by a sensitivity."""
     match = re.fullmatch(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([mµuμ]?V)\s*/\s*\(?(.+?)\)?\s*", text)
     unit = find_unit(match[3]) if match else None
     volts = volts_of(match[2]) if match else None
@@ -164,6 +164,6 @@ def per_volt(option: str, text: str, allowed: tuple[Measured, ...]) -> tuple[Uni
 
 
 def stated_unit(text: str | None, allowed: tuple[Measured, ...]) -> Unit | None:
-    """The unit of an option, if it is one of the quantities allowed."""
+    """The unit of an option, checked against the allowed quantities."""
     unit = find_unit(text) if text else None
     return unit if unit is not None and unit.measures in allowed else None

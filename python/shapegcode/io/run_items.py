@@ -1,4 +1,4 @@
-"""The data items of a log of runs, their time stamps, and notes of what reading bridged or left out."""
+"""The data items of a log of runs, their time stamps, and notes of gaps and ignored data."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Role = Literal[
 ]  # fmt: skip
 State = Literal["active", "hold", "stop", "completed", "ended", "unknown"]
 
-#: Names by role, the better one first; only letters and digits count, upper or lower case.
+#: Names by role, preferred ones first; only letters and digits are compared, without case.
 _NAMES: dict[Role, str] = {
     "time": "time timestamp times datetime date zeit t clock",
     "block": "block_number line_number line program_line current_line nc_line block_no line_no block_num "
@@ -44,9 +44,9 @@ _NAMES: dict[Role, str] = {
     "z": "z z_act zact z_actual z_pos zpos z_position actual_z z_abs zabs pos_z z_mm position_z",
 }
 
-_MAX_NAMES = 1000  # names that are kept for messages
+_MAX_NAMES = 1000  # stored names for messages
 
-ROLES: tuple[Role, ...] = get_args(Role)  # what an item can be; the keys of `items`
+ROLES: tuple[Role, ...] = get_args(Role)  # roles of an item; the keys of `items`
 
 _STATES: dict[State, str] = {
     "active": "ACTIVE RUNNING RUN EXECUTING IN_CYCLE CYCLE AUTO_RUN START STARTED STRT MSTR",
@@ -57,7 +57,7 @@ _STATES: dict[State, str] = {
     "ended": "READY IDLE RESET ABORTED CANCELLED CANCELED UNAVAILABLE OFF E_STOP EMERGENCY_STOP",
 }
 STATES: dict[str, State] = {word.replace("_", ""): state for state, words in _STATES.items() for word in words.split()}
-"""What a status means, by its words in capitals without blanks, bars and hyphens."""
+"""Meaning of a status, by its words in capitals without blanks, bars and hyphens."""
 
 
 def plain_name(name: str) -> str:
@@ -72,7 +72,7 @@ for _role, _words in _NAMES.items():
 
 
 def stated_feed_unit(text: str) -> str:
-    """The name of a unit of feed, however it is spelt."""
+    """Name of a unit of feed, in any spelling."""
     unit = find_unit(text)
     if unit is None or unit.measures != "velocity":
         raise RecordError(f"unit {text!r} of the feed: must be one of {units_of('velocity')}")
@@ -81,19 +81,19 @@ def stated_feed_unit(text: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """An item of a file that is used."""
+    """A used item of a file."""
 
     name: str  # in the file
-    role: Role  # what it is
-    rank: int  # of its name among those of its role; the lowest is taken
+    role: Role  # its meaning
+    rank: int  # preference of its name within its role; the lowest is used
 
 
 class ItemTable:
-    """Finds out what the items of a file are."""
+    """Identifies the items of a file."""
 
     def __init__(self, chosen: Mapping[str, str] | None = None) -> None:
-        self.chosen = chosen or {}  # names by role, which hold over the known ones
-        self.seen: dict[str, Item | None] = {}  # names that were met in the file, and what they are
+        self.chosen = chosen or {}  # names by role, which override the known ones
+        self.seen: dict[str, Item | None] = {}  # names found in the file, and their items
         self._chosen: dict[str, tuple[Role, int]] = {}
         self._items: dict[tuple[str, Role], Item] = {}
         for role, name in self.chosen.items():
@@ -106,10 +106,10 @@ class ItemTable:
             self._chosen[name.strip().lower()] = role, 0
 
     def find(self, *names: str) -> Item | None:
-        """What an item is."""
+        """Identify an item by its names."""
         found = self._find(names)
         if found is not None:
-            # The same item again, in another document, is one object: values are kept by it.
+            # The same item again, in another document, is the same object, as values are stored by it.
             found = self._items.setdefault((found.name, found.role), found)
         if len(self.seen) < _MAX_NAMES:
             self.seen[names[0]] = found
@@ -127,7 +127,7 @@ class ItemTable:
         return None
 
     def sought(self, role: Role) -> str:
-        """The names that are looked for, for messages."""
+        """Names searched for a role, for messages."""
         return self.chosen.get(role) or ", ".join(_NAMES[role].split()[:6])
 
 
@@ -140,28 +140,28 @@ class FileNotes:
     """Notes since the last run."""
 
     def __init__(self) -> None:
-        self.feed_unit: str | None = None  # what the file itself says of the unit of the feed
+        self.feed_unit: str | None = None  # unit of the feed as stated by the file
         self._kinds: dict[str, tuple[list[str], int, int]] = {}
 
     def add(self, kind: str, line: int, text: str) -> None:
-        """Note something."""
+        """Count a note of one kind, and keep the first few."""
         shown, count, _ = self._kinds.get(kind, ([], 0, 0))
         if len(shown) < _SHOWN:
             shown.append(f"line {line}: {text}" if line else text)
         self._kinds[kind] = shown, count + 1, line
 
     def taken(self) -> tuple[str, ...]:
-        """The notes, which are forgotten then."""
+        """Return the notes and clear them."""
         found: list[str] = []
         for shown, count, line in self._kinds.values():
             found += shown
             if count > len(shown):
-                found.append(f"{count - len(shown)} more like the last one" + (f", up to line {line}" if line else ""))
+                found.append(f"{count - len(shown)} more of the same kind" + (f", up to line {line}" if line else ""))
         self._kinds = {}
         return tuple(found)
 
 
-_MINUTE = 17  # 2017-02-10T18:33: stands before the seconds
+_MINUTE = 17  # 2017-02-10T18:33: length of the part before the seconds
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _ISO = re.compile(
     r"(\d{4})[-/](\d\d)[-/](\d\d)[T ](\d\d):(\d\d)(?::(\d\d)([.,]\d+)?)? ?(Z|[+-]\d\d(?::?\d\d)?)?", re.IGNORECASE
@@ -169,7 +169,7 @@ _ISO = re.compile(
 _GERMAN = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4})[T ](\d\d?):(\d\d)(?::(\d\d)([.,]\d+)?)?")
 _CLOCK = re.compile(r"(\d\d?):(\d\d):(\d\d)([.,]\d+)?")
 _NUMBER = re.compile(r"\d+(\.\d*)?(e[+-]?\d+)?", re.IGNORECASE)
-#: A plain number above it counts milliseconds since 1970: as seconds it would be the year 5138.
+#: Larger plain numbers are milliseconds since 1970, as seconds would be the year 5138.
 _MILLISECONDS_FROM = 1e11
 _LATEST = 1e15
 
@@ -182,11 +182,11 @@ class Stamps:
         self._base = 0.0
 
     def seconds(self, stamp: bytes) -> float:
-        """A time stamp as seconds."""
+        """Convert a time stamp to seconds."""
         if stamp[:_MINUTE] == self._minute and stamp[-1:] == b"Z":
             try:
                 second = float(stamp[_MINUTE:-1])
-            except ValueError:  # 02,25 or worse: looked at below
+            except ValueError:  # decimal comma or invalid: see below
                 second = -1.0
             if 0.0 <= second < 61.0:
                 return self._base + second
@@ -226,4 +226,4 @@ def _other(text: str) -> float:
         return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + _second(found[3], found[4])
     if _NUMBER.fullmatch(text) and (value := float(text)) < _LATEST:
         return value / 1000.0 if value > _MILLISECONDS_FROM else value
-    raise ValueError(f"{text!r} is no time")
+    raise ValueError(f"{text!r} is not a time")

@@ -1,10 +1,10 @@
-"""What a machine did while it ran a program, read from its log: line numbers, feed, tool, overrides over time.
+"""Reads logs of program runs: line numbers, feed, tool, overrides over time.
 
 >>> for run in iter_run_logs("monday.txt.gz"):
 ...     print(run.start, run.program, run.duration_s)
 
 Formats: SHDR text and MTConnect streams (`mtconnect`), Sinumerik Edge (`edge_json`), tables (`run_table`).
-Each makes events of a file; `run_cutter` cuts them into runs. What the items are called stands in `run_items`.
+Each yields the events of a file; `run_cutter` splits them into runs. Item names are in `run_items`.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from shapegcode.io.run_tracks import RunLog
 
 LogFormat = Literal["shdr", "mtconnect", "edge", "csv"]
 
-MAX_VALUES = 4_000_000  # values that one run may have: 10 hours at 100 a second; some 60 MB
-_SHORTEST_NAME = 4  # NIST_PLATE-12 is PLATE-12; whether OP2 is BOX_OP2 is not known
+MAX_VALUES = 4_000_000  # values of one run: 10 hours at 100 per second; about 60 MB
+_SHORTEST_NAME = 4  # NIST_PLATE-12 is PLATE-12; OP2 may not be BOX_OP2
 _TABLE_LINES = 100
 _SHDR_LINE = re.compile(rb"[^|\r\n]*\d[^|\r\n]*\|[^|\r\n]+\|")
 
@@ -43,19 +43,19 @@ def read_run_logs(
     """Read all runs of a log.
 
     Args:
-        path: of the file, plain or packed by gzip: SHDR text, MTConnect streams, Sinumerik Edge JSON, or a table.
-        items: names in the file by what they are (`run_items.ROLES`), over the names that are known:
+        path: path of the file, plain or gzip: SHDR text, MTConnect streams, Sinumerik Edge JSON, or a table.
+        items: item names in the file by role (`run_items.ROLES`), which override the known names:
             ``{"block": "Block_Number"}``.
-        format: of the file; None: by its content.
-        program_name: only runs whose log names this program, or none; several: names that it may have.
-        feed_unit: of the feed, where the log does not say it: "mm/s", "mm/min", "inch/min" ...
-        max_values: that a run may have.
+        format: format of the file; None: by its content.
+        program_name: only runs with this program name, or without a name; several: its possible names.
+        feed_unit: unit of the feed, if the log does not state it: "mm/s", "mm/min", "inch/min" ...
+        max_values: limit of values per run.
 
     Returns:
-        The runs, in their order.
+        The runs in order.
 
     Raises:
-        RecordError: no such log, or nothing of use in it; the message names file and line, what is there and what is
+        RecordError: not a log, or without usable data; the message gives file and line, what was found and what is
             needed.
         OSError: the file cannot be read.
     """
@@ -75,21 +75,21 @@ def iter_run_logs(
     feed_unit: str | None = None,
     max_values: int = MAX_VALUES,
 ) -> Iterator[RunLog]:
-    """The runs of a log one by one: the memory is that of the longest run, however long the log.
+    """Yield the runs of a log one by one; memory is that of the longest run, however long the log.
 
     Args:
-        path: as of `read_run_logs`.
-        items: the same.
-        format: the same.
-        program_name: the same.
-        feed_unit: the same.
-        max_values: the same.
+        path: path of the file, as in `read_run_logs`.
+        items: item names by role.
+        format: format of the file.
+        program_name: name or names of the program.
+        feed_unit: unit of the feed.
+        max_values: limit of values per run.
 
     Returns:
-        The runs, in their order.
+        The runs in order.
 
     Raises:
-        RecordError: as of `read_run_logs`; runs before the fault were given.
+        RecordError: as in `read_run_logs`; runs before the fault are yielded.
         OSError: the file cannot be read.
     """
     path = Path(path)
@@ -116,7 +116,7 @@ def iter_run_logs(
 
 
 def _format(path: Path, stated: LogFormat | None) -> LogFormat:
-    """What a file is, by its content; with a stated format it is only looked whether the file has anything."""
+    """Format of a file by its content; with a stated format only check that it is not empty."""
     if stated is not None and stated not in get_args(LogFormat):
         raise RecordError(f"format {stated!r}: must be one of {', '.join(get_args(LogFormat))}")
     head = head_of(path)
@@ -133,13 +133,13 @@ def _format(path: Path, stated: LogFormat | None) -> LogFormat:
     if any(mark in line for line in lines[:_TABLE_LINES] for mark in (b",", b";", b"\t", b"|")):
         return "csv"
     raise RecordError(
-        f"{path}:1: no log of runs: the file begins with {begin[:60]!r}; needed is SHDR text (time|item|value), an "
+        f"{path}:1: not a log of runs: the file begins with {begin[:60]!r}; needed is SHDR text (time|item|value), an "
         "MTConnectStreams document, Sinumerik Edge JSON or a table with a header"
     )
 
 
 def _same_program(logged: str, asked: str) -> bool:
-    """Whether a log's name means a program: names go with folders, suffixes and prefixes of the shop or without."""
+    """Whether a logged name is that of a program, with or without folders, suffixes and prefixes."""
     one, other = (re.split(r"[\\/]", name.strip())[-1].lower() for name in (logged, asked))
     stems = [re.sub(r"\.(nc|cnc|tap|mpf|spf|txt|ngc|gcode|hnc|min|eia)$", "", name) for name in (one, other)]
     stems = [re.sub(r"^o?0*(\d+)$", r"o\1", stem) for stem in stems]  # O0012 is O12, and 12 in some logs

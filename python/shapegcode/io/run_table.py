@@ -1,4 +1,4 @@
-"""Reads logs of runs that are tables: a header with a time and what else is known, a row per instant."""
+"""Reads tables of run logs: a header with a time and other items, one row per instant."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class _UsedColumn:
 
 @dataclass
 class _Header:
-    """The columns that are used."""
+    """The used columns."""
 
     line: int
     delimiter: str
@@ -43,7 +43,7 @@ class _Header:
 
 
 def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Event]:
-    """The values of the columns that are used."""
+    """Yield the values of the used columns."""
     header = _header(path, table)
     notes.feed_unit = header.feed_unit
     stamps = Stamps()
@@ -56,7 +56,7 @@ def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Eve
             try:
                 cells = cells_of(text, header.delimiter)
             except csv.Error as error:
-                notes.add("row", number, f"{error}; the row is left out")
+                notes.add("row", number, f"{error}; the row is ignored")
                 continue
             try:
                 stamp, time = _time(cells, header, stamps)
@@ -67,13 +67,13 @@ def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Eve
                         f"{path}:{number}: {header.time.item.name} is {shown[:40]!r}: must be a number or a time "
                         "such as 2017-02-10T18:33:01.138Z"
                     ) from None
-                notes.add("stamp", number, f"{header.time.item.name} is {shown[:40]!r}, no time; the row is left out")
+                notes.add("stamp", number, f"{header.time.item.name} is {shown[:40]!r}, not a time; the row is ignored")
                 continue
             if not readable and header.time_unit is None and is_number(cells[header.time.index], True):
-                notes.add("time unit", header.line, f"{header.time.item.name} has no unit: its numbers are taken as s")
+                notes.add("time unit", header.line, f"{header.time.item.name} has no unit: s is assumed")
             readable = True
             if any(cells[header.cells :]):
-                hint = "; decimal commas need another sign between the columns" if header.delimiter == "," else ""
+                hint = "; decimal commas need another delimiter" if header.delimiter == "," else ""
                 raise RecordError(f"{path}:{number}: {len(cells)} cells, the header has {header.cells}{hint}")
             if len(cells) < header.cells:
                 notes.add("short", number, f"{len(cells)} cells of {header.cells}")
@@ -100,7 +100,7 @@ def _time(cells: list[str], header: _Header, stamps: Stamps) -> tuple[bytes, flo
 
 
 def _point(cell: str) -> str:
-    """A number with a point for a comma."""
+    """Replace a decimal comma by a point."""
     return without_thousands(cell.encode()).decode().replace(",", ".") if "," in cell else cell
 
 
@@ -122,13 +122,13 @@ def _header(path: Path, table: ItemTable) -> _Header:
                 found = cells
     raise RecordError(
         f"{path}:1: no header with a time ({table.sought('time')}) and line numbers ({table.sought('block')}) among "
-        f"the first {len(lines)} lines; the first that looks like one has {', '.join(found[:20]) or 'no names'}; name "
+        f"the first {len(lines)} lines; the first candidate has {', '.join(found[:20]) or 'no names'}; specify "
         'them, for example items = { time = "Zeit", block = "Satz" }'
     )
 
 
 def _label(cell: str, table: ItemTable) -> tuple[Item | None, Label]:
-    """What a column is, with its unit."""
+    """Item of a column, with its label."""
 
     def names(name: str) -> Meaning | None:
         item = table.find(name)
@@ -168,5 +168,5 @@ def _columns(path: Path, number: int, delimiter: str, items: list[tuple[Item | N
         length = measures == "displacement" and label.unit is not None
         columns.append(_UsedColumn(index, item, factor_between(label.unit, "mm") if length and label.unit else 1.0))
     assert time is not None
-    columns.sort(key=lambda column: column.item.role == "status")  # a row's values belong to the run that ends in it
+    columns.sort(key=lambda column: column.item.role == "status")  # status last: a run's last row belongs to it
     return _Header(number, delimiter, len(items), time, columns, feed_unit, time_unit)

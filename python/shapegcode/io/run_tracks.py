@@ -1,4 +1,4 @@
-"""One run of a program as a log shows it, and the values of its items while it goes on."""
+"""One run of a program in a log, and the values of its items over time."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from shapegcode.io.units import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """One data item over time: each value holds until the next one.
+    """One data item over time: each value is valid until the next one.
 
     Attributes:
-        time_s: (n,) since the start of the run, not falling; what held before the start has a time of 0 or less.
-        value: (n,) as the log has it, in the unit that the item says.
-        name: of the item in the log.
+        time_s: (n,) since the start of the run, not descending; values set before the start have a time of 0 or less.
+        value: (n,) values in the log, in the item's unit.
+        name: name of the item in the log.
     """
 
     time_s: FloatArray
@@ -39,26 +39,26 @@ class RunLog:
 
     Attributes:
         source: file.
-        start: time stamp of the start, as the file has it; empty where the file has none.
-        duration_s: from start to completion, holds included; None: the log does not hold both.
-        block: numbers as the control gave them, see `block_counts`; empty where this run has none.
-        feed: along the path; None: not logged.
-        feed_unit: of the feed, such as "mm/s", a unit of `shapegcode.io.units`; None: the log
-            does not say.
-        tool: number in the spindle; 0 while it is changed, on some controls.
+        start: time stamp of the start in the file; empty if there is none.
+        duration_s: from start to completion, including holds; None: not both are in the log.
+        block: block numbers, see `block_counts`; empty if this run has none.
+        feed: feed along the path; None: not logged.
+        feed_unit: unit of the feed, such as "mm/s", a unit of `shapegcode.io.units`; None: the log
+            does not state it.
+        tool: tool number in the spindle; on some controls 0 during a change.
         spindle_rpm: speed of the spindle in 1/min.
         feed_override: ratio, 1: 100 %.
-        rapid_override: the same of rapids.
-        position_mm: (axis, positions in mm or degrees) of the axes that were logged.
-        holds: (start_s, duration_s) of what the log itself calls a hold, an interruption or a stop.
-        program: name that the log gives; None: it gives none.
-        notes: what was bridged or left out, with the line.
-        block_counts: what `block` counts: "line" of the program file, the first one is 1, or "sequence": N words.
-        block_texts: (time_s, text) of the blocks, where the log has their text.
-        gaps: (start_s, duration_s) of long times in which the log says nothing: a dwell, a long block, or the log
+        rapid_override: ratio of the rapid override.
+        position_mm: (axis, positions in mm or degrees) of the logged axes.
+        holds: (start_s, duration_s) of logged holds, interruptions and stops.
+        program: program name in the log; None: no name.
+        notes: gaps and ignored data, with the line.
+        block_counts: meaning of `block`: "line" of the program file, from 1, or "sequence": N words.
+        block_texts: (time_s, text) of the blocks, if the log has their text.
+        gaps: (start_s, duration_s) of long times without log entries: a dwell, a long block, or the log
             or its clock was interrupted.
-        lines: first and last line of the run in the file; (0, 0) where the file has no lines.
-        ended_by: what the log says at the end, such as "PROGRAM_COMPLETED"; None: it ends before.
+        lines: first and last line of the run in the file; (0, 0) if the file has no lines.
+        ended_by: status at the end, such as "PROGRAM_COMPLETED"; None: the log ends before.
         cut_start: the log began within the run.
         cut_end: the log ended, or its clock was set back, within the run.
     """
@@ -87,7 +87,7 @@ class RunLog:
 
     @property
     def complete(self) -> bool:
-        """Whether the log holds the run from its start to its end."""
+        """Whether the log contains the run from its start to its end."""
         return not (self.cut_start or self.cut_end)
 
 
@@ -97,13 +97,13 @@ _SIGNALS: tuple[Role, ...] = (
     "block", "sequence", "feed", "tool", "spindle", "feed_override", "rapid_override", "runtime", *_AXES,
 )  # fmt: skip
 _COUNTS: frozenset[Role] = frozenset({"block", "sequence"})
-#: What was set before the start still holds; of feed and block nothing is known after so long.
+#: Values set before the start remain valid; feed and block are unknown after this time.
 _KEPT: frozenset[Role] = frozenset({"tool", "spindle", "feed_override", "rapid_override"})
-_LEAD_IN_S = 1.0  # a status is polled: what came so shortly before it belongs to the run
-_NAME_S = 5.0  # a program's name may come so long after its start
-_LATE_START = 50  # a first block number beyond it is no start of a program
-_RESTART_BLOCKS = 20  # a program that begins anew after a hold goes back by more
-_CLOCKS_APART_S = 3.0  # whole seconds of a control, shown late
+_LEAD_IN_S = 1.0  # a status is polled: values so shortly before it belong to the run
+_NAME_S = 5.0  # largest delay of the program name after the start
+_LATE_START = 50  # a larger first block number is no start of a program
+_RESTART_BLOCKS = 20  # a program restarted after a hold goes back by more blocks
+_CLOCKS_APART_S = 3.0  # allowed difference of clocks: whole seconds, shown late
 _CLOCKS_APART = 0.01
 
 
@@ -119,7 +119,7 @@ class Hold:
 
 
 class Track:
-    """The values of one item, as they come."""
+    """Values of one item, in log order."""
 
     def __init__(self, item: Item) -> None:
         self.item, self.counts = item, item.role in _COUNTS
@@ -129,11 +129,11 @@ class Track:
 
     @property
     def last_time(self) -> float:
-        """Of its last value."""
+        """Time of the last value."""
         return self.times[-1] if self.times else -math.inf
 
     def drop_until(self, end: float) -> None:
-        """Drop values up to a time but for the last one, which may still hold."""
+        """Drop values up to a time except the last one, which may still be valid."""
         if not self.times:
             return
         self.ever = True
@@ -146,7 +146,7 @@ class Track:
             self.texts = self.texts[keep:]
 
     def forget_times(self) -> None:
-        """Forget all times but the last value, after the recorder's clock was set."""
+        """Keep only the last value, without its time, after the recorder's clock was set."""
         self.drop_until(self.last_time)
         if self.times:
             self.times[0] = -math.inf
@@ -162,7 +162,7 @@ class Track:
             times, kept = np.append(0.0, times), np.append(values[before[-1]], kept)
         order = np.argsort(times, kind="stable")
         times, kept = times[order], kept[order]
-        if self.counts and times.size:  # of two with one time stamp the second one counts
+        if self.counts and times.size:  # of two with equal time stamps the second one is used
             last = np.append(np.diff(times) > 0.0, True)
             times, kept = times[last], kept[last]
         return Signal(times, kept, self.item.name)
@@ -170,7 +170,7 @@ class Track:
 
 @dataclass
 class RunPart:
-    """From when to when a run goes; times in s of the log's clock."""
+    """Start and end of a run; times in s on the log's clock."""
 
     source: str
     start: float
@@ -178,7 +178,7 @@ class RunPart:
     lines: tuple[int, int]
     cut_start: bool = False
     end: float = math.inf
-    word: str | None = None  # what ended it; None: it is cut off
+    word: str | None = None  # status that ended it; None: truncated
     cut_end: bool = False
     has_status: bool = True
     holds: list[Hold] = field(default_factory=list)
@@ -186,11 +186,11 @@ class RunPart:
 
     @property
     def held(self) -> Hold | None:
-        """The hold that has not ended."""
+        """The hold in progress, if any."""
         return self.holds[-1] if self.holds and self.holds[-1].end is None else None
 
     def restarted(self, tracks: Sequence[Track]) -> Iterator[RunPart]:
-        """Divide it where the program started again after a stop, without an end in the log."""
+        """Split it where the program restarted after a stop without an end in the log."""
         rest = self
         for hold in self.holds:
             if hold.end is None or not hold.resumed[0] or not _began_anew(hold, rest, tracks):
@@ -206,7 +206,7 @@ class RunPart:
 
 
 def _began_anew(hold: Hold, part: RunPart, tracks: Sequence[Track]) -> bool:
-    """Whether the block numbers fall back to where the run began."""
+    """Whether the block numbers return to the start of the run."""
     assert hold.end is not None
     for track in tracks:
         if not track.counts or not track.times:
@@ -222,7 +222,7 @@ def _began_anew(hold: Hold, part: RunPart, tracks: Sequence[Track]) -> bool:
 
 
 def run_of(part: RunPart, tracks: Sequence[Track], feed_unit: str | None, notes: FileNotes) -> RunLog:
-    """Make the run."""
+    """Build the run."""
     signals = {role: _best(part, tracks, role, notes) for role in _SIGNALS}
     block, counts = signals["block"], "line"
     inside = ([p for p in pairs if p[0] >= -_LEAD_IN_S] for _, pairs in _text_values(part, tracks, "block_text"))
@@ -277,7 +277,7 @@ def _compare_clocks(part: RunPart, runtime: Signal | None, notes: FileNotes) -> 
 
 
 def _best(part: RunPart, tracks: Sequence[Track], role: Role, notes: FileNotes) -> Signal | None:
-    """The signal of the item with the best name, then of that with most values; the others are noted."""
+    """The signal of the item with the best name, then with most values; others are noted."""
     found = [
         (track.item.rank, -len(signal), index, signal)
         for index, track in enumerate(tracks)
@@ -285,12 +285,12 @@ def _best(part: RunPart, tracks: Sequence[Track], role: Role, notes: FileNotes) 
     ]
     found.sort(key=lambda each: each[:3])
     for _, _, _, other in found[1:]:
-        notes.add(f"other {role}", part.lines[0], f"{other.name} left out: {found[0][3].name} is taken")
+        notes.add(f"other {role}", part.lines[0], f"{other.name} ignored: {found[0][3].name} is used")
     return found[0][3] if found else None
 
 
 def _text_values(part: RunPart, tracks: Sequence[Track], role: Role) -> Iterator[tuple[Item, list[tuple[float, str]]]]:
-    """The text values until the end of a run, by item, preferred names first; items without values are left out."""
+    """The text values until the end of a run, by item, preferred names first; items without values are omitted."""
     for track in sorted((track for track in tracks if track.item.role == role), key=lambda each: each.item.rank):
         pairs = zip(track.times, track.texts or (), strict=True)
         yield (
@@ -300,30 +300,30 @@ def _text_values(part: RunPart, tracks: Sequence[Track], role: Role) -> Iterator
 
 
 def _n_words(texts: tuple[tuple[float, str], ...], notes: FileNotes) -> Signal | None:
-    """Numbers of the N words of blocks of which only the text is logged."""
+    """Numbers of the N words of blocks that are logged as text only."""
     found = [
         (time, float(word[1])) for time, text in texts if (word := re.match(r"\s*/?\s*N(\d+)", text, re.IGNORECASE))
     ]
     if not found:
         return None
-    notes.add("n words", 0, f"no line numbers: the N words of {len(found)} of {len(texts)} blocks are taken")
+    notes.add("n words", 0, f"no line numbers: the N words of {len(found)} of {len(texts)} blocks are used")
     return Signal(np.array([time for time, _ in found]), np.array([number for _, number in found]), "N")
 
 
 def _override(signal: Signal | None, notes: FileNotes) -> Signal | None:
-    """As a ratio; logs have percent."""
+    """Convert an override from percent to a ratio."""
     if signal is None:
         return None
     if signal.time_s[0] > 0.0:
         notes.add(
             f"late {signal.name}", 0,
-            f"{signal.name} is first logged at {signal.time_s[0]:.2f} s: what held before is not known",
+            f"{signal.name} is first logged at {signal.time_s[0]:.2f} s: the value before is unknown",
         )  # fmt: skip
     return Signal(signal.time_s, signal.value / 100.0, signal.name)
 
 
 def _program(part: RunPart, tracks: Sequence[Track], notes: FileNotes) -> str | None:
-    """The name that holds at the start or comes shortly after it."""
+    """Program name at the start, or logged shortly after it."""
     for item, pairs in _text_values(part, tracks, "program"):
         early = [text for time, text in pairs if time <= _NAME_S]
         name = early[-1] if early else pairs[0][1] if pairs else None

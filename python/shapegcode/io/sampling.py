@@ -1,4 +1,4 @@
-"""The time between two samples, from the instants that a file gives; samples off an even grid brought onto one."""
+"""Finds the sampling period from the instants in a file; resamples unevenly sampled data."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from scipy.linalg import solveh_banded
 
 from shapegcode.io.units import FloatArray
 
-#: An instant may lie this share of a period away from where even sampling puts it. Rounding to the digits of the file
+#: Allowed deviation of an instant from even sampling, relative to the period. Rounding to the file's digits
 #: moves it by up to half a digit; a missing or a doubled sample moves it, or a neighbour, by half a period or more.
 _OFF_GRID = 0.49
-#: A step from one instant to the next may differ from the period by this share; a missing sample doubles it.
+#: Allowed relative difference of a step from the period; a missing sample doubles the step.
 _OFF_STEP = 0.9
-_TELL = 0.1  # off the grid by more than this share of a period, the user gets a warning
-#: A stated rate and the instants may differ by this share: clocks are better by far, wrong units are worse by far.
+_TELL = 0.1  # deviation from the grid that is reported, relative to the period
+#: Allowed relative difference of stated and measured rate: clocks are far better, wrong units far worse.
 STATED_RATE_TOLERANCE = 0.01
-#: Rounding moves an instant by half a digit at most; where digits are finer than this share of what it is off, the
+#: Rounding moves an instant by half a digit at most; if digits are finer than this ratio to the deviation, the
 #: clock of the logger itself is uneven.
 _ROUNDED = 0.5
-_UNEVEN = 0.05  # half of the steps differ from the usual one by more than this share: the clock is uneven
+_UNEVEN = 0.05  # uneven clock: half of the steps differ from the usual one by more than this ratio
 _GRID_ONLY = "samples must be evenly spaced"
 
 
@@ -44,7 +44,7 @@ def even_period(
         raise UnevenTimeError(row, f"time {times_s[row]:.9g} s comes after {times_s[row - 1]:.9g} s: must ascend")
     mean = float(times_s[-1] - times_s[0]) / (count - 1)
     if stated_s is not None and not abs(mean / stated_s - 1.0) <= STATED_RATE_TOLERANCE:
-        what = f"the time column says a sample every {mean:.6g} s, {stated_s:.6g} s is stated"
+        what = f"the time column has a sample every {mean:.6g} s, {stated_s:.6g} s is stated"
         must = f"must agree within {100 * STATED_RATE_TOLERANCE:g} %; is the unit of the time right?"
         raise UnevenTimeError(0, f"{what}: {must}")
     period = mean if stated_s is None else stated_s
@@ -54,7 +54,7 @@ def even_period(
     repeated = np.flatnonzero(steps == 0.0)
     if repeated.size and not coarse:
         row = int(repeated[0]) + 1
-        remedy = "if the file gives too few digits, leave the time out and state the period (--sample-period)"
+        remedy = "if the file has too few digits, omit the time and state the period (--sample-period)"
         raise UnevenTimeError(row, f"time {times_s[row]:.9g} s is repeated: must ascend; {remedy}")
     usual = float(np.median(steps))
     if not coarse:
@@ -64,7 +64,7 @@ def even_period(
                 row + 1,
                 f"{steps[row]:.6g} s between {times_s[row]:.9g} s and {times_s[row + 1]:.9g} s, usually {usual:.6g} s: "
                 f"{_GRID_ONLY}; samples are missing",
-                # An even clock whose samples got lost is no uneven one: nothing shows what was in the gap.
+                # Lost samples of an even clock are not an uneven clock: the data in the gap are unknown.
                 ascending=bool(np.median(np.abs(steps - usual)) > _UNEVEN * usual),
             )
     grid = times_s[0] + period * np.arange(count)
@@ -74,7 +74,7 @@ def even_period(
     row = int(np.argmax(np.abs(off)))
     share = float(abs(off[row])) / period
     limit = max(_OFF_GRID, digit / period if coarse else 0.0)
-    place = f"time {times_s[row]:.9g} s is {share:.2g} periods of {period:.6g} s off even spacing"
+    place = f"time {times_s[row]:.9g} s is {share:.2g} periods of {period:.6g} s from even spacing"
     if share > limit:
         text = f"{place} (limit {limit:.2g}): {_GRID_ONLY} and none may be missing"
         raise UnevenTimeError(row, text, ascending=True)
@@ -83,14 +83,14 @@ def even_period(
         raise UnevenTimeError(row, text, ascending=True)
     if share > _TELL and not coarse:
         return period, [
-            f"times are up to {100 * share:.0f} % of a period off even spacing: taken as rounding, with the mean "
+            f"times are up to {100 * share:.0f} % of a period from even spacing: assumed rounding, with the mean "
             f"period of {period:.6g} s"
         ]
     return period, []
 
 
 def _digit_of(times_s: FloatArray) -> float:
-    """The last digit of instants, s; 0: none down to a picosecond."""
+    """Value of the last digit of instants, s; 0: finer than a picosecond."""
     for power in range(13):
         scaled = times_s * 10.0**power
         if np.max(np.abs(scaled - np.round(scaled))) < 1e-3:
@@ -98,13 +98,13 @@ def _digit_of(times_s: FloatArray) -> float:
     return 0.0
 
 
-_DENSITY = 0.8  # the grid has this share of the samples: the others show noise and gaps
-_LONGEST_STEP = 3.0  # the longest step may be so many mean ones: a longer one leaves less than a third of the band
-_REACH = 16  # Sinc of so many samples either way in a Kaiser window with 80 dB, flat up to .4 of the grid's rate
+_DENSITY = 0.8  # grid points per sample: the surplus samples average noise and bridge gaps
+_LONGEST_STEP = 3.0  # longest step relative to the mean: a longer one limits the band to less than a third
+_REACH = 16  # sinc of this many samples on either side in a Kaiser window with 80 dB, flat up to .4 of the grid's rate
 _BETA = 7.86
 _RIDGE = 1e-6
-#: Intervals are widened by this much at least: what the pulse holds above the grid's band is an error beside the noise,
-#: which a fit to the grid does not see.
+#: Least factor on intervals: the pulse's content above the grid's band is an error in addition to noise
+#: that a fit to the grid does not detect.
 _MIN_WIDENED = 3.0
 
 
@@ -114,12 +114,12 @@ class EvenGrid:
 
     period_s: float  # time between two of its samples
     times_s: FloatArray  # (m,) instants
-    widened: float  # what intervals are multiplied with
-    notes: list[str]  # what was done, in words
+    widened: float  # factor on confidence intervals
+    notes: list[str]  # description of the resampling
 
 
 def even_grid(times_s: FloatArray) -> EvenGrid:
-    """The grid that uneven instants are dense enough for.
+    """Finest even grid that the uneven samples can determine.
 
     Source: H. Landau, Acta Mathematica 117, 1967: samples denser than a band's Nyquist rate determine a signal in it;
     with no gap longer than the grid's period the solution is stable (K. Groechenig, 1992).
@@ -131,21 +131,21 @@ def even_grid(times_s: FloatArray) -> EvenGrid:
         raise UnevenTimeError(
             row + 1,
             f"{steps[row]:.6g} s between {times_s[row]:.9g} s and {times_s[row + 1]:.9g} s, on average {mean:.6g} s: a "
-            f"step of more than {_LONGEST_STEP:g} times the mean leaves too little to resample; samples are missing",
+            f"step of more than {_LONGEST_STEP:g} times the mean is too long to resample; samples are missing",
         )
     period = max(mean / _DENSITY, float(steps[row]))
     count = int((times_s[-1] - times_s[0]) / period + 1e-9) + 1
     widened = max(_MIN_WIDENED, float(np.sqrt(steps[row] / mean)))
     note = (
         f"times are not evenly spaced: steps of {np.min(steps):.4g} to {steps[row]:.4g} s, on average {mean:.4g} s; "
-        f"resampled to {1.0 / period:.5g} samples per second, which is good up to {0.4 / period:.4g} Hz; intervals are "
-        f"widened {widened:.2g} times"
+        f"resampled to {1.0 / period:.5g} samples per second, valid up to {0.4 / period:.4g} Hz; intervals are "
+        f"widened by a factor of {widened:.2g}"
     )
     return EvenGrid(period, times_s[0] + period * np.arange(count), widened, [note])
 
 
 def resample(values: FloatArray, times_s: FloatArray, grid: EvenGrid) -> FloatArray:
-    """The band-limited signal that goes through the samples best, on a grid: least squares over sinc functions."""
+    """Band-limited signal on a grid that fits the samples best: least squares of sinc functions."""
     offset = float(np.mean(values))
     at = (times_s - grid.times_s[0]) / grid.period_s
     first = np.floor(at).astype(int) - _REACH + 1
@@ -153,7 +153,7 @@ def resample(values: FloatArray, times_s: FloatArray, grid: EvenGrid) -> FloatAr
     away = at[:, None] - columns
     inside = np.sqrt(np.maximum(1.0 - (away / _REACH) ** 2, 0.0))
     weights = np.sinc(away) * np.i0(_BETA * inside) / np.i0(_BETA)
-    # Grid points beyond the ends belong to the signal, too.
+    # The signal includes grid points beyond the ends.
     count = len(grid.times_s) + 2 * _REACH
     columns = columns + _REACH
     band = np.zeros((2 * _REACH, count))

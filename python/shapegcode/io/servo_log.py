@@ -1,4 +1,4 @@
-"""Reads servo logs: CSV with a header, time and axis positions, whatever the columns are called."""
+"""Reads servo logs: CSV with a header, time and axis positions, with any column names."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _SHORTEST_S, _LONGEST_S = 2e-5, 0.05
 
 @dataclass(frozen=True)
 class ServoLog:
-    """One record."""
+    """A servo log."""
 
-    file: str  # where it was read
+    file: str  # path
     times_s: Array  # time of each row, from 0 on
-    command_mm: Array  # shape (n, 3), commanded X, Y, Z; NaN for an axis that was not recorded
+    command_mm: Array  # shape (n, 3), commanded X, Y, Z; NaN for an axis not recorded
     actual_mm: Array | None  # the same for actual positions; None if none was recorded
 
     @property
@@ -63,7 +63,7 @@ def _names(name: str) -> Meaning | None:
 
 @dataclass(frozen=True)
 class _Columns:
-    """Index of each column that is used, and by `kind` and axis those of the positions."""
+    """Indices of the used columns; those of positions by `kind` and axis."""
 
     labels: list[Label]
     time: int
@@ -85,7 +85,7 @@ def _columns(table: TextTable) -> _Columns:
             target.setdefault(label.axis, index)
     if time < 0 or not (found.command or found.actual):
         raise ArgumentError(
-            f"{table.where}: no header with a time and an axis; wanted for example {_EXAMPLE}; the header is "
+            f"{table.where}: no header with a time and an axis; needed is for example {_EXAMPLE}; the header is "
             f"{', '.join(table.layout.header)[:60]!r}"
         )
     if not found.command:
@@ -107,21 +107,21 @@ def is_servo_log(path: Path, head: bytes) -> bool:
 
 
 def _time_unit(table: TextTable, label: Label, step: float) -> float:
-    unit = unit_of(table.where, label, ("time",), "say it with --units")
+    unit = unit_of(table.where, label, ("time",), "specify it with --units")
     if unit is not None:
         return unit.factor
     as_seconds, as_ms = (_SHORTEST_S <= step * unit <= _LONGEST_S for unit in (1.0, 1e-3))
     if as_seconds == as_ms:
         raise ArgumentError(
-            f"{table.path}: a time step of {step:g} may be s or ms: say it with --units, for example ms,mm"
+            f"{table.path}: a time step of {step:g} may be s or ms: specify it with --units, for example ms,mm"
         )
     return 1.0 if as_seconds else 1e-3
 
 
 def _length_factors(table: TextTable, columns: _Columns) -> list[float]:
-    """To mm, of the columns behind the time; one without a unit has that of the others, else mm."""
+    """Factors to mm of the columns after the time; a column without a unit has that of the others, else mm."""
     labels = [columns.labels[index] for index in columns.used[1:]]
-    units = [unit_of(table.where, label, ("displacement",), "say it with --units") for label in labels]
+    units = [unit_of(table.where, label, ("displacement",), "specify it with --units") for label in labels]
     factors = [None if unit is None else factor_between(unit, "mm") for unit in units]
     usual = next((each for each in factors if each is not None), 1.0)
     return [usual if each is None else each for each in factors]

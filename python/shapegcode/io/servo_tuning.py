@@ -1,4 +1,4 @@
-"""Reads results of auto servo tuning (AST) as SINUMERIK Operate saves them: what a drive's motor answers to its torque.
+"""Reads results of auto servo tuning (AST) saved by SINUMERIK Operate: response of a drive's motor to its torque.
 
 Sources of the format: eliasrhoden/Trace-Tools (MIT), `tuning_files.py` and `b85.py`.
 """
@@ -37,20 +37,20 @@ def is_xml(head: bytes) -> bool:
 
 
 def read_servo_tuning(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
-    """The structure as the motor feels it, per unit of torque; of a linear axis.
+    """Read the structure's response at the motor per unit of torque, for a linear axis.
 
-    A control moves the motor, and the structure vibrates as with the motor held: where the torque for a speed is
-    largest, not where the speed for a torque is. With the apparent inertia J - sum m s²/(s² + 2 zeta w s + w²) of such
-    a structure, what is given on is -torque/acceleration, an accelerance of unknown scale.
+    The control holds the motor, so the structure vibrates at the antiresonances: where torque over speed is
+    largest, not speed over torque. With the apparent inertia J - sum m s²/(s² + 2 zeta w s + w²) of such
+    a structure, the result is -torque/acceleration, an accelerance of unknown scale.
     """
     root = _root(path)
     axis, warnings = _axis(path, root)
     if options.axis and axis and options.axis != axis:
-        raise RecordError(f"{path}: holds the {axis.upper()} axis, asked for is {options.axis.upper()}")
+        raise RecordError(f"{path}: contains the {axis.upper()} axis, asked for is {options.axis.upper()}")
     controller = next(root.iter("DynamicModelPositionController840DSL"), None)
     plant = _lines(path, controller, "m_pPlant")
     if plant is None:
-        raise RecordError(f"{path}: <{root.tag}> holds no m_pPlant of a speed controller: {_NEEDED}")
+        raise RecordError(f"{path}: <{root.tag}> contains no m_pPlant of a speed controller: {_NEEDED}")
     hertz, values = plant
     measured = _lines(path, controller, "m_pMeasCoherence")
     coherence = None
@@ -62,7 +62,7 @@ def read_servo_tuning(path: Path, options: ReadOptions) -> list[FrequencyRespons
     hertz, values = hertz[kept], values[kept]
     response = -1.0 / (2j * np.pi * hertz * values)
     lines = checked_lines(str(path), hertz, response, None if coherence is None else coherence[kept])
-    notes = [*lines[3], f"{path}: of the motor's torque and speed: the modes with the motor held, no masses"]
+    notes = [*lines[3], f"{path}: from motor torque and speed: modes with the motor held, without masses"]
     return [
         FrequencyResponse(
             f"{path}: auto servo tuning", *lines[:2], "acceleration", lines[2], options.axis or axis,
@@ -79,7 +79,7 @@ def _root(path: Path) -> Element:
         nonlocal depth
         depth += 1
         if depth > MAX_DEPTH:
-            raise RecordError(f"{path}:{parser.CurrentLineNumber}: more than {MAX_DEPTH} elements within each other")
+            raise RecordError(f"{path}:{parser.CurrentLineNumber}: more than {MAX_DEPTH} nested elements")
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -88,7 +88,7 @@ def _root(path: Path) -> Element:
         builder.end(tag)
 
     def refuse(*_: Any) -> None:
-        raise RecordError(f"{path}:{parser.CurrentLineNumber}: a document type is declared: no measurement needs one")
+        raise RecordError(f"{path}:{parser.CurrentLineNumber}: a declared document type: measurements have none")
 
     parser.buffer_text = True
     parser.StartElementHandler, parser.EndElementHandler = start, end
@@ -96,10 +96,10 @@ def _root(path: Path) -> Element:
     try:
         parser.Parse(read_file(path, _MAX_BYTES), True)
     except expat.ExpatError as error:
-        raise RecordError(f"{path}:{error.lineno}: no whole XML: {expat.ErrorString(error.code)}") from error
+        raise RecordError(f"{path}:{error.lineno}: incomplete XML: {expat.ErrorString(error.code)}") from error
     except RecordError:
         raise
-    except (LookupError, ValueError) as error:  # of the codec that the declaration names
+    except (LookupError, ValueError) as error:  # from the declared codec
         raise RecordError(f"{path}:1: {error}: needed is XML in UTF-8, UTF-16 or an encoding of one byte") from error
     return builder.close()
 
@@ -110,12 +110,12 @@ def _axis(path: Path, root: Element) -> tuple[str | None, list[str]]:
     if linear:
         return linear[1].lower(), []
     if re.fullmatch(r"M?(A|B|C|SP|S|SPINDLE|SPINDEL)\d*", name, re.IGNORECASE):
-        raise RecordError(f"{path}: axis {name} turns: a linear axis (X, Y or Z) is needed")
+        raise RecordError(f"{path}: axis {name} is rotary: a linear axis (X, Y or Z) is needed")
     return None, [f"{path}: axis {name!r} is not named X, Y or Z: state it with --axis"]
 
 
 def _lines(path: Path, controller: Element | None, name: str) -> tuple[FloatArray, Any] | None:
-    """Frequencies and complex values of a response; the last one of its name, as the tuning took it."""
+    """Frequencies and complex values of a response; the last one of its name, as the tuning used."""
     if controller is None:
         return None
     found = [each for each in controller.iter("FrequencyResponseFunction") if each.get("name") == name]
@@ -128,7 +128,7 @@ def _lines(path: Path, controller: Element | None, name: str) -> tuple[FloatArra
     if arrays["m_ValueVector"].get("elementtype") == "ComplexNumber":
         values = values[: len(values) // 2 * 2].view(np.complex128)
     if len(hertz) != len(values):
-        raise RecordError(f"{path}: {name} has {len(hertz)} frequencies and {len(values)} values: must be as many")
+        raise RecordError(f"{path}: {name} has {len(hertz)} frequencies and {len(values)} values: must be equally many")
     bad = np.flatnonzero(~np.isfinite(values) | ~np.isfinite(hertz))
     if bad.size:
         raise RecordError(f"{path}: value {bad[0] + 1} of {name} is not finite")
@@ -136,17 +136,17 @@ def _lines(path: Path, controller: Element | None, name: str) -> tuple[FloatArra
 
 
 def _doubles(path: Path, name: str, array: Element) -> Any:
-    """Numbers of an array: words of four bytes to the base 85, the higher one first, a dot for 0."""
+    """Numbers of an array: base-85 words of four bytes, high word first, a dot for 0."""
     where = f"{path}: {array.get('name')} of {name}"
     if array.get("format") != "base85":
-        raise RecordError(f"{where} has the format {array.get('format')!r}: base85 is read")
+        raise RecordError(f"{where} has the format {array.get('format')!r}: needed is base85")
     text = "".join("".join(each.text or "" for each in array.iter("raw")).split())
     if unknown := set(text) - set(_SIEMENS + "."):
-        raise RecordError(f"{where} has {min(unknown)!r}, which is no digit to the base 85")
+        raise RecordError(f"{where} has {min(unknown)!r}, which is no base-85 digit")
     try:
         data = base64.b85decode(text.replace(".", "00000").translate(_DIGITS))
     except (ValueError, binascii.Error) as error:
         raise RecordError(f"{where}: {error}") from error
     if len(data) % 8:
-        raise RecordError(f"{where} is cut off: {len(data)} bytes are no whole numbers of 8")
+        raise RecordError(f"{where} is truncated: {len(data)} bytes are not a multiple of 8")
     return np.frombuffer(data, dtype=">f8").astype(np.float64)

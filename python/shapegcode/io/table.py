@@ -1,6 +1,6 @@
-"""The one reader of text tables: what a file is written in, its header with units, its rows of numbers.
+"""Reads text tables: layout, header with units, rows of numbers.
 
-Delimiter, decimal comma, preamble and a row of units are found out (`shapegcode.io.layout`). What is wrong is said with
+Delimiter, decimal comma, preamble and a row of units are detected (`shapegcode.io.layout`). Errors give
 line, column and text of the cell.
 """
 
@@ -27,32 +27,32 @@ from shapegcode.io.layout import (
 )
 from shapegcode.io.units import FloatArray
 
-_PIECE_BYTES = 4_000_000  # faults are looked for in pieces of this size
+_PIECE_BYTES = 4_000_000  # faults are searched in pieces of this size
 
 
 class TextTable:
     """A text file with columns."""
 
     def __init__(self, path: Path, *, by_number: bool = False) -> None:
-        self.path = path  # where it was read
+        self.path = path  # path
         data = utf8_text(path)
-        self.layout = find_layout(path, data, by_number)  # how it is written
+        self.layout = find_layout(path, data, by_number)  # its layout
         self.where = f"{path}:{self.layout.header_line}" if self.layout.header else f"{path}"
-        self.used: list[int] = []  # indices of the columns that were asked for last
+        self.used: list[int] = []  # indices of the columns requested last
         offset = 0
         for _ in range(self.layout.first_row - 1):
             offset = data.index(b"\n", offset) + 1
         self.data = data[offset:]
 
     def labels(self, read: Callable[[str, str], Label]) -> list[Label]:
-        """What the header says of each column."""
+        """Parsed label of each column."""
         count = self.layout.columns
         units = [*self.layout.units, *[""] * count][:count]
         header = [*self.layout.header, *[""] * count][:count]
         return [read(text, unit) for text, unit in zip(header, units, strict=True)]
 
     def numbers(self, used: list[int], fewest: int) -> FloatArray:
-        """Some columns, shape (rows, columns used)."""
+        """Read columns, shape (rows, columns used)."""
         self.used = used
         try:
             table = self._table(self.data)
@@ -81,7 +81,7 @@ class TextTable:
         )
 
     def _pieces(self) -> Iterator[tuple[int, bytes]]:
-        """(number of its first line, text) of pieces of the file: faults are found without going through it all."""
+        """Yield pieces of the file with the number of their first line, to find faults without parsing all of it."""
         number, start = self.layout.first_row, 0
         while start < len(self.data):
             end = self.data.find(b"\n", start + _PIECE_BYTES) + 1 or len(self.data)
@@ -91,20 +91,20 @@ class TextTable:
             start = end
 
     def _lines(self, first: int, piece: bytes) -> Iterator[tuple[int, str]]:
-        """(number, text) of the lines with cells."""
+        """Yield number and text of the lines with cells."""
         for number, line in enumerate(piece.split(b"\n"), start=first):
             text = line.decode("latin-1").partition("#")[0]
             if text.strip():
                 yield number, text
 
     def first_cell(self, index: int) -> str:
-        """The cell of a column in the first row; empty where there is none."""
+        """Cell of a column in the first row; empty if missing."""
         _, text = next((line for piece in self._pieces() for line in self._lines(*piece)), (0, ""))
         cells = cells_of(text, self.layout.delimiter)
         return cells[index] if index < len(cells) else ""
 
     def line_of(self, row: int) -> int:
-        """Line number of a row."""
+        """Line number of a row in the file."""
         lines = (number for piece in self._pieces() for number, _ in self._lines(*piece))
         return next(islice(lines, row, None))
 
@@ -134,19 +134,19 @@ class TextTable:
                 finite = is_number(cell, comma) and math.isfinite(float(plain))
                 if is_clock_time(cell):
                     raise RecordError(
-                        f"{self.path}:{number}: column {index + 1}{name} {cell!r} is a time of the day, which is not "
-                        "read: state the time between samples (for example --sample-period 0.1ms), or export seconds"
+                        f"{self.path}:{number}: column {index + 1}{name} {cell!r} is a time of day, which is not "
+                        "supported: state the time between samples (such as --sample-period 0.1ms), or export seconds"
                     )
                 if not finite:
                     kind = "is empty" if not cell else f"{cell!r} is not a finite number"
                     dialect = "comma" if comma else "point"
                     raise RecordError(
                         f"{self.path}:{number}: column {index + 1}{name} {kind}: every cell must be a number (decimal "
-                        f"{dialect}, columns divided by {self.layout.delimiter_name})"
+                        f"{dialect}, columns separated by {self.layout.delimiter_name})"
                     )
 
     def _refuse_points(self) -> None:
-        """Points for thousands, or both kinds of numbers: where decimal commas are, points are not wanted."""
+        """Refuse thousands points, or both kinds of numbers: with decimal commas points are invalid."""
         pieces = (piece for piece in self._pieces() if b"." in piece[1])
         for number, text in (line for piece in pieces for line in self._lines(*piece)):
             cells = cells_of(text, self.layout.delimiter)
@@ -154,5 +154,5 @@ class TextTable:
                 if "." in cells[index] and not has_thousands(cells[index]):
                     raise RecordError(
                         f"{self.path}:{number}: column {index + 1}: {cells[index]!r} has a decimal point, other cells "
-                        "have decimal commas: must be the same throughout, without separators of thousands"
+                        "have decimal commas: must be the same throughout, without thousands separators"
                     )

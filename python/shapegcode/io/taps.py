@@ -1,4 +1,4 @@
-"""Reads records of taps and decays from text with columns, Klipper's accelerations too."""
+"""Reads records of taps and decays from text with columns, including Klipper's accelerations."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from shapegcode.io.units import Measured, Unit
 _EXAMPLE = "time_s,force_N,acc_m/s^2"
 _RESPONSES: tuple[Quantity, ...] = ("acceleration", "velocity", "displacement")
 _REMEDY = (
-    "state the unit, or of a signal in volts the sensor's sensitivity (--force-sensitivity 2.25mV/N, "
+    "state the unit, or for a signal in volts the sensor's sensitivity (--force-sensitivity 2.25mV/N, "
     "--response-sensitivity 100mV/g) or the scale (--force-scale, --response-scale)"
 )
 _MIN_ROWS = 16  # fewer samples are no record of a vibration
@@ -43,7 +43,7 @@ class _Chooser:
         self.notes: list[str] = []
 
     def _named(self, wanted: str, option: str) -> int:
-        """Index of the column that an option names."""
+        """Index of the column named by an option."""
         path, columns = self.table.path, self.table.layout.columns
         if wanted.strip().isdigit():
             number = int(wanted)
@@ -67,10 +67,10 @@ class _Chooser:
         return repr(text) if text else f"column {index + 1}"
 
     def _factor(self, index: int, measures: Literal["time", "force"], option_unit: str | None) -> float:
-        """To s or N."""
+        """Factor of a column to s or N."""
         unit = self._unit(index, (measures,), option_unit)
         if unit is None and measures == "force":
-            self.warnings.append(f"{self._name(index)} has no unit: N is taken")
+            self.warnings.append(f"{self._name(index)} has no unit: N is assumed")
         return 1.0 if unit is None else unit.factor
 
     def _unit(self, index: int, allowed: tuple[Measured, ...], option_unit: str | None) -> Unit | None:
@@ -80,7 +80,7 @@ class _Chooser:
         return unit_of(self.where, replace(label, text=label.text or f"column {index + 1}"), allowed, _REMEDY)
 
     def _response(self, index: int) -> _Column:
-        """A column of a response, its quantity by option, name or unit."""
+        """Response column, with its quantity by option, name or unit."""
         options, label = self.options, self.labels[index]
         said = next((each for each in _RESPONSES if each == label.measures), None)
         quantity = options.quantity or said
@@ -94,7 +94,7 @@ class _Chooser:
         unit = self._unit(index, _RESPONSES if bound is None else (bound,), options.response_unit)
         if unit is None:
             quantity = quantity or "acceleration"
-            self.warnings.append(f"{self._name(index)} has no unit: {UNITS[quantity]} is taken")
+            self.warnings.append(f"{self._name(index)} has no unit: {UNITS[quantity]} is assumed")
             return _Column(index, label, 1.0, quantity)
         return _Column(index, label, unit.factor, next(each for each in _RESPONSES if each == unit.measures))
 
@@ -105,15 +105,15 @@ class _Chooser:
         if factor is None:
             said = label.unit.name if label.unit is not None else label.unknown_unit
             raise RecordError(
-                f"{self.where}: {self._name(index)} is in {said}, not in volts: leave its sensitivity out, or state "
+                f"{self.where}: {self._name(index)} is in {said}, not in volts: omit its sensitivity, or state "
                 "the scale (--force-scale, --response-scale)"
             )
         if not label.unknown_unit:
-            self.warnings.append(f"{self._name(index)} has no unit: V is taken, as its sensitivity is stated")
+            self.warnings.append(f"{self._name(index)} has no unit: V is assumed, as its sensitivity is stated")
         return factor
 
     def time(self) -> _Column | None:
-        """The column of the time; None: there is none, and a period is stated."""
+        """The column of the time; None: no column, and a period is stated."""
         options = self.options
         if options.time_column is not None:
             index = self._named(options.time_column, "--time-column")
@@ -132,7 +132,7 @@ class _Chooser:
         return _Column(index, self.labels[index], self._factor(index, "time", options.time_unit))
 
     def force(self) -> _Column | None:
-        """The column of the force; None: there is none, a free decay."""
+        """The column of the force; None: no column, a free decay."""
         options = self.options
         if options.ignore_force:
             return None
@@ -203,15 +203,15 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
     layout, reader = table.layout, _Chooser(table, options)
     if layout.skipped:
         lines = "line" if layout.skipped == 1 else "lines"
-        reader.notes.append(f"{path}: {layout.skipped} {lines} before the header in line {layout.header_line} left out")
+        reader.notes.append(f"{path}: {layout.skipped} {lines} before the header in line {layout.header_line} ignored")
     time = reader.time()
     force = reader.force()
     taken = {column.index for column in (time, force) if column is not None}
     responses = reader.responses(taken)
     if time is not None and options.period_s is not None and is_clock_time(table.first_cell(time.index)):
         reader.notes.append(
-            f"{path}: {time.label.text!r} holds times of the day, which are not read: the stated period of "
-            f"{options.period_s:.6g} s is taken"
+            f"{path}: {time.label.text!r} contains times of day, which are not supported: the stated period of "
+            f"{options.period_s:.6g} s is used"
         )
         time = None
     columns = [column for column in (time, force, *responses) if column is not None]
@@ -222,7 +222,7 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
         assert stated is not None
         period = stated
         if options.period_s is None:
-            reader.warnings.append(f"no column of time: the preamble's {1.0 / period:.9g} samples per second are taken")
+            reader.warnings.append(f"no column of time: the preamble's {1.0 / period:.9g} samples per second are used")
     else:
         times = values[:, 0] * time.factor
         try:
@@ -241,7 +241,7 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
         reader.warnings += notes
         start_s = float(times[0])
         if time.label.unit is None and options.time_unit is None:
-            reader.warnings.append(f"the time has no unit: s is taken, {1.0 / period:.6g} samples per second")
+            reader.warnings.append(f"the time has no unit: s is assumed, {1.0 / period:.6g} samples per second")
     at = 0 if time is None else 1
     force_n = None
     if force is not None:
@@ -275,7 +275,7 @@ def is_klipper(head: bytes) -> bool:
 
 
 def klipper_options(options: ReadOptions) -> ReadOptions:
-    """Options with the units that Klipper writes without saying them: s and mm/s²."""
+    """Options with Klipper's units, which its files do not state: s and mm/s²."""
     scaled = options.response_scale is not None or options.response_unit is not None
     return replace(
         options,
@@ -286,12 +286,12 @@ def klipper_options(options: ReadOptions) -> ReadOptions:
 
 
 def read_sweep(path: Path, options: ReadOptions) -> Record:
-    """The record along the axis that was shaken."""
+    """Read the record along the shaken axis."""
     told = options.axis or _axis_of_name(path.name)
     records = read_csv(path, replace(klipper_options(options), axis=told))
     record = max(records, key=lambda each: float(each.response.std()))
     axis = (record.axis or "").upper()
-    note = () if told else (f"{path}: the axis is not stated: {axis} moved most (state it with --axis)",)
+    note = () if told else (f"{path}: the axis is not stated: {axis} moved most and is used (state it with --axis)",)
     return replace(record, source=str(path), notes=(*record.notes, *note))
 
 

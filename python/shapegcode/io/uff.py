@@ -47,13 +47,13 @@ class _Channel:
 
 
 class UffFile:
-    """The datasets of one file."""
+    """Datasets of one file."""
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
         import pyuff
 
         self.path, self.options = path, options
-        self.warnings: list[str] = []  # what reading had to assume
+        self.warnings: list[str] = []  # assumptions made on reading
         self.unitless: list[str] = []
         try:
             self.uff = pyuff.UFF(str(path))
@@ -62,7 +62,7 @@ class UffFile:
             raise RecordError(f"{path}: the universal file cannot be read: {error}") from error
 
     def dataset(self, index: int) -> dict[str, Any]:
-        """One dataset as pyuff gives it."""
+        """Read one dataset with pyuff."""
         try:
             found: dict[str, Any] = self.uff.read_sets(index)
         except Exception as error:  # pyuff raises nothing narrower
@@ -70,11 +70,11 @@ class UffFile:
                 f"{self.path}: dataset {index + 1} (type {self.types[index]}) cannot be read: {error}"
             ) from error
         if self.types[index] == 58 and "data" not in found:
-            raise RecordError(f"{self.path}: dataset {index + 1} holds no values: it is damaged")
+            raise RecordError(f"{self.path}: dataset {index + 1} has no values: it is damaged")
         return found
 
     def channels(self) -> list[_Channel]:
-        """The time records."""
+        """Read the time records."""
         units: dict[str, Any] = {}
         others: dict[str, int] = {}
         found: list[_Channel] = []
@@ -93,16 +93,16 @@ class UffFile:
             found.append(self._channel(index, data, units))
         if not found:
             held = ", ".join(f"{count} {name}" for name, count in others.items()) or (
-                "datasets of type " + ", ".join(map(str, sorted(set(self.types)))) if self.types else "no whole dataset"
+                "datasets of type " + ", ".join(map(str, sorted(set(self.types)))) if self.types else "no dataset"
             )
             raise RecordError(
-                f"{self.path}: no time record: the file holds {held}; needed are time records (dataset 58, function "
-                "type 1) of the response, and of the force for a mass: spectra no longer tell overload, double hits "
+                f"{self.path}: no time record: the file contains {held}; needed are time records (dataset 58, function "
+                "type 1) of the response, and of the force for a mass: spectra do not show overload, double hits "
                 "and noise"
             )
         if self.unitless:
             sets = "dataset" if len(self.unitless) == 1 else "datasets"
-            self.warnings.append(f"no unit in {sets} {', '.join(self.unitless)}, and no dataset 164: SI is taken")
+            self.warnings.append(f"no unit in {sets} {', '.join(self.unitless)}, and no dataset 164: SI is assumed")
         return found
 
     def _channel(self, index: int, data: dict[str, Any], units: dict[str, Any]) -> _Channel:
@@ -112,7 +112,7 @@ class UffFile:
         values = whole_values(where, data)
         if len(values) < 16:
             raise RecordError(
-                f"{where}: {len(values)} samples: too short; a record has at least 16, a good one some 1000"
+                f"{where}: {len(values)} samples: too short; a record needs at least 16, better about 1000"
             )
         direction = int(data["rsp_dir"])
         if abs(direction) > 3:
@@ -152,7 +152,7 @@ class UffFile:
         if self.options.quantity:
             return self.options.quantity
         raise RecordError(
-            f"{where}: cannot tell what it is: ordinate data type {code}, unit "
+            f"{where}: unknown quantity: ordinate data type {code}, unit "
             f"{data.get('ordinate_axis_units_lab', '')!r}, title {data.get('id1', '')!r}; needed is data type 13 "
             "(force), 12 (acceleration), 11 (velocity) or 8 (displacement), or a unit"
         )
@@ -165,7 +165,7 @@ class UffFile:
         if sensitivity is not None:
             volts = volts_of(str(data.get("ordinate_axis_units_lab", "")).replace("NONE", ""))
             if volts is None:
-                raise RecordError(f"{where}: it is not in volts: leave the sensitivity out, or state the scale")
+                raise RecordError(f"{where}: it is not in volts: omit the sensitivity, or state the scale")
             return volts * per_volt("sensitivity", sensitivity, (measures,))[1]
         if scale is not None:
             return scale
@@ -179,8 +179,8 @@ class UffFile:
         if label is not None:
             if system is not None and not np.isclose(system, label.factor, rtol=1e-4):
                 self.warnings.append(
-                    f"dataset {where.rsplit(' ', 1)[1]}: its unit is {label.name}, dataset 164 says "
-                    f"{system:g} SI units: the label is taken"
+                    f"dataset {where.rsplit(' ', 1)[1]}: its unit is {label.name}, dataset 164 has "
+                    f"{system:g} SI units: the label is used"
                 )
             return label.factor
         if system is not None:
@@ -197,7 +197,7 @@ class UffFile:
     def _period(self, where: str, data: dict[str, Any]) -> tuple[float, float]:
         unit = find_unit(str(data.get("abscissa_axis_units_lab", "")))
         if unit is not None and unit.measures != "time":
-            raise RecordError(f"{where}: its abscissa is in {unit.name}: a time record has its time there")
+            raise RecordError(f"{where}: its abscissa is in {unit.name}: must be time in a time record")
         times = np.asarray(data["x"], dtype=np.float64) * (unit.factor if unit is not None else 1.0)
         if not np.isfinite(times).all():
             raise RecordError(f"{where}: a time is not a finite number")
@@ -212,11 +212,11 @@ class UffFile:
 
 
 def whole_values(where: str, data: dict[str, Any]) -> npt.NDArray[Any]:
-    """The values of a dataset: as many as its header says, and finite."""
+    """Check the values of a dataset: as many as its header states, and finite."""
     values = np.asarray(data["data"])
     if len(values) != int(data["num_pts"]):
         raise RecordError(
-            f"{where}: {len(values)} values, its header says {data['num_pts']}: the file is cut off or damaged"
+            f"{where}: {len(values)} values, but {data['num_pts']} by its header: the file is truncated or damaged"
         )
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
@@ -225,10 +225,10 @@ def whole_values(where: str, data: dict[str, Any]) -> npt.NDArray[Any]:
 
 
 def _force_of(path: Path, response: _Channel, forces: list[_Channel], responses: list[_Channel]) -> _Channel:
-    """The force that belongs to a response.
+    """Find the force of a response.
 
-    The force at the response's reference; of those, the one with its version, load case or function number where these
-    tell measurements apart; of those, by their order in the file.
+    The force at the response's reference; of several, the one with its version, load case or function number if these
+    distinguish measurements; else by their order in the file.
     """
 
     def alike(channel: _Channel, channels: list[_Channel]) -> list[_Channel]:
@@ -245,8 +245,8 @@ def _force_of(path: Path, response: _Channel, forces: list[_Channel], responses:
     order = rivals.index(response)
     if order >= len(candidates):
         raise RecordError(
-            f"{path}: {len(rivals)} responses at node {response.place[0]} and {len(candidates)} forces that may belong "
-            "to them: each measurement needs its force; number them (version number of dataset 58)"
+            f"{path}: {len(rivals)} responses at node {response.place[0]} and {len(candidates)} forces that may "
+            "match: each measurement needs its force; number them (version number of dataset 58)"
         )
     force = candidates[order]
     if len(force.values) != len(response.values) or not np.isclose(force.period_s, response.period_s, rtol=1e-4):
@@ -274,7 +274,7 @@ def read_uff(path: Path, options: ReadOptions) -> list[Record]:
         wanted = " ".join(
             part for part in (options.quantity or "response", f"along {options.axis}" if options.axis else "") if part
         )
-        raise RecordError(f"{path}: no {wanted}; the file holds {held}")
+        raise RecordError(f"{path}: no {wanted}; the file contains {held}")
     quantities = sorted({each.measures for each in responses})
     if len(quantities) > 1:
         raise RecordError(
@@ -309,13 +309,13 @@ def _functions(file: UffFile) -> list[tuple[int, dict[str, Any]]]:
 
 
 def is_frf_uff(path: Path, options: ReadOptions) -> bool:
-    """Whether a universal file holds frequency responses and no time record."""
+    """Whether a universal file contains frequency responses and no time record."""
     kinds = {int(data["func_type"]) for _, data in _functions(UffFile(path, options))}
     return _FRF in kinds and _TIME_RESPONSE not in kinds
 
 
 def read_frf_uff(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
-    """Read the frequency responses of a universal file: that of the driving point, if it is among several."""
+    """Read the frequency responses of a universal file: of several that of the driving point, if present."""
     file = UffFile(path, options)
     functions = _functions(file)
     units = next((file.dataset(k) for k, kind in enumerate(file.types) if kind == 164), None)
@@ -331,14 +331,14 @@ def read_frf_uff(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
         where = f"{path}: dataset {index + 1}"
         if not np.iscomplexobj(data["data"]):
             raise RecordError(
-                f"{where}: real values only: a magnitude without phase tells no mode from its neighbour; export real "
+                f"{where}: real values only: a magnitude without phase does not separate modes; export real "
                 "and imaginary part"
             )
         values = whole_values(where, data)
         label = str(data.get("abscissa_axis_units_lab", ""))
         unit = find_unit(label)
         if unit is not None and unit.measures == "time":
-            raise RecordError(f"{where}: its abscissa is in {unit.name}: a frequency response has its frequency there")
+            raise RecordError(f"{where}: its abscissa is in {unit.name}: must be frequency in a frequency response")
         frequency = np.asarray(data["x"], dtype=np.float64) * frequency_factor(label)
         quantity, factor, warnings = _scale(where, data, units, options)
         sign = -1.0 if int(data["rsp_dir"]) * int(data["ref_dir"]) < 0 else 1.0
@@ -368,28 +368,28 @@ def _numbered(
 def _of_one_point(
     path: Path, found: list[tuple[int, dict[str, Any]]], options: ReadOptions, notes: list[str]
 ) -> list[tuple[int, dict[str, Any]]]:
-    """Those along the axis, at the driving point where there is one."""
+    """Select the responses along the axis, at the driving point if present."""
     along = [each for each in found if options.axis is None or _axis(each[1]) in {options.axis, None}]
     listed = "; ".join(f"dataset {index + 1}: {_point(data)}" for index, data in found[:12])
     if not along:
-        raise RecordError(f"{path}: --axis {options.axis}: no frequency response along it; the file holds {listed}")
+        raise RecordError(f"{path}: --axis {options.axis}: no frequency response along it; the file contains {listed}")
     driving = [each for each in along if _place(each[1], "rsp") == _place(each[1], "ref")]
     chosen = driving or along
     if len({(_place(data, "rsp"), _place(data, "ref")) for _, data in chosen}) > 1:
         raise RecordError(
             f"{path}: {len(chosen)} frequency responses of different points: choose with --axis, or with "
-            f"--response-column NUMBER of the dataset; the file holds {listed}"
+            f"--response-column NUMBER of the dataset; the file contains {listed}"
         )
     if len(chosen) < len(found):
         which = ", ".join(str(index + 1) for index, _ in chosen)
         notes.append(
-            f"{path}: of {len(found)} frequency responses that in dataset {which} is used, {_point(chosen[0][1])}"
+            f"{path}: of {len(found)} frequency responses the one in dataset {which} is used, {_point(chosen[0][1])}"
         )
     if not driving:
         data = chosen[0][1]
         if _place(data, "rsp")[0] and _place(data, "ref")[0]:
             notes.append(
-                f"{path}: hammer and sensor are not at one point ({_point(data)}): the masses are not those there"
+                f"{path}: hammer and sensor are not at one point ({_point(data)}): masses are not those at the sensor"
             )
     return chosen
 
@@ -409,7 +409,7 @@ def _point(data: dict[str, Any]) -> str:
 def _scale(
     where: str, data: dict[str, Any], units: dict[str, Any] | None, options: ReadOptions
 ) -> tuple[Quantity, float, list[str]]:
-    """Quantity and factor to SI: by options, the labels, dataset 164, the kinds of the ordinate."""
+    """Quantity and factor to SI: from options, labels, dataset 164, types of the ordinate."""
     kind, denominator = int(data["ordinate_spec_data_type"]), int(data["orddenom_spec_data_type"])
     if kind in _FORCES and denominator in _RESPONSES:
         raise RecordError(f"{where}: force over response (an apparent mass or stiffness): export response over force")
@@ -434,17 +434,17 @@ def _scale(
     if unit is not None and unit.measures == quantity and (bottom == "" or find_unit(bottom) is not None):
         force = find_unit(bottom)
         over = 1.0 if force is None else force.factor
-        return quantity, unit.factor / over, [] if force else [f"{where}: no unit of the force: N is taken"]
+        return quantity, unit.factor / over, [] if force else [f"{where}: no unit of the force: N is assumed"]
     if units is not None:
         # Dataset 164: SI value = value / factor.
         return quantity, float(units["force"]) / float(units["length"]), []
     if named:
         raise RecordError(f"{where}: the units {' / '.join(named)!r} are not known; state --response-unit (over N)")
-    return quantity, 1.0, [f"{where}: no unit and no dataset 164: SI is taken"]
+    return quantity, 1.0, [f"{where}: no unit and no dataset 164: SI is assumed"]
 
 
 def _coherence(data: dict[str, Any], coherences: list[dict[str, Any]], lines: int) -> FloatArray | None:
-    """The coherence of the same points, if the file has it."""
+    """Coherence of the same points, if in the file."""
     for other in coherences:
         same = all(_place(other, which) == _place(data, which) for which in ("rsp", "ref"))
         values = np.real(np.asarray(other["data"]))

@@ -1,4 +1,4 @@
-"""The one table of units, how measuring programs spell them: ``m/s^2``, ``m_s2``, ``mm/min``, ``kgf``, arrays."""
+"""Table of units, with the spellings of measuring programs: ``m/s^2``, ``m_s2``, ``mm/min``, ``kgf``, arrays."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _SPELLINGS = {
     }.items()
     for spelling in spellings.split()
 }  # fmt: skip
-#: Units of raw signals and of quantities that are not converted: behind a name they must not pass for a part of it.
+#: Units of raw signals and of quantities not converted: after a name they must not be read as part of it.
 _FOREIGN = frozenset(
     {"v", "mv", "µv", "uv", "kv", "volt", "volts", "pc", "nc", "coulomb", "ma"}
     | {"count", "counts", "cts", "digit", "digits", "lsb", "adc", "%", "%fs", "fs", "db"}
@@ -55,8 +55,8 @@ _FOREIGN_TIMES = frozenset({"ns", "h", "hour", "hours", "tick", "ticks", "sample
 class Unit:
     """A known unit."""
 
-    measures: Measured  # what it is a unit of
-    name: str  # as messages write it
+    measures: Measured  # measured quantity
+    name: str  # name in messages
     factor: float  # multiplies a value to give SI (s, N, N·m, m/s², m/s, m)
 
 
@@ -68,12 +68,12 @@ _UNITS = {
 
 
 def units_of(*measures: Measured) -> str:
-    """The units known for quantities, for messages."""
+    """Known units of quantities, for messages."""
     return "; ".join(", ".join(name for name in _FACTORS[each] if name[0] != "u") for each in measures)
 
 
 def find_unit(text: str) -> Unit | None:
-    """The unit that a text means, upper or lower case; None: not known."""
+    """Find a unit, in upper or lower case; None: unknown."""
     plain = text.strip().lower().replace("μ", "µ").replace("_per_", "/")
     plain = re.sub(r"[\s*·⋅()\[\]]", "", plain.replace("**", "^"))
     plain = plain.replace("⁻", "-").replace("¹", "1").replace("²", "2").replace("^", "")
@@ -84,14 +84,14 @@ def find_unit(text: str) -> Unit | None:
 
 
 def factor_between(unit: Unit, wanted: str) -> float:
-    """What a value in a unit is multiplied with to give it in another of the same quantity."""
+    """Factor from a unit to another of the same quantity."""
     other = find_unit(wanted)
     if other is None or other.measures != unit.measures:
-        raise ValueError(f"{unit.name} of {unit.measures} is not converted to {wanted}")
+        raise ValueError(f"{unit.name} of {unit.measures} cannot be converted to {wanted}")
     return unit.factor / other.factor
 
 
 def is_foreign_unit(text: str, measures: str | None) -> bool:
-    """Whether a text is a unit that is not converted, such as V, where a quantity of this kind is measured."""
+    """Whether a text is a unit without conversion, such as V, for a quantity of this kind."""
     plain = re.sub(r"[\s^]", "", text.lower()).replace("²", "2").replace("μ", "µ")
     return plain in _FOREIGN or (measures == "time" and plain in _FOREIGN_TIMES)

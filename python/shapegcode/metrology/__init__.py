@@ -1,1 +1,1 @@
-"""What programs would measure on the part."""
+"""Virtual metrology: measures the simulated part."""

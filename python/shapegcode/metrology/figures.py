@@ -1,4 +1,4 @@
-"""The figures of a section of a path by kind: contour, circles, walls, width, roughness."""
+"""Figures of a section of a path: contour, circles, walls, width, roughness."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Sides(Generic[T]):
-    """A figure of both sides of the travel."""
+    """A figure for both sides of the travel."""
 
-    left: T  # of the left one
-    right: T  # of the right one
+    left: T  # left side
+    right: T  # right side
 
     def both(self) -> tuple[T, T]:
         """Left and right."""
@@ -29,7 +29,7 @@ class Sides(Generic[T]):
 
 @dataclass(frozen=True)
 class SidedError:
-    """How far a track leaves the programmed path, in µm; a vertical deviation is above or below, not left or right."""
+    """Deviation of a track from the programmed path, µm; vertical deviations are above or below, not left or right."""
 
     max: float  # distance, any side
     rms: float  # root mean square over the time in which the command moves
@@ -40,7 +40,7 @@ class SidedError:
 
     @classmethod
     def of(cls, stats: Sequence[_core.DeviationStats], sides: Sequence[_core.SideFigures]) -> SidedError:
-        """The figures of one or several runs together; all zero without any. The core's are in mm."""
+        """Combine the core's figures (mm) of one or several runs; all zero without any."""
         whole = ContourError.of(stats)
         names = ("left_mm", "right_mm", "above_mm", "below_mm")
         largest = (max((getattr(each, name) for each in sides), default=0.0) * 1e3 for name in names)
@@ -49,18 +49,18 @@ class SidedError:
 
 @dataclass(frozen=True)
 class FittedCircle:
-    """A circle through what was moved or cut on an arc."""
+    """A circle fitted to the track or the wall of an arc."""
 
-    nominal_radius_mm: float  # as programmed; of a wall with the tool's radius
-    fitted_radius_mm: float  # circle of least squares
-    radius_deviation_um: float  # fitted less nominal
-    mean_radius_deviation_um: float  # mean distance from the programmed centre less nominal
-    centre_offset_um: tuple[float, float]  # of the fitted centre from the programmed one, in the plane of the arc
-    form_error_um: float  # largest less smallest radial distance
+    nominal_radius_mm: float  # as programmed; for a wall including the tool's radius
+    fitted_radius_mm: float  # radius of the least-squares circle
+    radius_deviation_um: float  # fitted minus nominal
+    mean_radius_deviation_um: float  # mean distance from the programmed centre minus nominal
+    centre_offset_um: tuple[float, float]  # fitted minus programmed centre, in the plane of the arc
+    form_error_um: float  # largest minus smallest radial distance
 
     @classmethod
     def of(cls, arc: _core.ArcFigures | None, nominal_mm: float, centre_mm: FloatArray) -> FittedCircle | None:
-        """From the core; None where there is none."""
+        """Convert from the core; None: no circle."""
         if arc is None:
             return None
         x, y = (float(value) for value in (arc.fit.centre_mm - centre_mm) * 1e3)
@@ -70,18 +70,18 @@ class FittedCircle:
 
 @dataclass(frozen=True)
 class MeasuredArc:
-    """What only an arc has."""
+    """Figures of an arc."""
 
     nominal_radius_mm: float  # as programmed
-    command: FittedCircle | None  # circle through the set-points; arcs of 10 degrees on, else None
+    command: FittedCircle | None  # circle through the set-points; None for arcs below 10 degrees
     response: FittedCircle | None  # through the table's positions, likewise
-    inside_wall: FittedCircle | None  # through the wall towards the centre; None where there is none
+    inside_wall: FittedCircle | None  # through the wall towards the centre; None: no wall
     outside_wall: FittedCircle | None  # through the other wall, likewise
-    orbit_error_percent: Tracks[float | None]  # area between track and arc over the sector; None where it is not known
+    orbit_error_percent: Tracks[float | None]  # area between track and arc over the sector; None: unknown
 
     @classmethod
     def of(cls, figures: _core.SectionFigures, tool_diameter_mm: float) -> MeasuredArc:
-        """From the core's figures of an arc, and the tool that cuts its walls."""
+        """Convert the core's figures of an arc, given the diameter of the tool that cuts its walls."""
         nominal, centre, radius = figures.nominal_radius_mm, figures.nominal_centre_mm, tool_diameter_mm / 2.0
         walls = (figures.left_wall_arc, figures.right_wall_arc)
         inside, outside = walls if figures.turns_left else walls[::-1]
@@ -93,17 +93,17 @@ class MeasuredArc:
 
 @dataclass(frozen=True)
 class WallDeviation:
-    """A wall from where the programmed path cuts it, in µm, positive to the left of the travel; None without a wall."""
+    """Deviation of a wall from that of the programmed path, µm, positive to the left; None without a wall."""
 
-    min: float | None  # least
-    mean: float | None  # of all stations
-    max: float | None  # largest
-    band: float | None  # largest less least
-    stations: int  # places at which it was measured
+    min: float | None  # minimum
+    mean: float | None  # mean of all stations
+    max: float | None  # maximum
+    band: float | None  # maximum minus minimum
+    stations: int  # number of measured stations
 
     @classmethod
     def of(cls, wall: _core.WallFigures) -> WallDeviation:
-        """From the core, in mm."""
+        """Convert from the core's figures in mm."""
         values_mm = (wall.least_mm, wall.mean_mm, wall.largest_mm, wall.band_mm)
         least, mean, largest, band = (1e3 * value if wall.stations else None for value in values_mm)
         return cls(least, mean, largest, band, wall.stations)
@@ -114,14 +114,14 @@ class Width:
     """Width from wall to wall, in mm; None without two walls."""
 
     nominal: float  # the tool's diameter
-    min: float | None  # least
-    mean: float | None  # of all stations
-    max: float | None  # largest
-    stations: int  # places at which it was measured
+    min: float | None  # minimum
+    mean: float | None  # mean of all stations
+    max: float | None  # maximum
+    stations: int  # number of measured stations
 
     @classmethod
     def of(cls, width: _core.WallFigures, tool_diameter_mm: float) -> Width:
-        """From the core."""
+        """Convert from the core."""
         values = (width.least_mm, width.mean_mm, width.largest_mm)
         least, mean, largest = (value if width.stations else None for value in values)
         return cls(tool_diameter_mm, least, mean, largest, width.stations)
@@ -132,14 +132,14 @@ class WallRoughness:
     """Roughness and waviness of a wall (ISO 4287, ISO 21920-2)."""
 
     ra_um: float  # arithmetic mean height of the roughness
-    rz_um: float  # mean of highest less deepest over sampling lengths
+    rz_um: float  # mean of highest minus deepest over sampling lengths
     wa_um: float  # arithmetic mean height of the waviness
     cutoff_mm: float  # cut-off λc
-    evaluated_mm: float  # length that the figures speak of
+    evaluated_mm: float  # evaluation length
 
     @classmethod
     def of(cls, figures: _core.Roughness | None) -> WallRoughness | None:
-        """From the core, in mm; None of a wall that is too short."""
+        """Convert from the core's figures in mm; None: the wall is too short."""
         if figures is None:
             return None
         heights = (figures.ra_mm * 1e3, figures.rz_mm * 1e3, figures.wa_mm * 1e3)
@@ -148,44 +148,44 @@ class WallRoughness:
 
 @dataclass(frozen=True, eq=False)
 class WallProfile:
-    """The walls of a section."""
+    """Wall profiles of a section."""
 
-    distance_mm: FloatArray  # of the stations from the region's start, (n,)
-    # deviation of the left wall from what the programmed path cuts, positive to the left, (n,); NaN where there is no
+    distance_mm: FloatArray  # distance of the stations from the region's start, (n,)
+    # deviation of the left wall from that of the programmed path, positive to the left, (n,); NaN: no
     # wall
     left_um: FloatArray
-    right_um: FloatArray  # of the right wall, likewise
-    point_mm: FloatArray  # of the programmed path there, seen from above, (n, 2)
-    normal: FloatArray  # unit vectors to the left of the path, (n, 2); zero where it has no horizontal direction
+    right_um: FloatArray  # deviation of the right wall, likewise
+    point_mm: FloatArray  # points of the programmed path there, in XY, (n, 2)
+    normal: FloatArray  # unit vectors to the left of the path, (n, 2); zero without a horizontal direction
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSection:
-    """One section of the path: a line, an arc, a curve of short moves, or the lines that one asked for."""
+    """One section of the path: a line, an arc, a curve of short moves, or the requested lines."""
 
-    region: int  # cutting region in which it is, from 1
+    region: int  # its cutting region, from 1
     kind: str  # "line", "arc" or "curve"
     lines: tuple[int, int]  # first and last of the nominal program, from 1
     begin_mm: float  # distance from the region's start
     length_mm: float  # of the section
-    time_s: float  # while the command moves in it
+    time_s: float  # motion time of the command in it
     peak_vibration_um: Xyz[float]  # largest |response - command| of each axis while the command moves
-    residual_vibration_um: Xyz[float] | None  # the same once it rests; None: it does not stop here
-    # from then until it stays within the band; null: not while it was looked at; None: no stop
+    residual_vibration_um: Xyz[float] | None  # the same after its stop; None: no stop here
+    # time from then until it stays within the band; null: not within the observed time; None: no stop
     settling_time_s: Xyz[float | None] | None
-    observed_rest_s: float | None  # how long the rest was looked at; None: no stop
+    observed_rest_s: float | None  # observed time after the stop; None: no stop
     contour_error_um: Tracks[SidedError]  # distance of command and response from the path
-    arc: MeasuredArc | None  # what only arcs have; None for others
+    arc: MeasuredArc | None  # figures of an arc; None for others
     wall_deviation_um: Sides[WallDeviation]  # of both walls
     width_mm: Width  # from wall to wall
-    roughness: Sides[WallRoughness | None]  # of both walls; None where a wall is too short
-    walls: WallProfile | None = field(metadata=hidden())  # the profiles; None where so many stations are not kept
+    roughness: Sides[WallRoughness | None]  # of both walls; None: the wall is too short
+    walls: WallProfile | None = field(metadata=hidden())  # wall profiles; None: too many stations to keep
 
     @classmethod
     def of(
         cls, figures: _core.SectionFigures, region: int, tool_diameter_mm: float, walls: WallProfile | None
     ) -> MeasuredSection:
-        """From the core's figures, and with what tool the walls were cut."""
+        """Convert from the core's figures, given the tool that cut the walls."""
         section, rest = figures.section, figures.rest
         settling = None
         if rest is not None:
@@ -212,12 +212,12 @@ class MeasuredSection:
         )
 
     def name(self, number: int) -> str:
-        """Number, kind and lines in words."""
+        """Number, kind and lines as text."""
         kind = self.kind if self.arc is None else f"arc R{self.arc.nominal_radius_mm:g}"
         return f"{number} {kind}, {self.place}"
 
     @property
     def place(self) -> str:
-        """Its lines in words."""
+        """Its lines as text."""
         first, last = self.lines
         return f"line {first}" if first == last else f"lines {first}-{last}"

@@ -1,6 +1,6 @@
-"""Virtual metrology: what the response of the machine would measure on the part, section by section of the path.
+"""Virtual metrology: measures the part that the simulated response would cut, section by section of the path.
 
-The tool is a disc that removes what it sweeps: cutting forces, its deflection and the marks of its teeth are not in it.
+The tool is a disc that removes swept material: cutting forces, deflection and tooth marks are not included.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions
 
 _CHUNK_SAMPLES = 65_536
-_LONGEST_REST_S = 10.0  # that a vibration is waited for behind a stop
+_LONGEST_REST_S = 10.0  # longest observation of a vibration after a stop
 _MIN_REST_S = 0.25
 _MILLIONTH = math.log(1e6)
-_MAX_PROFILE_STATIONS = 200_000  # kept of each program for pictures
+_MAX_PROFILE_STATIONS = 200_000  # stored per program for pictures
 _MAX_TOOL_MM, _MIN_SPACING_MM, _SHORT_MM = 1000.0, 1e-3, 0.5
-_MAX_SECTIONS = 20_000  # of a program: each is a row with its walls
+_MAX_SECTIONS = 20_000  # largest number of sections of a program
 _MAX_FACTOR = 2.0**20
 _LAST_LINE = 2**32 - 1
-_BLOCKS_PER_CURVE = 2.5  # a shaped program's own blocks are shorter than this many block periods at its feed
+_BLOCKS_PER_CURVE = 2.5  # blocks of a shaped program are shorter than this many block periods at its feed
 
 
 def measure(
@@ -51,31 +51,31 @@ def measure(
 ) -> Measurement:
     """Measure one program, or several side by side.
 
-    Regions that shapegcode shaped, as the program's header says, are simulated block by block at their feed, all others
+    Shaped regions (by the program's header) are simulated block by block at their feed, all others
     with the controller's own motion.
 
     Args:
-        programs: what to measure: one or several, or their files.
+        programs: one or several programs, or their files.
         machine: controller and modes.
-        tool_diameter_mm: of the disc that is swept along the response.
+        tool_diameter_mm: diameter of the disc swept along the response.
         plant: "modal" or "feed-drive", see `sg.stream`.
         against: the program whose path is the nominal one; None: the first of several if shapegcode did not write it
             and did write all the others, else each program's own path.
-        lines: sections by lines of the nominal program, first and last; None: maximal runs of lines of one direction
+        lines: sections by first and last lines of the nominal program; None: sequences of lines of one direction
             and of arcs about one centre.
-        band_um: settled is what stays within this of the command.
-        station_spacing_mm: largest distance between two places at which walls are measured.
+        band_um: settled means within this distance of the command.
+        station_spacing_mm: largest distance between two measured stations of walls.
         cutoff_mm: cut-off lambda c of the roughness; None: the standard's, by the length of a section.
         lambda_s_mm: short-wave cut-off of the roughness; 0: none.
-        on_progress: called with regions done and regions in all.
+        on_progress: called with completed and total regions.
 
     Returns:
-        The figures of every section of every program, and which of them keep `tolerance.contour_um`.
+        The figures of every section of every program, and which programs keep `tolerance.contour_um`.
 
     Raises:
-        ArgumentError: no program, one without cuts, a value outside its range, lines that hold no cut, or a program
-            that does not cut the regions of the one it is measured against.
-        ProgramError: a program cannot be read, or a region takes longer than can be computed.
+        ArgumentError: no program, one without cuts, a value outside its range, lines without a cut, or a program
+            without the regions of the one it is measured against.
+        ProgramError: a program cannot be read, or a region takes too long to compute.
         OSError: a file cannot be read.
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
@@ -93,7 +93,7 @@ def measure(
         against = several[0]
     for program in several if against is None else [against]:
         if not program.regions:
-            raise _core.ArgumentError(f"{program.source}: no cutting move, so there is nothing to measure")
+            raise _core.ArgumentError(f"{program.source}: no cutting move, nothing to measure")
     total, done = sum(len(program.regions) for program in several), 0
 
     def one_done() -> None:
@@ -103,8 +103,8 @@ def measure(
 
     limit_um = machine.tolerance.contour_um
     beside = [(each.source, ours, (against or each).source) for each, ours in zip(several, shaped, strict=True)]
-    # Held against the tolerance are the shaped ones beside the programmed path, if there are any; the own path of a
-    # shaped one is not the programmed one.
+    # Compared with the tolerance are the shaped programs against the programmed path, if any; the own path of a
+    # shaped program is not the programmed one.
     judged = [ours and path != name for name, ours, path in beside]
     judged = judged if any(judged) else [not ours for ours in shaped]
     measured = []
@@ -136,15 +136,15 @@ def _coarse_warnings(regions: Iterable[MeasuredRegion], asked_mm: float, jobs: I
     joined_mm = max((job.joined_mm for job in jobs), default=0.0)
     if joined_mm > 0.0:
         yield (
-            f"so many sections that runs of lines and arcs below {joined_mm:.3g} mm are measured together as curves; "
-            "--lines picks places"
+            f"so many sections that lines and arcs below {joined_mm:.3g} mm are measured together as curves; "
+            "--lines selects sections"
         )
 
 
 def _options(
     tool_diameter_mm: float, band_um: float, station_spacing_mm: float, cutoff_mm: float | None, lambda_s_mm: float
 ) -> _core.MetrologyOptions:
-    """With what is measured; what nobody can measure with is refused before anything is simulated."""
+    """Check the measuring options before simulating anything."""
     diameter, spacing, cutoff = tool_diameter_mm, station_spacing_mm, cutoff_mm or 0.0
     for name, value, is_in, limit in (
         ("tool diameter", diameter, diameter > 0.0, "above 0"), ("station spacing", spacing, spacing > 0.0, "above 0"),
@@ -173,15 +173,15 @@ def measure_samples(
     cutoff_mm: float | None = None,
     lambda_s_mm: float = 0.0,
 ) -> MeasuredRegion:
-    """Measure samples of command and response against a path, wherever they come from.
+    """Measure samples of command and response from any source against a path.
 
     Args:
         chunks: command and response, (n, 3) each, mm, piece by piece; the first sample is at the start of the path.
-        path: what was programmed.
+        path: the programmed path.
         period_s: time between two samples.
-        tool_diameter_mm: of the disc that is swept along the response.
+        tool_diameter_mm: diameter of the disc swept along the response.
         lines: first and last of the path in its program, for reports.
-        band_um: settled is what stays within this of the command.
+        band_um: settled means within this distance of the command.
         station_spacing_mm: see `measure`.
         cutoff_mm: see `measure`.
         lambda_s_mm: see `measure`.
@@ -200,7 +200,7 @@ def measure_samples(
 def _measured_regions(
     jobs: Iterable[Job], machine: Machine, plant: str, options: _core.MetrologyOptions, on_done: Callable[[], None]
 ) -> Iterator[MeasuredRegion]:
-    """Every region of a program, simulated and measured."""
+    """Simulate and measure every region of a program."""
     kept = 0
     options.period_s = machine.controller.interpolation_period_s
     for number, job in enumerate(jobs, start=1):
@@ -231,11 +231,11 @@ def _measured(
 
 
 def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Command and response of a region, and what follows the stop until vibration and servo lag have decayed."""
+    """Yield command and response of a region, including the decay of vibration and servo lag after the stop."""
     model = MachineModel(machine)
     memory_s = max(model.vibration_memory_s, _MIN_REST_S)
     if plant != "modal":
-        # The position loop takes the lag off as exp(-gain t): to a millionth, as the vibration.
+        # The lag decays as exp(-gain t): wait until a millionth, as for vibration.
         memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
     rest_s = min(memory_s, _LONGEST_REST_S)
     options = model.options(plant=plant, offset=model.offset(job.simulated))
@@ -246,25 +246,25 @@ def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArra
 
 @dataclass(frozen=True)
 class Job:
-    """A region to simulate, the nominal one, and its sections."""
+    """A region to simulate, with nominal region and sections."""
 
     simulated: _core.Region
     nominal: _core.Region
     path: _core.Path
     sections: list[_core.PathSection]
-    joined_mm: float = 0.0  # runs shorter than this are one curve, as there were too many; 0: as everywhere
+    joined_mm: float = 0.0  # shorter sequences are joined to curves, as there were too many; 0: default
 
 
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:
-    """Pairs of regions that are measured, without those that have no section."""
+    """Pairs of regions to measure, without those without sections."""
     pairs = [pair for pair in paired_regions(program, nominal) if pair[1].path.length_mm > 0.0]
     blocks = _BLOCKS_PER_CURVE * machine.controller.block_time_s
     blocks = blocks if program.shaped_regions > 0 and nominal is program else 0.0
-    # Runs shorter than this that follow each other are one curve.
+    # Consecutive shorter sequences are joined to one curve.
     paths = [(region.path, max(_SHORT_MM, blocks * region.path.fastest_feed_mm_per_s)) for _, region in pairs]
     joined = 1.0
     if lines is None:
-        # So many times longer must runs be to stand alone that somebody may look at all sections; a region has one.
+        # Increase the least length of a separate section until there are few enough; a region has at least one.
         most = max(_MAX_SECTIONS, len(pairs))
         while joined < _MAX_FACTOR and sum(len(_core.path_sections(path, joined * mm)) for path, mm in paths) > most:
             joined *= 2.0

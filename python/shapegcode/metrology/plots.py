@@ -17,24 +17,24 @@ from shapegcode.results.outcome import Plot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SHARE_OF_TOOL = 0.8  # of the tool's radius that the largest deviation takes in the drawing
+_SHARE_OF_TOOL = 0.8  # drawn size of the largest deviation, relative to the tool's radius
 _SHARE_OF_PART, _MIN_DRAWN_UM, _MAX_MARKED = 0.03, 1e-3, 12
 
 
 def plots_of(measurement: Measurement) -> dict[str, Plot]:
-    """Its pictures by name: of the region with the largest deviation of walls; none if no walls were measured."""
+    """Pictures by name, of the region with the largest deviation of walls; none without measured walls."""
     if _worst_region(measurement) is None:
         return {}
     return {"measure-part": partial(plot_part, measurement), "measure-walls": partial(plot_walls, measurement)}
 
 
 def plot_part(measurement: Measurement, ax: Axes | None = None, *, region: int | None = None) -> Axes:
-    """The slot from above: nominal walls in grey, those of each program magnified.
+    """Plot the slot from above: nominal walls in grey, those of each program magnified.
 
     Args:
-        measurement: what was measured.
+        measurement: the measurement.
         ax: where to draw; None: a new figure.
-        region: index of the region; None: the one whose walls leave their place most.
+        region: index of the region; None: the one with the largest wall deviation.
 
     Returns:
         The panel.
@@ -70,12 +70,12 @@ def plot_part(measurement: Measurement, ax: Axes | None = None, *, region: int |
 
 
 def plot_walls(measurement: Measurement, ax: Axes | None = None, *, region: int | None = None) -> Axes:
-    """Left wall, right wall and width along the path; the borders of a few sections are marked.
+    """Plot left wall, right wall and width along the path; the borders of a few sections are marked.
 
     Args:
-        measurement: what was measured.
+        measurement: the measurement.
         ax: where to draw; None: a new figure.
-        region: index of the region; None: the one whose walls leave their place most.
+        region: index of the region; None: the one with the largest wall deviation.
 
     Returns:
         The upper panel.
@@ -92,9 +92,9 @@ def plot_walls(measurement: Measurement, ax: Axes | None = None, *, region: int 
         for panel, values in zip(column, curves, strict=True):
             panel.plot(wall.distance_mm, values, color=_colour(number), linewidth=1.1, label=program.name)
             panel.margins(x=0.01)
-    left.set_ylabel("left wall, µm\npositive: cut too far")
-    right.set_ylabel("right wall, µm\nnegative: cut too far")
-    ylabel = f"width less {measurement.tool_diameter_mm:g} mm, µm"
+    left.set_ylabel("left wall, µm\npositive: cut too deep")
+    right.set_ylabel("right wall, µm\nnegative: cut too deep")
+    ylabel = f"width minus {measurement.tool_diameter_mm:g} mm, µm"
     width.set(ylabel=ylabel, xlabel="distance along the programmed path, mm")
     sections = drawn[0][1].sections
     for section in sections if len(sections) <= _MAX_MARKED else ():
@@ -109,7 +109,7 @@ def plot_walls(measurement: Measurement, ax: Axes | None = None, *, region: int 
 
 
 def _worst_region(measurement: Measurement) -> int | None:
-    """The region with the largest deviation of walls in any program, of those whose walls were measured in all."""
+    """Region with the largest wall deviation in any program, among those with walls measured in all."""
     beside = enumerate(zip(*(program.regions for program in measurement.programs), strict=False))
     found = {index: max(map(_largest_um, regions)) for index, regions in beside if all(map(_walls, regions))}
     return max(found, key=lambda index: found[index], default=None)
@@ -133,7 +133,7 @@ def _walls(region: MeasuredRegion) -> list[WallProfile]:
 
 
 def _joined(region: MeasuredRegion) -> WallProfile:
-    """All walls of a region as one, with a gap between two sections."""
+    """Join all walls of a region, with a gap between sections."""
     gap = WallProfile(*(np.full(1, np.nan) for _ in range(3)), *(np.full((1, 2), np.nan) for _ in range(2)))
     with_gaps = [each for wall in _walls(region) for each in (wall, gap)]
     return WallProfile(*(np.concatenate([getattr(each, field.name) for each in with_gaps]) for field in fields(gap)))

@@ -17,7 +17,7 @@ from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 _MAX_SECTIONS = 12
-_SHOWN_UM = 0.005  # less is shown as 0.00
+_SHOWN_UM = 0.005  # smaller values are shown as 0.00
 
 Sections = Sequence[MeasuredSection]
 Values = Callable[[MeasuredSection], Sequence[float | None]]
@@ -25,16 +25,16 @@ Values = Callable[[MeasuredSection], Sequence[float | None]]
 
 @dataclass(frozen=True)
 class _Row:
-    name: str  # what is measured
-    values: tuple[str, ...]  # as text, one per program
-    nominal: str = ""  # what it should be; empty where that is nothing but zero
-    limit: str = ""  # what the machine file allows; empty: nothing stated
-    out: tuple[bool, ...] = ()  # for each program, whether it is beyond the limit
-    heading: bool = False  # it begins a section
+    name: str  # name of the figure
+    values: tuple[str, ...]  # values as text, one per program
+    nominal: str = ""  # nominal value; empty: zero
+    limit: str = ""  # limit of the machine file; empty: none
+    out: tuple[bool, ...] = ()  # for each program: beyond the limit
+    heading: bool = False  # starts a section
 
 
 def _program_columns(names: Sequence[str]) -> tuple[Column, ...]:
-    """One per program; the values of more than two wrap, so that they fit beside each other."""
+    """Columns, one per program; with more than two, values wrap to fit side by side."""
 
     def text(rank: int, row: _Row) -> str:
         return row.values[rank] if row.values else ""
@@ -48,11 +48,11 @@ def _program_columns(names: Sequence[str]) -> tuple[Column, ...]:
     )
 
 
-# --- the worst of every figure ----------------------------------------------------------------------------------------
+# --- worst value of each figure ---------------------------------------------------------------------------------------
 
 
 def _summary_table(title: str, programs: Mapping[str, MeasuredProgram], band_um: float) -> Table:
-    """The largest of each figure with section and line, one column per program."""
+    """Table of the largest value of each figure with section and line, one column per program."""
     all_of = programs.values()
     largest = (each.contour_error_um.response.max for each in all_of)
     rows = [
@@ -68,7 +68,7 @@ def _summary_table(title: str, programs: Mapping[str, MeasuredProgram], band_um:
 
 
 def _worst(sections: Sections, values: Values) -> str:
-    """The largest value and its place; empty where no section has the figure."""
+    """Largest value and its location; empty if no section has the figure."""
     numbered = enumerate(sections, start=1)
     found = [(value, -number) for number, each in numbered for value in values(each) if value is not None]
     if not found:
@@ -79,17 +79,17 @@ def _worst(sections: Sections, values: Values) -> str:
 
 
 def _figures(band_um: float) -> Iterator[tuple[str, Values]]:
-    """Name with unit, and the values of a section of which the largest counts."""
+    """Names with units, and functions for a section's values, of which the largest counts."""
     yield "contour error of a section µm", lambda s: [s.contour_error_um.response.max]
     for name, key in (("peak vibration", "peak_vibration_um"), ("residual at the stop", "residual_vibration_um")):
         for axis in "xyz":
             yield f"{name} {axis.upper()} µm", partial(_of_axis, key, axis)
     yield f"settling to {band_um:g} µm, ms", _settling_ms
-    yield "fitted radius off µm", partial(_radii_off, ("response",))
-    yield "inside, outside wall radius off µm", partial(_radii_off, ("inside_wall", "outside_wall"))
+    yield "fitted radius deviation µm", partial(_radii_off, ("response",))
+    yield "inside, outside wall radius deviation µm", partial(_radii_off, ("inside_wall", "outside_wall"))
     yield "orbit error of response %", lambda s: [None if s.arc is None else s.arc.orbit_error_percent.response]
     yield "cut-width band µm", lambda s: [wall.band for wall in s.wall_deviation_um.both()]
-    yield "width off µm", _width_off_um
+    yield "width deviation µm", _width_off_um
     yield "Ra of a wall µm", partial(_of_walls, "ra_um")
     yield "Wa of a wall µm", partial(_of_walls, "wa_um")
 
@@ -123,7 +123,7 @@ def _width_off_um(section: MeasuredSection) -> list[float | None]:
 def _section_table(
     title: str, programs: Mapping[str, MeasuredProgram], limit_um: float | None, band_um: float, *, every: bool
 ) -> Table:
-    """The figures of each section, one column per program."""
+    """Table of the figures of each section, one column per program."""
     beside = list(zip(*(each.sections for each in programs.values()), strict=False))
     count = len(beside)
     worst = [max(each.contour_error_um.response.max for each in sections) for sections in beside]
@@ -139,7 +139,7 @@ def _section_table(
         Column("limit", value="limit"),
     )
     left_out = count - len(shown)
-    caption = f"{left_out} more sections, whose contour error is less: --verbose shows them, --json lists them"
+    caption = f"{left_out} more sections with smaller contour error: --verbose shows them, --json lists them"
     return Table(
         title, columns, rows, caption=caption if left_out else "",
         sections=[rank for rank, row in enumerate(rows) if row.heading],
@@ -189,12 +189,12 @@ def _arc_rows(arcs: Sequence[MeasuredArc]) -> Iterator[_Row]:
     ):
         nominal = next((circle.nominal_radius_mm for circle in circles if circle is not None), None)
         if nominal is not None:
-            yield _Row(f"{name} mm (µm off)", tuple(map(_radius, circles)), f"{nominal:.3f}")
+            yield _Row(f"{name} mm (deviation µm)", tuple(map(_radius, circles)), f"{nominal:.3f}")
     if any(circle is not None for circle in track):
         form = ("–" if circle is None else f"{circle.form_error_um:.2f}" for circle in track)
         yield _Row("form error µm", tuple(form), "0")
         centre = ("–" if circle is None else _pair(circle.centre_offset_um, 1) for circle in track)
-        yield _Row("centre off µm", tuple(centre), "0")
+        yield _Row("centre offset µm", tuple(centre), "0")
     orbits = (arc.orbit_error_percent.response for arc in arcs)
     yield _Row("orbit error of response %", tuple("–" if value is None else f"{value:.4f}" for value in orbits), "0")
 
@@ -212,7 +212,7 @@ def _wall_rows(sections: Sections) -> Iterator[_Row]:
     bands = tuple(_pair([wall.band for wall in each.both()], 2) for each in walls)
     yield _Row("cut-width band left / right µm", bands, "0")
     ends = _each(sections, lambda s: _pair((s.width_mm.min, s.width_mm.max), 4))
-    yield _Row("width least / most mm", ends, f"{sections[0].width_mm.nominal:.3f}")
+    yield _Row("width min / max mm", ends, f"{sections[0].width_mm.nominal:.3f}")
 
 
 def _span(wall: WallDeviation) -> str:
@@ -249,11 +249,11 @@ def _pair(values: Sequence[float | None], decimals: int) -> str:
 class MeasuredRegion:
     """One cutting region of a program, measured."""
 
-    lines: tuple[int, int]  # of the program whose path it is measured against, first and last, from 1
-    path: _core.Path  # that path
-    figures: _core.TrackFigures  # what the core measured
-    sections: tuple[MeasuredSection, ...]  # of the path, in order
-    station_spacing_mm: float  # largest distance between two places at which walls were measured
+    lines: tuple[int, int]  # first and last line of the program against which it is measured, from 1
+    path: _core.Path  # its path
+    figures: _core.TrackFigures  # measured by the core
+    sections: tuple[MeasuredSection, ...]  # sections of the path, in order
+    station_spacing_mm: float  # largest distance between two measured stations of walls
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,14 +261,14 @@ class MeasuredProgram:
     """One program, measured."""
 
     program: str  # its name
-    shaped: bool  # simulated as one that shapegcode wrote: block by block at its feed
+    shaped: bool  # simulated as an emitted program: block by block at its feed
     measured_against: str  # name of the program whose path is the nominal one; its own name for its own path
-    ok: bool | None  # the response stays within the tolerance of the path; None: it is not judged
+    ok: bool | None  # the response is within the tolerance of the path; None: not judged
     cutting_time_s: float  # of all regions, until the set-points rest
-    contour_error_um: Tracks[SidedError]  # of all regions; missed corners count
+    contour_error_um: Tracks[SidedError]  # of all regions, including corners
     residual_vibration_um: Xyz[float]  # largest |response - command| of each axis at the stops
     sections: tuple[MeasuredSection, ...]  # of all regions, in order
-    warnings: tuple[str, ...]  # about the program and the machine
+    warnings: tuple[str, ...]  # on the program and the machine
     regions: tuple[MeasuredRegion, ...] = field(metadata=hidden())  # in order
 
     @classmethod
@@ -279,7 +279,7 @@ class MeasuredProgram:
         limit_um: float | None,
         warnings: tuple[str, ...],
     ) -> MeasuredProgram:
-        """The figures of its regions together; about: program, whether it is shaped, what it is measured against."""
+        """Combine the figures of its regions; about: program, shaped or not, measured against."""
         figures = [region.figures for region in regions]
         contour = Tracks(
             SidedError.of([each.command for each in figures], [each.command_sides for each in figures]),
@@ -298,23 +298,23 @@ class MeasuredProgram:
 
     @property
     def name(self) -> str:
-        """The name of its file."""
+        """File name."""
         return Path(self.program).name
 
     @property
     def how(self) -> str:
-        """How it was simulated, and against which path it was measured."""
+        """Sentence: how it was simulated, and against which path it was measured."""
         simulated = "block by block, as a shaped program" if self.shaped else "with the controller's own motion"
         own = self.measured_against == self.program
         path = "its own path" if own else f"the path of {self.measured_against}"
-        why = ", which is not the programmed one" if self.shaped else ", to compare the shaped with"
+        why = ", which is not the programmed one" if self.shaped else ", to compare with the shaped one"
         judged = f"{why}: not judged" if self.ok is None else ""
         return f"{self.program}: simulated {simulated}, measured against {path}{judged}"
 
     def verdict(self, limit_um: float) -> str:
-        """By how much it keeps the tolerance or does not, and where."""
+        """Sentence: within tolerance or not, by how much, and where."""
         largest = self.contour_error_um.response.max
-        within = f"leaves the path by {largest:.2f} µm at most"
+        within = f"deviates from the path by up to {largest:.2f} µm"
         if self.ok is None:
             return f"{self.name}: not judged: {within}"
         limit = f"limit {limit_um:g} µm (tolerance.contour_um)"
@@ -327,7 +327,7 @@ class MeasuredProgram:
         worst = [section.contour_error_um.response.max for section in self.sections]
         index = worst.index(max(worst))
         if worst[index] < self.contour_error_um.response.max:
-            return "at a corner that it rounds off"
+            return "at a rounded corner"
         return f"in section {self.sections[index].name(index + 1)}"
 
 
@@ -338,14 +338,14 @@ class Measurement(Result):
     Attributes:
         machine: name of the machine.
         plant: "modal" or "feed-drive".
-        tool_diameter_mm: of the disc that was swept along the response.
-        settling_band_um: settled is what stays within it.
-        station_spacing_mm: largest distance between two places at which walls were measured.
+        tool_diameter_mm: diameter of the disc swept along the response.
+        settling_band_um: settled means within this distance of the command.
+        station_spacing_mm: largest distance between two measured stations of walls.
         roughness_cutoff_mm: cut-off λc; None: by the length of each section.
         roughness_lambda_s_mm: short-wave cut-off; 0: none.
         contour_tolerance_um: of the machine file (`tolerance.contour_um`).
-        programs: in the order in which they were given.
-        simulated: the first two of them, to simulate them again for a page.
+        programs: in the given order.
+        simulated: the first two of them, for a page.
     """
 
     machine: str
@@ -361,57 +361,57 @@ class Measurement(Result):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Published methods of the controller, the plant and the fit of arcs."""
+        """Published methods of controller, plant and circle fit."""
         has_arcs = any(section.arc is not None for program in self.programs for section in program.sections)
         return (*(("circle fit",) if has_arcs else ()), *(() if self.simulated is None else self.simulated.methods))
 
     @property
     def ok(self) -> bool:
-        """The response of every program that is judged stays within the tolerance of the path."""
+        """True if the response of every judged program is within the tolerance of the path."""
         return all(program.ok is not False for program in self.programs)
 
     @property
     def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Those of the programs, each once."""
+        """Warnings of the programs, each once."""
         return tuple(dict.fromkeys(warning for program in self.programs for warning in program.warnings))
 
     @property
     def answer(self) -> str:
-        """For each program that is compared with the tolerance: whether it keeps it, or by how much it does not."""
+        """For each judged program: within tolerance, or by how much out."""
         judged = [program for program in self.programs if program.ok is not None] or self.programs
         return "; ".join(program.verdict(self.contour_tolerance_um) for program in judged)
 
     @property
     def next_step(self) -> str:
-        """The one thing to do next, in one sentence."""
+        """Next command or change, in one sentence."""
         if not self.ok and self.plant == "feed-drive":
             return (
-                "the lag of the servo loops takes the table off the path: more feed-forward or position gain, or less "
-                "feed; --plant modal shows what vibration alone does"
+                "servo lag moves the table off the path: more feed-forward or position gain, or less "
+                "feed; --plant modal shows the effect of vibration alone"
             )
         missed = next((each for each in self.programs if each.shaped and each.ok is False), None)
         if missed is not None:
-            return f"convert again with a smaller --contour-tolerance: {missed.name} leaves the path"
+            return f"convert again with a smaller --contour-tolerance: {missed.name} deviates from the path"
         if not any(program.shaped for program in self.programs):
-            return "shapegcode convert shapes the program; measure both to see what it gains"
+            return "shapegcode convert shapes the program; measure both to see the gain"
         if any(program.shaped and program.ok is None for program in self.programs):
             return "measure it --against the original program: its own path is not the programmed one"
         return "--plots DIR draws the part with its deviations magnified, --lines A-B measures the cut of these lines"
 
     def tables(self, *, every_section: bool = False) -> list[Table]:
-        """A summary and a table of sections for the programs that are measured against the same path, side by side.
+        """A summary and a table of sections of the programs measured against the same path, side by side.
 
         Args:
-            every_section: show all sections; False: of many the worst ones.
+            every_section: show all sections; False: only the worst of many.
 
         Returns:
-            Two for each path.
+            Two tables for each path.
         """
         found = []
         for path in dict.fromkeys(program.measured_against for program in self.programs):
             beside = [program for program in self.programs if program.measured_against == path]
             by_name = {program.name: program for program in beside}
-            # Whole paths where two files of one name are compared.
+            # Full file paths if two files have the same name.
             if len(by_name) < len(beside):
                 by_name = {f"{number} {program.program}": program for number, program in enumerate(beside, start=1)}
             judged = any(program.ok is not None for program in beside)

@@ -1,1 +1,1 @@
-"""From the machine to the core: its controller, modes and drives, and programs simulated on them."""
+"""Core models of a machine: controller, modes, drives; and simulation of programs on them."""

@@ -1,4 +1,4 @@
-"""A machine as the core simulates it: made once from the machine file, used by every simulation.
+"""Core model of a machine, made once from the machine file and used by every simulation.
 
 Whether a path is planned or simulated block by block is decided in `SimulatedController` alone.
 """
@@ -25,7 +25,7 @@ from shapegcode.model.modes import NO_OFFSET, Offset
 def fanuc_model(
     machine: Machine, *, feed_override: float = 1.0, rapid_override: float = 1.0, shaped: bool | None = None
 ) -> _core.FanucModel:
-    """The controller of a machine as the core times and simulates it."""
+    """Core model of a machine's controller, for times and simulation."""
     controller = machine.controller
     model = _core.FanucModel()
     model.planner = planner_rules(machine)
@@ -65,7 +65,7 @@ def fanuc_model(
     model.spindle_stop_s = times.spindle_stop.rows if times.spindle_stop else []
     model.unknown_move_s = times.unknown_move_s.as_tuple()
     if controller.kind != "fanuc":
-        # Straight rapids by the acceleration of the axes, and no wait behind them.
+        # Straight rapids with the axes' acceleration, and no wait after them.
         pairs = [(axis.rapid_mm_per_min / 60.0, axis.max_acceleration_mm_s2) for axis in machine.axes.as_tuple()]
         model.rapid_time_constant_s = [rate / acceleration for rate, acceleration in pairs]
         model.rapid_bell_time_s = 0.0
@@ -76,7 +76,7 @@ def fanuc_model(
 
 
 def planner_rules(machine: Machine) -> _core.PlannerRules:
-    """The planner of a control that is none of FANUC's."""
+    """Planner rules of a control other than FANUC."""
     controller, rules = machine.controller, _core.PlannerRules()
     rules.kind = getattr(_core.ControllerKind, controller.kind)
     rules.period_s = controller.interpolation_period_s
@@ -91,7 +91,7 @@ def planner_rules(machine: Machine) -> _core.PlannerRules:
 
 
 def command_planner(machine: Machine) -> _core.CommandPlanner:
-    """What plans a cut before it is shaped: `shaping.planner`."""
+    """Planner of a cut before shaping: `shaping.planner`."""
     planner = machine.shaping.planner
     if planner == "optimal" or (planner == "auto" and machine.controller.kind != "fanuc"):
         return _core.CommandPlanner.time_optimal
@@ -99,7 +99,7 @@ def command_planner(machine: Machine) -> _core.CommandPlanner:
 
 
 def planned_jerk_mm_s3(machine: Machine) -> list[float]:
-    """Jerk of each axis of a time-optimal cut; without a limit the acceleration still takes a time to build up."""
+    """Jerk of each axis in a time-optimal cut; without a limit it follows from the acceleration's build-up time."""
     rise_s = machine.shaping.jerk_time_s
     return [axis.max_jerk_mm_s3 or axis.max_acceleration_mm_s2 / rise_s for axis in machine.axes.as_tuple()]
 
@@ -110,13 +110,13 @@ def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.Mot
     controller = machine.controller
     axes = machine.axes.as_tuple()
     limits.law, limits.arc_feed_ratio = getattr(_core.AccelerationLaw, controller.law), arc_feed_ratio
-    # A ramp of one tick stands for "no ramp": zero time has no acceleration.
+    # A ramp of one interpolation period stands for "no ramp": zero time has no acceleration.
     limits.time_constant_s = max(controller.time_constant_s, controller.interpolation_period_s)
     limits.jerk_time_s = controller.bell_time_s
     limits.max_feed_mm_per_s = [axis.max_feed_mm_per_min / 60.0 for axis in axes]
     limits.max_acceleration_mm_per_s2 = [axis.max_acceleration_mm_s2 for axis in axes]
     limits.max_jerk_mm_per_s3 = [_limit(axis.max_jerk_mm_s3) for axis in axes]
-    # 0 means a stop at every corner; the planner wants a speed, and this one is a stop to every purpose.
+    # 0 means a stop at every corner; the planner needs a speed, and this one is practically a stop.
     rule, along = controller.corner_rule, controller.polyline_acceleration_mm_s2
     if rule == "speed_difference":
         steps = controller.corner_speed_difference_mm_per_min.as_tuple()
@@ -139,9 +139,9 @@ def _limit(value: float | None) -> float:
 
 
 BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)  # both rules of block timing
-PLANTS = ("modal", "feed-drive")  # modes behind an ideal servo; motor, ball screw and table with their servo loops
-_DRIVE_REST_S = 0.5  # how long behind a stop the error of feed drives is looked at
-_LEAST_DECAY_PER_S = 0.01  # below it a mode has no damping to speak of
+PLANTS = ("modal", "feed-drive")  # ideal servo followed by modes; motor, ball screw and table with their servo loops
+_DRIVE_REST_S = 0.5  # time after a stop in which the error of feed drives is evaluated
+_LEAST_DECAY_PER_S = 0.01  # below it a mode counts as undamped
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class OwnFilter:
     shape: str  # "linear" (moving averages) or "exponential"
     time_constant_s: float  # length of the moving average, or time constant; 0: none
     bell_time_s: float  # length of the second moving average; 0: none
-    duration_s: float  # of the response to a step
+    duration_s: float  # duration of the step response
 
     @property
     def variance_s2(self) -> float:
@@ -162,23 +162,23 @@ class OwnFilter:
 
     @property
     def mean_deviation_s(self) -> float:
-        """Mean of the absolute distance from the mean, at most: what a corner is cut by goes with it."""
+        """Upper bound on the mean absolute deviation; the error at a corner is proportional to it."""
         if self.shape == "exponential":
             return self.time_constant_s * 2.0 / math.e
         return (self.time_constant_s + self.bell_time_s) / 4.0
 
 
 class SimulatedController:
-    """A controller that makes a motion of paths: planned by its look-ahead, or block by block."""
+    """A controller that turns paths into motion: planned by its look-ahead, or block by block."""
 
     def __init__(self, model: _core.FanucModel, override: float = 1.0) -> None:
         self.model = model
         self._override = override
         model.limits.feed_override *= override
-        self.filters = _core.acceleration_filters(model)  # of acceleration/deceleration after interpolation
+        self.filters = _core.acceleration_filters(model)  # acceleration/deceleration after interpolation
 
     def _planned(self, path: _core.Path) -> tuple[_core.Path, _core.SpeedProfile] | None:
-        """Motion that the planner computes for a path, and its speed; None if the control executes block by block."""
+        """Planned motion of a path and its speed; None if the control executes block by block."""
         model = self.model
         look_ahead = model.motion == _core.MotionKind.look_ahead or model.planner.kind != _core.ControllerKind.fanuc
         return _core.controlled_motion(path, model.limits, model.planner) if look_ahead else None
@@ -191,7 +191,7 @@ class SimulatedController:
         against: _core.Path | None = None,
         block_end: _core.BlockEnd | None = None,
     ) -> _core.SimulationFigures:
-        """A path simulated from rest to rest and measured against itself or another one."""
+        """Simulate a path from rest to rest and measure it against itself or another path."""
         options.axis_filters = self.filters
         planned = self._planned(path)
         if planned is not None:
@@ -200,7 +200,7 @@ class SimulatedController:
         return _core.simulate_blocks(path, against or path, block_end or self.model.block_end, self._override, options)
 
     def stream(self, path: _core.Path, options: _core.SimulationOptions, rest_s: float) -> _core.SimulationStream:
-        """The same motion piece by piece, and what the plant does for a while behind its end."""
+        """Simulate the same motion piece by piece, and the plant for a while after its end."""
         options.axis_filters = self.filters
         planned = self._planned(path)
         if planned is not None:
@@ -208,7 +208,7 @@ class SimulatedController:
         return _core.SimulationStream.of_blocks(path, self.model.block_end, 1.0, options, rest_s)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: FloatArray, window_s: float) -> _core.Travel:
-        """How fast a path is travelled."""
+        """Speed along a path."""
         period_s, planned = self.model.period_s, self._planned(path)
         if planned is not None:
             return _core.travel_path(*planned, along, stations_mm, period_s, self.filters, window_s)
@@ -216,7 +216,7 @@ class SimulatedController:
 
 
 class _Given(TypedDict, total=False):
-    """What simulations of a cut pass on to `MachineModel.options`."""
+    """Arguments that simulations of a cut pass on to `MachineModel.options`."""
 
     shift: float
     only: str | None
@@ -230,16 +230,16 @@ class MachineModel:
         self.machine, self.name = machine, machine.name
         self.period_s = machine.controller.interpolation_period_s
         self.own_rule: _core.BlockEnd = getattr(_core.BlockEnd, machine.controller.block_end)
-        # Whether the control plans shaped blocks too: its planner cannot be switched off.
+        # True if the control plans shaped blocks too, since its planner cannot be switched off.
         self.always_plans = machine.controller.kind != "fanuc"
-        # Rules of block timing under which emitted blocks are simulated; a planner has one of its own.
+        # Rules of block timing under which emitted blocks are simulated; a planner has its own rule.
         self.block_rules = (self.own_rule,) if self.always_plans else BLOCK_ENDS
         slowest = [modes.slowest_mode(mode) for axis in machine.axes.as_tuple() for mode in axis.modes]
         rates = [damping * 2.0 * math.pi * frequency for frequency, damping in slowest]
-        self.slowest_decay_per_s = min(rates, default=math.inf)  # of the mode that rings longest
+        self.slowest_decay_per_s = min(rates, default=math.inf)  # decay rate of the mode that rings longest
 
     def __reduce__(self) -> tuple[type[MachineModel], tuple[Machine]]:
-        """Built again from the machine: what the core holds does not travel."""
+        """Pickle as the machine, from which the core objects are rebuilt."""
         return MachineModel, (self.machine,)
 
     def __eq__(self, other: object) -> bool:
@@ -250,12 +250,12 @@ class MachineModel:
 
     @cached_property
     def ordinary(self) -> SimulatedController:
-        """The controller as it simulates an ordinary program."""
+        """Controller for an ordinary program."""
         return SimulatedController(fanuc_model(self.machine))
 
     @cached_property
     def shaped(self) -> SimulatedController:
-        """The controller as it simulates shaped blocks: one by one, without look-ahead, if that can be switched off."""
+        """Controller for shaped blocks: one by one, without look-ahead if that can be switched off."""
         model = _core.for_shaped_blocks(fanuc_model(self.machine))
         model.block_end = self.own_rule
         return SimulatedController(model)
@@ -269,28 +269,28 @@ class MachineModel:
         return OwnFilter(control.shaped_filter_shape, *times_s, duration_s)
 
     def simulated(self, *, shaped: bool) -> SimulatedController:
-        """One of the two: `shaped` for a program that shapegcode wrote."""
+        """Select the controller: `shaped` for an emitted program."""
         return self.shaped if shaped else self.ordinary
 
     @property
     def vibration_memory_s(self) -> float:
-        """Time after which a vibration is a millionth of itself, s; 0 where a mode has no damping to speak of."""
+        """Time in which a vibration decays to a millionth, s; 0 if a mode is undamped."""
         slowest = self.slowest_decay_per_s
         return math.log(1e6) / slowest if _LEAST_DECAY_PER_S < slowest < math.inf else 0.0
 
     @cached_property
     def bounds_deviations(self) -> bool:
-        """Whether deviations at other overrides cost little beside a run: no filter, modes that stay, sides alike."""
+        """True if deviations at other overrides are cheap to bound: no filter, constant modes, equal sides."""
         moves = modes.moving_axis(self.machine) is not None
         plain = self.machine.verdict.plant == "modal" and not self.shaped.filters and not moves
         return plain and not self.always_plans and self.machine.input.material_side is None
 
     def limits(self, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
-        """Look-ahead limits, a copy of one's own."""
+        """A copy of the look-ahead limits."""
         return motion_limits(self.machine, arc_feed_ratio=arc_feed_ratio)
 
     def offset(self, region: _core.Region) -> Offset:
-        """From the program's positions in a region to the machine's; see `region_offset`."""
+        """Offset from program to machine positions in a region; see `region_offset`."""
         return modes.region_offset(region, self.machine)
 
     def options(
@@ -316,7 +316,7 @@ class MachineModel:
         plant = self.machine.verdict.plant
         options = self.options(plant=plant, filters=filters, **given)
         if plant != "modal":
-            # The lag that runs out at a stop is no vibration: the residual is that of table against motor.
+            # Servo lag that settles at a stop is no vibration: the residual is that of table relative to motor.
             options.settling_limit_s = _DRIVE_REST_S
             options.arrived_mm = min(self.machine.controller.in_position_width_um.as_tuple()) * 1e-3
         return options
@@ -325,14 +325,14 @@ class MachineModel:
         self, path: _core.Path, *, against: _core.Path | None = None, override: float = 1.0, record_samples: int = 0,
         emitted: bool = False, **given: Unpack[_Given],
     ) -> _core.SimulationFigures:  # fmt: skip
-        """A cut as the controller executes an ordinary program; `emitted`: with arcs as they are emitted."""
+        """Simulate a cut of an ordinary program; `emitted`: with the emitted arcs."""
         options = self.verdict_options(**given)
         options.record_samples = record_samples
         controller = self._at_override(override, shaped=emitted and self.always_plans)
         return controller.simulate(path, options, against=against)
 
     def is_emitted_alike(self, path: _core.Path) -> bool:
-        """Whether a cut left unchanged moves as in the original: its arcs may be emitted as chords."""
+        """Whether a cut left unchanged moves as in the original; arcs emitted as chords do not."""
         has_chords = self.always_plans and self.shaped.model.planner.chord_tolerance_mm > 0.0
         return not has_chords or path.largest_sweep_rad == 0.0
 
@@ -345,7 +345,7 @@ class MachineModel:
     def simulate_rapid(
         self, start_mm: FloatArray, end_mm: FloatArray, options: _core.SimulationOptions
     ) -> _core.SimulationFigures:
-        """A rapid as the control makes it, from rest to rest, without its contour."""
+        """Simulate a rapid from rest to rest, without contour."""
         options.measure_contour = False
         samples = _core.rapid_samples(start_mm, end_mm, self.ordinary.model)
         still = _core.Path([_core.Segment.line(start_mm, start_mm, 1.0)])
@@ -358,7 +358,7 @@ class MachineModel:
         other_overrides: Sequence[float] = (), tracker: _core.ContourTracker | None = None,
         increment_mm: float | None = None, **given: Unpack[_Given],
     ) -> _core.SimulationFigures:  # fmt: skip
-        """Emitted blocks as the controller simulates them, measured against the programmed path."""
+        """Simulate emitted blocks, measured against the programmed path."""
         options = self.verdict_options(filters=self.shaped.filters, **given)
         options.measure_contour = contour
         options.measure_command, options.measure_response = command_contour, response_contour
@@ -382,7 +382,7 @@ class MachineModel:
         self, blocks: _core.Path, path: _core.Path, *, offset: Offset = NO_OFFSET,
         tracker: _core.ContourTracker | None = None,
     ) -> _core.SimulationFigures:  # fmt: skip
-        """Emitted blocks as the look-ahead plans them again if it is left on, against the programmed path."""
+        """Simulate emitted blocks replanned by a look-ahead left on, measured against the programmed path."""
         ticks = round(self.machine.controller.look_ahead_filter_time_constant_s / self.period_s)
         filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []
         options = self.verdict_options(filters=filters, offset=offset)
@@ -391,21 +391,21 @@ class MachineModel:
         return _core.simulate_planned(blocks, self.limits(), options, path)
 
     def cycle_time_s(self, program: _core.ProgramText) -> float:
-        """Time of a whole program in closed form, s; `shapegcode.cycle_time` says where it goes."""
+        """Time of a whole program in closed form, s; `shapegcode.cycle_time` splits it into parts."""
         return float(_core.time_program(program, self.ordinary.model).total_s)
 
 
-RAMP_FREQUENCY_HZ = 10_000.0  # at which no block that is written is a ramp
-_CORNER_RAD = 0.1  # a turn of the path itself, at which LinuxCNC blends or stops
-_MOST_KINK_RATIO = 0.7  # LinuxCNC takes 0.7071 for more
+RAMP_FREQUENCY_HZ = 10_000.0  # no emitted block is a ramp at this frequency
+_CORNER_RAD = 0.1  # from this turn of the path LinuxCNC blends or stops
+_MOST_KINK_RATIO = 0.7  # LinuxCNC limits more to 0.7071
 _KINK_MARGIN = 1.25
-_STEPS = 20.0  # of a kink ratio of 1
+_STEPS = 20.0  # rounding steps of a kink ratio of 1
 
 
 def ini_lines(
     paths: Iterable[_core.Path], machine: Machine
 ) -> Iterator[tuple[Literal["kink_ratio", "ramp_frequency"], int, str]]:
-    """What to set, as its key, the line where it matters most, and a sentence; nothing for another control."""
+    """LinuxCNC settings to change: key, line of the worst case, sentence; empty for another control."""
     if machine.controller.kind != "linuxcnc":
         return
     model = fanuc_model(machine)
@@ -415,7 +415,7 @@ def ini_lines(
     if kinks := sum(each.kinks for each in found):
         worst = max(found, key=lambda each: each.largest_ratio)
         ratio = min(_MOST_KINK_RATIO, math.ceil(worst.largest_ratio * _KINK_MARGIN * _STEPS) / _STEPS)
-        more = "" if worst.largest_ratio < _MOST_KINK_RATIO else ", the most that it takes"
+        more = "" if worst.largest_ratio < _MOST_KINK_RATIO else ", the highest accepted value"
         yield "kink_ratio", worst.line, (
             f"LinuxCNC slows where {kinks} of {blocks} shaped blocks meet: {worst.speed_mm_per_s:.0f} mm/s turn by "
             f"{worst.angle_rad * 1e3:.2f} mrad within {rules.period_s * 1e3:g} ms, {worst.largest_ratio:.2f} of the "
@@ -424,7 +424,7 @@ def ini_lines(
         )  # fmt: skip
     if ramps := sum(each.ramps for each in found):
         yield "ramp_frequency", 0, (
-            f"LinuxCNC stretches {ramps} of {blocks} shaped blocks, as it makes the speed a ramp over each that takes "
+            f"LinuxCNC stretches {ramps} of {blocks} shaped blocks, as it ramps the speed over each that takes "
             f"less than {1e3 / rules.ramp_frequency_hz:g} ms; INI file: [TRAJ] ARC_BLEND_RAMP_FREQ = "
             f"{RAMP_FREQUENCY_HZ:.0f}, and it is {rules.ramp_frequency_hz:g}"
         )  # fmt: skip

@@ -1,6 +1,6 @@
-"""Modes that move over the mass of the part or the position of an axis, for the plant, for shapers and for people.
+"""Modes that vary with part mass or axis position, for plant, shapers and messages.
 
-Positions in tables are the machine's: those of the program plus work offset and tool length.
+Positions in tables are machine positions: program position plus work offset and tool length.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import AxisMode, Machine
 from shapegcode.machine.axes import Drive
 
-#: Machine position minus program position of X, Y, Z in mm; None where it is not known.
+#: Machine position minus program position of X, Y, Z in mm; None if unknown.
 Offset = tuple[float | None, float | None, float | None]
 NO_OFFSET: Offset = (0.0, 0.0, 0.0)
 _AXES = "xyz"
 
 
 def still_mode(mode: AxisMode, part_mass_kg: float | None) -> _core.Mode:
-    """The mode that holds where no axis position counts: nominal, or as a stated mass of the part makes it."""
+    """Mode independent of axis position: nominal, or at the stated part mass."""
     nominal = _core.Mode(mode.frequency_hz, mode.damping_ratio, mode.participation)
     over = mode.frequency_over
     if over is None or over.mass_kg is None or part_mass_kg is None:
         return nominal
-    # The core interpolates over any abscissa.
+    # The core interpolates over any variable.
     return _core.ModeTable(0, over.mass_kg, over.frequency_hz, over.damping_ratio or ()).mode_at(nominal, part_mass_kg)
 
 
@@ -40,10 +40,10 @@ Pairs = list[tuple[_core.Mode, _core.ModeTable]]
 def moving_modes(
     machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET, only: str | None = None
 ) -> list[Pairs]:
-    """What moves X, Y, Z: modes for the core, each with how it varies with the position of the command.
+    """Core modes at X, Y, Z, each with its variation over the commanded position.
 
-    Each is shifted by `shift` times its stated uncertainty, its damping at its low end. A table over the part's mass is
-    looked up; of one over a position the nominal frequency is taken. A mode that moves several axes stands at each.
+    Each is shifted by `shift` times its stated uncertainty, damping at its low end. A table over the part's mass is
+    evaluated; for one over a position the nominal frequency is used. A mode of several axes is listed at each.
     """
     found: list[Pairs] = [[], [], []]
     for name, axis, mode in numbered_modes(machine):
@@ -60,7 +60,7 @@ def moving_modes(
 
 
 def axis_modes(machine: Machine, shift: float = 0.0, only: str | None = None) -> list[list[_core.Mode]]:
-    """The modes of `moving_modes` alone."""
+    """The modes of `moving_modes` without their variation."""
     return [[mode for mode, _ in pairs] for pairs in moving_modes(machine, shift, only=only)]
 
 
@@ -70,7 +70,7 @@ def own_modes(machine: Machine, shift: float = 0.0, only: str | None = None) -> 
 
 
 def excited_modes(machine: Machine) -> list[list[_core.Mode]]:
-    """The modes that X, Y, Z excite, for their shapers: each as far as its axis moves the tool by it."""
+    """Modes that X, Y, Z excite, for their shapers, weighted by their motion of the tool along that axis."""
     found: list[list[_core.Mode]] = [[], [], []]
     for exciting, share, axis, mode in _excitations(machine):
         still = _shifted(mode, 0.0, machine)
@@ -96,7 +96,7 @@ def _excitations(machine: Machine) -> Iterator[tuple[int, float, int, AxisMode]]
 
 
 def _shifted(mode: AxisMode, off: float, machine: Machine) -> _core.Mode:
-    """A mode at a share of its stated uncertainty."""
+    """A mode shifted by a fraction of its stated uncertainty."""
     still = still_mode(mode, machine.shaping.part_mass_kg)
     return _core.Mode(
         still.frequency_hz * (1.0 + off * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
@@ -106,7 +106,7 @@ def _shifted(mode: AxisMode, off: float, machine: Machine) -> _core.Mode:
 
 
 def slowest_mode(mode: AxisMode) -> tuple[float, float]:
-    """Lowest frequency (Hz) by a mode's tables, and least damping ratio by them and by its stated uncertainty."""
+    """Lowest frequency (Hz) by a mode's tables, and lowest damping ratio by tables and stated uncertainty."""
     over = mode.frequency_over
     least = damping_scale(mode, 1.0)
     if over is None:
@@ -115,31 +115,31 @@ def slowest_mode(mode: AxisMode) -> tuple[float, float]:
 
 
 def damping_scale(mode: AxisMode, shift: float) -> float:
-    """What a mode's damping ratio is multiplied by where its frequency is moved by `shift` of its uncertainty.
+    """Factor on a mode's damping ratio if its frequency is shifted by `shift` of its uncertainty.
 
-    Both ways it is the lower end of the stated damping that counts. To first order a shaper leaves the same at either
-    end: what counts is how far the pole is off, |dw/w + i dzeta|. Beyond that less damping leaves more.
+    It is always the lower end of the stated damping. A shaper's residual is the same at either end to first order, as
+    it depends on the pole's distance |dw/w + i dzeta|; to second order it is larger at lower damping.
     """
     return 1.0 - abs(shift) * (mode.damping_uncertainty_percent or 0.0) / 100.0
 
 
 def moving_axis(machine: Machine) -> int | None:
-    """The axis over whose position modes vary: 0, 1, 2 for X, Y, Z; None: there is none."""
+    """The axis over whose position modes vary: 0, 1, 2 for X, Y, Z; None: no such axis."""
     named = {mode.frequency_over.axis for _, _, mode in numbered_modes(machine) if mode.frequency_over is not None}
     axes = sorted(axis for axis in named if axis is not None)
     if len(axes) > 1:
         raise _core.ArgumentError(
             f"modes vary over the positions of {' and '.join(name.upper() for name in axes)} (frequency_over): "
-            "shapers can follow one axis"
+            "shapers can follow only one axis"
         )
     return _AXES.index(axes[0]) if axes else None
 
 
 def region_offset(region: _core.Region, machine: Machine) -> Offset:
-    """From the program's positions in a region to the machine's.
+    """Offset from program to machine positions in a region.
 
-    The work offset is that of `input.work_offsets`, zero if it is left out there; tool length counts for Z where
-    `input.tool_length_mm` gives it. Nothing is known of an axis whose position the program does not state.
+    The work offset is that of `input.work_offsets`, zero if omitted there; tool length is added for Z if
+    `input.tool_length_mm` gives it. None for an axis whose position the program does not state.
     """
     state = region.entry
     system = f"G54.1P{state.coordinate_number}" if state.coordinate_system == 541 else f"G{state.coordinate_system}"
@@ -153,28 +153,28 @@ def region_offset(region: _core.Region, machine: Machine) -> Offset:
 
 
 def machine_warnings(machine: Machine) -> list[str]:
-    """Warnings about the tables of modes before any program is read: a mass that is missing, unused or outside."""
+    """Warnings about the tables of modes known before reading a program: mass missing, unused or outside."""
     mass = machine.shaping.part_mass_kg
     tables = [(name, mode, mode.frequency_over) for name, _, mode in numbered_modes(machine)]
     over_mass = [(name, mode, over.mass_kg) for name, mode, over in tables if over is not None and over.mass_kg]
     if mass is None:
         return [
             f"{name} has a table over mass_kg, but shaping.part_mass_kg is not given: its nominal "
-            f"{mode.frequency_hz:g} Hz holds"
+            f"{mode.frequency_hz:g} Hz is used"
             for name, mode, _ in over_mass
         ]
     if not over_mass:
-        return [f"shaping.part_mass_kg = {mass:g}: no mode has a table over mass_kg, so it changes nothing"]
+        return [f"shaping.part_mass_kg = {mass:g}: no mode has a table over mass_kg, so it has no effect"]
     return [
         f"shaping.part_mass_kg = {mass:g} lies outside the table of {name}, {masses[0]:g} to {masses[-1]:g} kg: its "
-        f"nearest row holds, {still_mode(mode, mass).frequency_hz:g} Hz"
+        f"nearest row is used, {still_mode(mode, mass).frequency_hz:g} Hz"
         for name, mode, masses in over_mass
         if not masses[0] <= mass <= masses[-1]
     ]
 
 
 def region_range_warnings(regions: Sequence[_core.Region], machine: Machine) -> list[str]:
-    """Tables that the program leaves, or whose axis' position it does not state; one sentence for each mode."""
+    """Warnings, one per mode: the program leaves its table, or does not state the axis' position."""
     warnings = []
     for name, _, mode in numbered_modes(machine):
         over = mode.frequency_over
@@ -189,20 +189,20 @@ def region_range_warnings(regions: Sequence[_core.Region], machine: Machine) -> 
                 reached += [float(positions.min()), float(positions.max())]
         if unknown := [region for region, offset in offsets if offset is None]:
             warnings.append(
-                f"line {unknown[0].first_line}: the position of {over.axis.upper()} is not known, over which {name} "
-                f"varies: its nominal {mode.frequency_hz:g} Hz holds"
+                f"line {unknown[0].first_line}: the position of {over.axis.upper()} is unknown, and {name} "
+                f"varies with it: its nominal {mode.frequency_hz:g} Hz is used"
             )
         low, high = over.abscissa[0], over.abscissa[-1]
         if reached and (min(reached) < low or max(reached) > high):
             warnings.append(
                 f"{over.axis.upper()} moves between {min(reached):g} and {max(reached):g} mm (machine coordinates), "
-                f"the table of {name} covers {low:g} to {high:g} mm: beyond it the nearest row holds"
+                f"the table of {name} covers {low:g} to {high:g} mm: beyond it the nearest row is used"
             )
     return warnings
 
 
 def position_table(mode: AxisMode, shift: float = 0.0, offset: Offset = NO_OFFSET) -> _core.ModeTable:
-    """How a mode varies with the position of the command; without rows where it does not."""
+    """Variation of a mode with the commanded position; no rows for a constant mode."""
     over = mode.frequency_over
     if over is None or over.axis is None:
         return _core.ModeTable()
@@ -239,21 +239,21 @@ _LINEAR = {
 def drive_parameters(
     machine: Machine | str | Path, shift: float = 0.0, only: str | None = None
 ) -> list[_core.FeedDriveParameters]:
-    """The feed drives of X, Y and Z, referred to the travel of the tables.
+    """Feed drives of X, Y and Z, referred to table travel.
 
-    Position gain and feed-forward are those of the controller; the modes of the axes ride on the tables, those that
+    Position gain and feed-forward are those of the controller; the axes' modes are attached to the tables, those that
     vary with a position at their nominal frequency.
 
     Args:
-        machine: with a table ``[axes.x.drive]``, and so for y and z.
-        shift: share of each mode's stated uncertainty by which it is off, see `axis_modes`.
-        only: the one mode that is off; None: all of them.
+        machine: with a key table ``[axes.x.drive]``, and likewise for y and z.
+        shift: shift of each mode, as a ratio to its stated uncertainty; see `axis_modes`.
+        only: the one mode to shift; None: all.
 
     Returns:
         Parameters of X, Y and Z, in SI units.
 
     Raises:
-        MachineError: an axis has no such table, or its loop is unstable.
+        MachineError: an axis without such a table or with an unstable loop.
     """
     machine = Machine.of(machine)
     control, axes = machine.controller, machine.axes.as_tuple()
@@ -266,7 +266,7 @@ def drive_parameters(
     for (key, drive), modes, (gain, ratio) in zip(drives.items(), own_modes(machine, shift, only), loops, strict=True):
         assert drive is not None
         parameters.append(_of_axis(modes, drive, gain, ratio))
-        # Whether the loop grows by itself, dry friction, backlash and force limit left out.
+        # Stability of the loop without dry friction, backlash and force limit.
         linear = _of_axis([], drive.model_copy(update=_LINEAR), gain, 0.0)
         poles = np.linalg.eigvals(np.array(_core.linear_model(linear)[0]))
         worst = poles[np.argmax(poles.real)]
@@ -321,23 +321,23 @@ _WANTED = (
 def plant_response(
     command_mm: npt.ArrayLike, modes: Machine | Sequence[Sequence[AxisMode | _core.Mode]], period_s: float
 ) -> FloatArray:
-    """Response of base-excited modes to a whole record of set-points, exact for set-points linear in between.
+    """Response of base-excited modes to a record of set-points, exact for set-points joined by straight lines.
 
-    What the real-time plant of the core gives sample by sample, to the last bit, at the speed of a batch. At rest at
+    Bit-identical to the core's real-time plant, at the speed of a batch. At rest at
     the first row.
 
     Args:
         command_mm: set-points in mm, shape (n_samples, n_axes), one per period.
-        modes: of each axis, those of the core or of a machine file; none: the axis follows its command. A machine
-            stands for the modes of its X, Y, Z, as many as the command has axes. Tables over a position count with
-            their nominal mode.
+        modes: for each axis core or machine-file modes; none: the axis follows its command. A machine
+            is used for its modes of X, Y, Z, as many as the command has axes. Modes with tables over a position are
+            nominal.
         period_s: time between samples in s, above 0.
 
     Returns:
         Positions of the table in mm at the same instants, (n_samples, n_axes), in the memory order of the command.
 
     Raises:
-        ArgumentError: not as many lists of modes as axes, a command that is not finite, an invalid mode or period.
+        ArgumentError: number of mode lists other than of axes, a non-finite command, an invalid mode or period.
     """
     if isinstance(modes, Machine):
         command_mm = np.asarray(command_mm, dtype=np.float64)

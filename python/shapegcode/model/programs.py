@@ -1,4 +1,4 @@
-"""Programs on the machine that runs them: what the header of an emitted one says of it, and simulated for a page."""
+"""Programs and their machine: header data of emitted programs, and simulation for a page."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _WHOLE = 1e-6
 class SimulatedPrograms:
     """A program and its emitted program."""
 
-    original: Program  # what is simulated
+    original: Program  # program to simulate
     machine: Machine  # controller and plant
-    emitted: Program | None = None  # made of it; None: none
-    labels: tuple[str, str] = ("original", "emitted")  # of both, for people
+    emitted: Program | None = None  # its emitted program; None: none
+    labels: tuple[str, str] = ("original", "emitted")  # display names of both
     plant: str = "modal"  # "modal" or "feed-drive"
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Published methods of the controller and the plant that simulate them; see `Result.methods`."""
+        """Published methods behind controller and plant models; see `Result.methods`."""
         control, drives = self.machine.controller, [axis.drive for axis in self.machine.axes.as_tuple()]
         look_ahead = control.kind == "fanuc" and control.motion == "look_ahead"
         lugre = any(drive is not None and drive.friction_model == "lugre" for drive in drives)
@@ -42,7 +42,7 @@ class SimulatedPrograms:
         return tuple(name for name, is_used in used.items() if is_used)
 
     def scene(self, on_progress: Callable[[float], None] = lambda _done: None) -> Scene | None:
-        """Simulate them."""
+        """Simulate both programs."""
         from shapegcode.model.scene import scene_of
 
         return scene_of(
@@ -51,7 +51,7 @@ class SimulatedPrograms:
 
 
 def stamp_of_machine(machine: Machine, *, version: str = "") -> Stamp:
-    """The part of a header that the machine alone decides."""
+    """The part of a header that depends only on the machine."""
     modes = [
         f"{axis} {mode.frequency_hz:g} HZ {mode.damping_ratio:g}"
         for axis, modes in zip("XYZ", axis_modes(machine), strict=True)
@@ -65,7 +65,7 @@ def stamp_of_machine(machine: Machine, *, version: str = "") -> Stamp:
 
 
 def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]:
-    """Why the verdict in the header of an emitted program does not hold here."""
+    """Why the verdict in the header of an emitted program is not valid here."""
     stamp = program.stamp
     if stamp is None:
         return []
@@ -73,16 +73,16 @@ def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]
     if (mark := text_mark(program.own_text)) != stamp.mark:
         found["edited"] = (
             f"the program was changed since it was shaped (mark in its header: {stamp.mark}, computed: {mark}): the "
-            "verdict in its header does not hold for it; convert the original again"
+            "verdict in its header is not valid; convert the original again"
         )
     if difference := stamp.difference(stamp_of_machine(machine)):
-        why = f"shaped for another machine ({difference}): it is no remedy for this one's vibration"
+        why = f"shaped for another machine ({difference}): it does not reduce this machine's vibration"
         found["other_machine"] = why
     if why := _other_period(stamp, machine):
         found["other_period"] = why
     if not program.shaped_regions:
         found["unmarked"] = (
-            "its header says that it is shaped, but no cut is marked (SHAPED): simulated as an ordinary program "
+            "its header marks it as shaped, but no cut is marked (SHAPED): simulated as an ordinary program "
             "(simulate --shaped simulates all of it as shaped blocks)"
         )
     return list(found.items())
@@ -93,12 +93,12 @@ def _other_period(stamp: Stamp, machine: Machine) -> str:
     try:
         period_s = float(stamp.block_period_ms) * 1e-3
     except ValueError:
-        return f"its header gives no block period: {stamp.block_period_ms!r}"
+        return f"its header states no valid block period: {stamp.block_period_ms!r}"
     ticks = period_s / controller.interpolation_period_s
-    blocks = f"its blocks last {stamp.block_period_ms} ms"
+    blocks = f"its blocks take {stamp.block_period_ms} ms"
     if abs(ticks - round(ticks)) > _WHOLE:
         tick_ms = controller.interpolation_period_s * 1e3
-        return f"{blocks}, which is no whole number of this control's periods of {tick_ms:g} ms"
+        return f"{blocks}, not a whole number of this control's periods of {tick_ms:g} ms"
     if period_s < controller.block_time_s * (1.0 - _WHOLE):
         return f"{blocks}, this control needs {controller.block_time_s * 1e3:g} ms for a block: buffer underrun"
     if stated_s is not None and abs(stated_s - period_s) > _WHOLE * period_s:
@@ -107,10 +107,10 @@ def _other_period(stamp: Stamp, machine: Machine) -> str:
 
 
 def shaped_note(program: Program) -> str:
-    """How a program is simulated, in one sentence; empty for one without shaped regions."""
+    """How a program is simulated, in one sentence; empty without shaped regions."""
     shaped, whole = program.shaped_regions, len(program.regions)
     if not shaped:
         return ""
-    others = "" if shaped == whole else f"; the other {whole - shaped} as the control executes any program"
+    others = "" if shaped == whole else f"; the other {whole - shaped} as in an ordinary program"
     how = f"{shaped} of {whole} regions are simulated block by block at their feed"
-    return f"its header says that it is shaped: {how}{others}"
+    return f"its header marks it as shaped: {how}{others}"

@@ -1,6 +1,6 @@
-"""Programs simulated for a page: one motion in time beside the other, thinned as it passes by.
+"""Programs simulated for a page: both motions over time, decimated while simulated.
 
-Memory does not grow with the length of a program: each piece is thinned as soon as it was simulated.
+Memory does not grow with the length of a program: each piece is decimated once simulated.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from shapegcode.program.compensation import paired_regions
 from shapegcode.results.page import scene as page
 from shapegcode.results.page.scene import Kept, Scene, SceneSpectrum, Variant
 
-MOST_POINTS = 60_000  # samples of a program that a page shows, at most
+MOST_POINTS = 60_000  # largest number of samples per program on a page
 _HALF_PIXEL, _LEAST_EXTENT_MM = 0.5, 1e-3
-_FLAT = {"deviation": 1e-3, "vibration": 1e-3, "speed": 1e-3, "acceleration": 1e-6}  # a curve within so little is flat
+_FLAT = {"deviation": 1e-3, "vibration": 1e-3, "speed": 1e-3, "acceleration": 1e-6}  # a curve with less range is flat
 
 
 @dataclass
 class _Followed:
-    cuts: list[tuple[_core.Region, _core.Path]]  # each with the path that it shall follow, in the order of its lines
+    cuts: list[tuple[_core.Region, _core.Path]]  # cuts with their nominal paths, in line order
     _at: int = -1
     _follower: _core.PathFollower | None = field(default=None, repr=False)
 
     def deviations_mm(self, chunk: Chunk) -> FloatArray:
-        """From path to table, (k, 3); from command to table where no path is known."""
+        """Deviation of table from path, (k, 3); from command if no path is known."""
         found = chunk.error_mm.copy()
         cut_of = cuts_of_lines([cut for cut, _ in self.cuts], chunk.line)
         borders = np.flatnonzero(np.diff(cut_of)) + 1
@@ -77,7 +77,7 @@ def scene_of(
     return Scene(
         period_s=machine.controller.interpolation_period_s,
         variants=tuple(variants),
-        thinned=f"Thinned for display, extremes kept ({'; '.join(notes)}). The figures are not thinned.",
+        thinned=f"Decimated for display, extremes kept ({'; '.join(notes)}). Figures use all samples.",
         spectra=tuple(spectra),
         modes=tuple(
             page.ModeLine(axis, mode.frequency_hz, of_mode(axis.upper(), mode.frequency_hz))
@@ -133,7 +133,7 @@ def _variant(
 
 
 class _Blocks:
-    """Ranks of the blocks that are interpolated, and how long each takes."""
+    """Ranks of the interpolated blocks, and their durations."""
 
     def __init__(self) -> None:
         self._last_line = -1
@@ -141,7 +141,7 @@ class _Blocks:
         self._rank = -1
 
     def add(self, chunk: Chunk) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.intp]]:
-        """Of each sample the rank of its block, (k,), and the rows at which blocks begin."""
+        """Rank of each sample's block, (k,), and the rows at which blocks begin."""
         line = chunk.line.astype(np.int64)
         begins = np.diff(line, prepend=self._last_line) != 0
         rank = self._rank + np.cumsum(begins)
@@ -150,7 +150,7 @@ class _Blocks:
         return rank, np.flatnonzero(begins)
 
     def durations(self) -> npt.NDArray[np.int64]:
-        """Of each block, in samples."""
+        """Duration of each block, in samples."""
         ranks, counts = np.concatenate(self._counts, axis=1)
         found = np.zeros(self._rank + 1, dtype=np.int64)
         np.add.at(found, ranks, counts)
@@ -158,7 +158,7 @@ class _Blocks:
 
 
 def _scales(program: Program) -> dict[str, float]:
-    """What half a pixel is, of the path in mm; of a curve the range below which it is flat."""
+    """Half a pixel of the path in mm, and for each curve the range below which it is flat."""
     corners = [corner for region in program.regions for corner in (region.path.polyline(),) if len(corner)]
     extent = float(np.ptp(np.concatenate(corners), axis=0).max()) if corners else 0.0
     return {"path": max(extent, _LEAST_EXTENT_MM) * _HALF_PIXEL / page.PIXELS_WIDE} | _FLAT

@@ -1,4 +1,4 @@
-"""Signatures of what the core offers, so that `inspect.signature`, `help` and editors show them."""
+"""Signatures of core functions and classes for `inspect.signature`, `help` and editors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 def with_signature(value: T) -> T:
-    """A function or class of the core, with the signature that stands in its docstring."""
+    """Set the signature of a core function or class from its docstring."""
     if isinstance(value, type):
         if not issubclass(value, BaseException) and (found := _signature(value.__init__.__doc__)):
             taken = list(found.parameters.values())[1:]  # without self
@@ -35,7 +35,7 @@ def with_signature(value: T) -> T:
 
 
 def _signature(doc: str | None) -> inspect.Signature | None:
-    """Of the first line of a docstring, ``name(first: type, second: type = 1) -> type``; None where there is none."""
+    """Parse the first docstring line, ``name(first: type, second: type = 1) -> type``; None if there is none."""
     # pybind11 writes the default of an enumeration as <WallSide.right: 0>.
     head = re.sub(r"<(\w+\.\w+): -?\d+>", r"\1", (doc or "").partition("\n")[0])
     try:
@@ -56,7 +56,7 @@ def _signature(doc: str | None) -> inspect.Signature | None:
 
 
 def _value(default: ast.expr | None) -> Any:
-    """Of a default: a literal, inf, or a member of an enumeration of the core."""
+    """Evaluate a default: a literal, inf, or a member of a core enumeration."""
     if default is None:
         return inspect.Parameter.empty
     if isinstance(default, ast.Name):
@@ -67,10 +67,10 @@ def _value(default: ast.expr | None) -> Any:
 
 
 class _Short(ast.NodeTransformer):
-    """``typing.Annotated[numpy.typing.ArrayLike, ...]`` as ``ArrayLike``: names alone, without notes."""
+    """``typing.Annotated[numpy.typing.ArrayLike, ...]`` as ``ArrayLike``: without modules and annotations."""
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
-        """The first of what is annotated; every other subscript as it is."""
+        """The type inside ``Annotated``; other subscripts unchanged."""
         noted = ast.unparse(node.value) == "typing.Annotated" and isinstance(node.slice, ast.Tuple)
         self.generic_visit(node)
         return node.slice.elts[0] if noted and isinstance(node.slice, ast.Tuple) else node
@@ -84,6 +84,6 @@ def _words(annotation: ast.expr | None) -> Any:
     if annotation is None:
         return inspect.Parameter.empty
     text = ast.unparse(_Short().visit(annotation))
-    # What the core calls a number, and what a reader does.
+    # Replace the core's names for numbers by readable ones.
     text = text.replace("SupportsFloat | SupportsIndex", "float")
     return text.replace("SupportsInt | SupportsIndex", "int")

@@ -1,6 +1,6 @@
-"""A program simulated on the machine's model as one motion in time: cuts, rapids and waits, piece by piece.
+"""Simulates a program on a model of the machine as one motion in time: cuts, rapids and waits, piece by piece.
 
-The plant is at rest at the start and runs on through the whole program. Memory does not grow with its length.
+The plant is at rest at the start and simulated through the whole program. Memory does not grow with its length.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, fanuc_model
 from shapegcode.program import Program, given_program
 
-#: Names of what `Chunk.kind` numbers.
+#: Names of the kinds in `Chunk.kind`.
 KINDS = tuple(kind.name for kind in sorted(_core.BlockKind.__members__.values(), key=lambda kind: kind.value))
-REST_S = 0.25  # for which the set-points rest after the end of a program
+REST_S = 0.25  # rest of the set-points after the end of a program
 _CHUNK_SAMPLES = 65536
 _OF_EVERY_PLANT = ("line", "kind", "command_mm", "response_mm", "velocity_mm_per_s")
 _OF_DRIVES = ("motor_mm", "motor_force_n", "friction_force_n")
@@ -33,9 +33,9 @@ class Chunk:
     sample: npt.NDArray[np.int64]  # number of each row since the start of the program, (k,)
     time_s: FloatArray  # since the start of the program, (k,)
     line: npt.NDArray[np.uint32]  # of the block that is being interpolated, (k,)
-    # what that block is, (k,): a rank in `KINDS`. Waits for in-position count to the block before them
+    # kind of that block, (k,): a rank in `KINDS`. Waits for in-position belong to the block before them
     kind: npt.NDArray[np.uint8]
-    command_mm: FloatArray  # set-points behind every filter, (k, 3)
+    command_mm: FloatArray  # set-points after all filters, (k, 3)
     response_mm: FloatArray  # the table, (k, 3)
     velocity_mm_per_s: FloatArray  # of the command over the period before, (k, 3)
     motor_mm: FloatArray | None = None  # feed drives only: the motor as travel of the table, (k, 3)
@@ -59,19 +59,19 @@ class Chunk:
         return named
 
     def rows(self, wanted: npt.NDArray[np.bool_]) -> Chunk:
-        """The rows that are wanted, (k,)."""
+        """Select rows, (k,)."""
         if wanted.all():
             return self
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return replace(self, **{name: value[wanted] for name, value in values.items() if value is not None})
 
     def every(self, step: int) -> Chunk:
-        """Of all samples of the program every `step`-th, the first among them."""
+        """Every `step`-th sample of the program, from the first."""
         return self if step == 1 else self.rows(self.sample % step == 0)
 
 
 def cuts_of_lines(cuts: Sequence[_core.Region], lines: npt.NDArray[np.integer]) -> npt.NDArray[np.int64]:
-    """Rank of the cut that each line stands in, (k,), -1 outside of them; the cuts are in the order of their lines."""
+    """Rank of the cut that contains each line, (k,), -1 outside cuts; cuts are in line order."""
     firsts = np.array([cut.first_line for cut in cuts], dtype=np.int64)
     lasts = np.array([cut.last_line for cut in cuts] or [0], dtype=np.int64)
     found = np.searchsorted(firsts, lines, side="right") - 1
@@ -88,29 +88,29 @@ def stream(
     lines: tuple[int, int] | None = None,
     chunk_samples: int = _CHUNK_SAMPLES,
 ) -> Iterator[Chunk]:
-    """Simulate a whole program and give its motion piece by piece.
+    """Simulate a whole program and yield its motion piece by piece.
 
     Regions, other cutting moves, rapids, waits for in-position, dwells, tool changes and M functions follow each other
-    as `sg.cycle_time` counts them; behind the end the set-points rest for a quarter of a second. Where coordinates jump
+    as in `sg.cycle_time`; after the end the set-points rest for a quarter of a second. Where coordinates jump
     without motion (work offset, tool length, an axis whose position was not known), command and response jump.
 
     Args:
-        program: what to play, or its file.
+        program: the program, or its file.
         machine: controller and plant.
         plant: "modal" or "feed-drive".
-        shaped: cuts are shaped blocks, see `simulate`.
-        lines: give what happens in these lines alone, first and last, of the expanded program, which is simulated from
+        shaped: the cuts are shaped blocks, see `simulate`.
+        lines: yield only these lines, first and last, of the expanded program, which is simulated from
             its start in any case.
-        chunk_samples: rows of a piece, at most.
+        chunk_samples: largest number of rows of a piece.
 
     Returns:
         Pieces in the order of time: command, response and their lines, of `chunk_samples` rows at most.
 
     Raises:
         ProgramError, OSError: the file cannot be read.
-        ArgumentError: a plant, lines or a size that do not exist, or a value that no controller can have.
+        ArgumentError: an invalid plant, line range, chunk size or controller value.
         MachineError: the machine has no feed drives.
-        NumericError: while pieces are given: the integrator of a feed drive fails.
+        NumericError: while yielding: the integrator of a feed drive fails.
     """
     machine = Machine.of(machine)
     if chunk_samples < 1:
@@ -134,7 +134,7 @@ def _chunks(
     simulated: _core.SimulationStream, period_s: float, lines: tuple[int, int] | None, chunk_samples: int
 ) -> Iterator[Chunk]:
     rate_hz = 1.0 / period_s
-    # A whole rate divides exactly: 9 / 1000 is 0.009, 9 * 0.001 is not.
+    # Division by a whole rate is exact: 9 / 1000 is 0.009, 9 * 0.001 is not.
     rate_hz = round(rate_hz) if abs(rate_hz - round(rate_hz)) < 1e-6 else rate_hz
     while len(read := simulated.read(chunk_samples)):
         sample = np.arange(read.first_sample, read.first_sample + len(read), dtype=np.int64)
@@ -146,6 +146,6 @@ def _chunks(
         inside = (chunk.line >= lines[0]) & (chunk.line <= lines[1])
         if inside.any():
             yield chunk.rows(inside)
-        # A program is expanded: its lines happen in order.
+        # Lines of an expanded program execute in order.
         if chunk.line[-1] > lines[1]:
             return

@@ -1,4 +1,4 @@
-"""A CNC program as the controller reads it, and cutter compensation in it."""
+"""Reads CNC programs like the controller, including cutter compensation."""
 
 from shapegcode.errors import located_error
 from shapegcode.io.units import MM_PER_INCH

@@ -1,7 +1,7 @@
-"""Compare two programs: the same moves, tools, offsets and functions in the same order? Counts and list of differences.
+"""Compares moves, tools, offsets and functions of two programs and their order: counts, list of differences.
 
-Both are read as the control executes them. Nothing of a conversion is looked at: the words and canonical moves of
-either program are put in order by themselves, and aligned by what they do (Myers 1986).
+Both are read as executed by the control, independently of any conversion: words and canonical moves of
+both programs are sequenced separately, and aligned by function (Myers 1986).
 """
 
 from __future__ import annotations
@@ -28,36 +28,36 @@ if TYPE_CHECKING:
     from shapegcode.results.page.model import Figure
 
 KINDS = {
-    "cuts": "cuts that one program has and the other has not, or that are not the same length",
+    "cuts": "cuts in only one of the programs, or of different length",
     "rapids": "rapids, and moves to a reference point or in machine coordinates",
     "tools": "T, M06",
     "spindle": "S, M03, M04, M05, M19",
     "coolant": "M07, M08, M09",
     "offsets": "G43, G44, G49, H, G54 to G59, G54.1, G10, G52, G92, G40, G41, G42, D",
     "cycles": "blocks of drilling cycles",
-    "calls": "M98, M198, G65, G66 and codes that call a program; their blocks are compared as they are executed",
+    "calls": "M98, M198, G65, G66 and codes that call a program; their blocks are compared as executed",
     "functions": "other M and G codes, moves of further axes, macro statements left to the control",
     "dwells": "G04",
     "stops": "M00, M01, M02, M30, M99",
-    "modal": "plane, G90 or G91, G94, G61 and the like where a cut begins; exact stops in it",
+    "modal": "plane, G90 or G91, G94, G61 and the like at the start of a cut; exact stops in it",
     "feeds": "feeds of cuts and drilling cycles",
     "blocks": "number of blocks of a cut; the lines of emission.* around the cuts of a shaped program",
-    "order": "the same, but elsewhere in the program",
+    "order": "the same, but at another position in the program",
     "shaped-rapids": "rapids as cutting moves, marked (SHAPED RAPID)",
-    "compensation": "G41 and G42 worked out: the control's offset no longer acts",
+    "compensation": "G41 and G42 expanded: the control's offset has no effect",
     "units": "G20 or G21",
     "end": "one program ends early",
 }
-"""What may be allowed beside ``path=LENGTH``, and what it covers."""
+"""Words that may be allowed in addition to ``path=LENGTH``, with their meaning."""
 
 
 @dataclass(frozen=True)
 class Allowed:
-    """Differences that count as none.
+    """Differences to ignore.
 
     Attributes:
-        kinds: of `KINDS`.
-        path_um: distance of the paths that is allowed, µm.
+        kinds: names in `KINDS`.
+        path_um: allowed distance of the paths, µm.
     """
 
     kinds: frozenset[str] = frozenset()
@@ -68,13 +68,13 @@ class Allowed:
         """Parse allowed differences such as ``feeds,blocks,path=20um,calls``.
 
         Args:
-            words: in one text with commas, or one by one.
+            words: one text with commas, or single words.
 
         Returns:
-            What they allow.
+            The allowed differences.
 
         Raises:
-            ArgumentError: a word is none of `KINDS` and no ``path=LENGTH`` above 0 with its unit.
+            ArgumentError: a word that is not in `KINDS` nor ``path=LENGTH`` above 0 with its unit.
         """
         kinds, path_um = set(), 0.0
         for word in (words.split(",") if words else ()) if isinstance(words, str) else words:
@@ -85,7 +85,7 @@ class Allowed:
                 kinds.add(name)
             else:
                 raise ArgumentError(
-                    f"allow {word.strip()!r}: no difference of this name; there are {', '.join(KINDS)} and path=20um"
+                    f"allow {word.strip()!r}: unknown kind of difference; known are {', '.join(KINDS)} and path=20um"
                 )
         return cls(frozenset(kinds), path_um)
 
@@ -93,17 +93,17 @@ class Allowed:
         """Whether a difference is allowed.
 
         Args:
-            kind: of it.
-            distance_um: of the paths, where it is one of these.
+            kind: kind of difference.
+            distance_um: distance of the paths, for such a difference.
 
         Returns:
-            Whether it is.
+            True if it is allowed.
         """
         return distance_um <= self.path_um if kind == "path" else kind in self.kinds
 
     @property
     def words(self) -> tuple[str, ...]:
-        """As `of` takes them."""
+        """The words in the form for `of`."""
         path = (f"path={self.path_um:g}um",) if self.path_um > 0.0 else ()
         return (*(kind for kind in KINDS if kind in self.kinds), *path)
 
@@ -122,18 +122,18 @@ def _length_um(word: str, length: str) -> float:
 _NOUNS = {"tools": "tool calls", "functions": "other functions", "cycles": "drilling blocks", "modal": "modal states"}
 _ALWAYS = ("rapids", "tools", "offsets")
 _SHOWN = 20
-_JOINT_TOLERANCES = 3.0  # a command may leave the path further than the response to it does
+_JOINT_TOLERANCES = 3.0  # a command may deviate from the path more than its response
 
 
 @dataclass(frozen=True)
 class KindCount:
-    """How many there are of one kind.
+    """Counts of one kind.
 
     Attributes:
-        kind: of them, as `shapegcode.program.comparison.KINDS` names it.
-        original: in the original.
-        emitted: in the other program.
-        unchanged: the same in both, at the same place in their order.
+        kind: name in `shapegcode.program.comparison.KINDS`.
+        original: number in the original.
+        emitted: number in the other program.
+        unchanged: number equal in both, in the same order.
     """
 
     kind: str
@@ -143,21 +143,21 @@ class KindCount:
 
     @property
     def differs(self) -> bool:
-        """Whether one has some that the other has not."""
+        """Whether one program has some that the other lacks."""
         return not self.original == self.emitted == self.unchanged
 
 
 @dataclass(frozen=True)
 class ProgramDifference:
-    """One thing in which two programs differ.
+    """One difference of two programs.
 
     Attributes:
-        kind: of `shapegcode.program.comparison.KINDS`, "path", or "emission" for a line of emission.* around a cut.
-        original_line: from 1; None: the original has nothing there.
-        emitted_line: likewise of the other program.
-        original: what the original has; empty: nothing.
-        emitted: what the other program has.
-        allowed: whether it was allowed.
+        kind: one of `shapegcode.program.comparison.KINDS`, "path", or "emission" for a line of emission.* at a cut.
+        original_line: line in the original, from 1; None: nothing there.
+        emitted_line: line in the other program, likewise.
+        original: content of the original; empty: nothing.
+        emitted: content of the other program.
+        allowed: the difference is allowed.
         distance_um: largest distance of the two paths of a cut, µm; 0 for other kinds.
     """
 
@@ -171,7 +171,7 @@ class ProgramDifference:
 
     @property
     def place(self) -> str:
-        """The line of the original, else that of the other program."""
+        """Line of the original, else that of the other program."""
         if self.original_line is not None:
             return f"line {self.original_line}"
         return f"line {self.emitted_line} of the other program"
@@ -179,16 +179,16 @@ class ProgramDifference:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Comparison(Result):
-    """What differs between two programs.
+    """Differences between two programs.
 
     Attributes:
-        original: name of the one program.
-        emitted: name of the other.
+        original: name of the first program.
+        emitted: name of the second program.
         machine: name of the machine whose controller read them.
-        counts: of each kind of which one of them has some.
-        path_um: largest distance of the paths of a cut that both have, seen from either, µm.
-        differences: all, in the order of the original.
-        allow: what was allowed, as `shapegcode.program.comparison.Allowed.of` takes it.
+        counts: counts of each kind that occurs in one of them.
+        path_um: largest distance of the paths of a common cut, in both directions, µm.
+        differences: all differences, in the order of the original.
+        allow: allowed differences, in the form for `shapegcode.program.comparison.Allowed.of`.
         warnings: none.
     """
 
@@ -204,28 +204,28 @@ class Comparison(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether nothing differs but what was allowed."""
+        """Whether there are no differences except allowed ones."""
         return not any(True for _ in self.refused)
 
     @property
     def refused(self) -> Iterator[ProgramDifference]:
-        """The differences that were not allowed."""
+        """The differences that are not allowed."""
         return (each for each in self.differences if not each.allowed)
 
     def count(self, kind: str) -> KindCount:
-        """How many there are of a kind.
+        """Find the counts of a kind.
 
         Args:
             kind: its name.
 
         Returns:
-            The counts; zeros where neither program has one.
+            The counts; zeros if neither program has one.
         """
         return next((each for each in self.counts if each.kind == kind), KindCount(kind, 0, 0, 0))
 
     @property
     def answer(self) -> str:
-        """What is unchanged, and how near the paths are; the first difference that was not allowed."""
+        """Unchanged items, distance of the paths, and the first difference that is not allowed."""
         shown_counts = [self.count(kind) for kind in _ALWAYS]
         shown_counts += [each for each in self.counts if each.differs and each.kind not in (*_ALWAYS, "emission")]
         counts = ", ".join(f"{each.unchanged} of {each.original} {_noun(each.kind)}" for each in shown_counts)
@@ -239,21 +239,21 @@ class Comparison(Result):
 
     @property
     def next_step(self) -> str:
-        """The one thing to do next, in one sentence."""
+        """What to do next, in one sentence."""
         first = next(self.refused, None)
         if first is None:
-            return f"nothing: the programs do the same{', but for what was allowed' if self.differences else ''}."
+            return f"nothing: the programs do the same{', except for allowed differences' if self.differences else ''}."
         if first.kind == "emission" and first.original_line is not None:
-            lacks = "the other program lacks lines that a shaped cut needs for its verdict to hold"
-            return f"look at {first.place}: {lacks}."
+            lacks = "the other program lacks lines that a shaped cut needs for a valid verdict"
+            return f"check {first.place}: {lacks}."
         words = [*self.allow, first.kind.replace("emission", "blocks")]
         if first.kind == "path":
             words = [word for word in self.allow if not word.startswith("path=")]
             words.append(f"path={math.ceil(max(each.distance_um for each in self.refused))}um")
-        return f"look at {first.place}; if that is meant, allow it: --allow {','.join(words)}."
+        return f"check {first.place}; if intended, allow it: --allow {','.join(words)}."
 
     def key_figures(self) -> tuple[Figure, ...]:
-        """The distance of the paths, and how many differences there are."""
+        """Distance of the paths, and number of differences."""
         from shapegcode.results.page.model import Figure
 
         return (
@@ -262,7 +262,7 @@ class Comparison(Result):
         )
 
     def tables(self) -> list[Table]:
-        """Number of differences of each kind, then the differences, with those that are not allowed first."""
+        """Number of differences of each kind, then the differences, those not allowed first."""
         what = Column("what", value=lambda row: _noun(row.kind), left=True)
         counts = Table(
             "", (what, Column("original"), Column("other", value="emitted"), Column("unchanged")), self.counts
@@ -298,15 +298,15 @@ def compare(
     *,
     allow: Allowed | str | Iterable[str] = (),
 ) -> Comparison:
-    """Hold a program against another one: what has one of them that the other has not?
+    """Compare two programs, and list what differs.
 
-    Calls, macros and coordinate modes are compared as the plain blocks that they come to. The paths of a cut are
-    followed along each other, so that it may have other blocks.
+    Calls, macros and coordinate modes are compared as expanded blocks. The paths of a cut are
+    compared along each other, so that blocks may differ.
 
     Args:
-        original: the one program, or its file; a file that is cut off is read as far as it goes.
-        emitted: the other one, for example what `convert` made of it.
-        machine: whose controller reads them; None: that which read a `Program` of the two, else the built-in
+        original: the first program, or its file; a truncated file is read up to its end.
+        emitted: the second one, for example the output of `convert`.
+        machine: whose controller reads them; None: that of a given `Program`, else the built-in
             ``vx500``.
         allow: differences that are allowed, for example ``"feeds,blocks,path=20um"``.
 
@@ -314,8 +314,8 @@ def compare(
         Counts, distance of the paths, and every difference with its lines.
 
     Raises:
-        ArgumentError: `allow` has a word that is none; a program was read with other settings than the machine has.
-        ProgramError: a file is no program that can be read.
+        ArgumentError: an unknown word in `allow`; a program was read with other settings than the machine's.
+        ProgramError: a program cannot be read.
         OSError: a file cannot be read.
     """
     if machine is None:
@@ -323,12 +323,12 @@ def compare(
     machine = Machine.of(machine)
     allowed = allow if isinstance(allow, Allowed) else Allowed.of(allow)
     (first, first_is_cut), (second, second_is_cut) = _read(original, machine), _read(emitted, machine)
-    # Within which cuts of other lengths are the same: a conversion allows any, and judges it later.
+    # Tolerance for cuts of different lengths: a conversion allows any, and judges it later.
     joint_um = allowed.path_um if allowed.path_um < math.inf else _JOINT_TOLERANCES * machine.tolerance.contour_um
     emission = machine.emission
     lines = [line for group in emission.around_cuts.values() for line in group]
     lines += [*emission.prefill_lines, *guard_lines(first.core.expanded_radii_mm, machine)]
-    written = ["".join(re.sub(r"\([^)]*\)", "", line).split()) for line in lines]  # as the core compares them
+    written = ["".join(re.sub(r"\([^)]*\)", "", line).split()) for line in lines]  # as compared by the core
     core = _core.compare_programs(first.core, second.core, reader_options(machine), written, joint_um * 1e-3)
     is_shaped = second.stamp is not None
     differences = [
@@ -370,7 +370,7 @@ def _name(kind: _core.ComparedKind) -> str:
 
 
 def _read(program: Program | str | Path, machine: Machine) -> tuple[Program, bool]:
-    """The program, and whether it is cut off: without its end, or within its last line."""
+    """Read a program; returns also whether it is truncated: without end, or within its last line."""
     if isinstance(program, Program):
         program.require_machine(machine)
         return program, False
@@ -395,7 +395,7 @@ def _compensation(first: Program, second: Program, allowed: Allowed) -> Iterator
         if radii[0].get(number) == radii[1].get(number):
             continue
         lines: list[int | None] = [None, None]
-        texts = ["worked out", "worked out"]
+        texts = ["expanded", "expanded"]
         for at, program in enumerate((first, second)):
             if number in radii[at]:
                 found = _COMPENSATED.search(program.text)

@@ -1,4 +1,4 @@
-"""Cutter compensation in a conversion: refused, kept, or expanded behind a guard."""
+"""Cutter compensation in a conversion: refused, kept, or expanded with a check of the offset."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from shapegcode.program import MM_PER_INCH, Program, located_error
 from shapegcode.program.computer import require_memory
 
 RADIUS_NOT_KNOWN = "the radius of offset D"
-"""Start of the reader's warning about a G41 or G42 whose radius is not given."""
+"""Start of the reader's warning about a G41 or G42 without a given radius."""
 
 _ZERO_RADIUS = re.compile(r"offset D(\d+) has a radius of 0\b")
 _KEPT = "cutter compensation is on and not expanded"
-_MEMORY_PER_BLOCK = 100  # bytes of memory for each block that a conversion writes (docs/evidence/benchmarks.md)
-_SLACK_MM = 0.0005  # a radius that differs by more is another one
+_MEMORY_PER_BLOCK = 100  # bytes of memory per emitted block (docs/evidence/benchmarks.md)
+_SLACK_MM = 0.0005  # largest difference of equal radii
 
 
 def read_for_conversion(path: str | Path, machine: Machine, *, program_number: int | str | None = None) -> Program:
-    """Read a program file or text as `convert` wants it: compensation expanded only if `input.compensation` says so."""
+    """Read a program file or text for `convert`: compensation is expanded only with `input.compensation = "expand"`."""
     expand = machine.input.compensation == "expand"
     program = Program.read(path, machine, program_number=program_number, expand_compensation=expand)
     require_decision(program, machine)
@@ -39,7 +39,7 @@ def read_for_conversion(path: str | Path, machine: Machine, *, program_number: i
 
 
 def program_for_conversion(program: Program | str | Path, machine: Machine) -> Program:
-    """A program as it is, or read from its file as `convert` wants it."""
+    """A given program, or one read from its file for `convert`."""
     if not isinstance(program, Program):
         return read_for_conversion(program, machine)
     program.require_machine(machine)
@@ -48,7 +48,7 @@ def program_for_conversion(program: Program | str | Path, machine: Machine) -> P
 
 
 def require_decision(program: Program, machine: Machine) -> None:
-    """Refuse a program with G41 or G42 unless the machine file says what becomes of it."""
+    """Refuse a program with G41 or G42 unless the machine file states how to handle it."""
     core, policy = program.core, machine.input.compensation
     if policy == "expand":
         for line, _, _, message, file in core.warnings:
@@ -78,13 +78,13 @@ def refuse_zero_radius(program: Program) -> None:
             what = (
                 f"give it: --set input.tool_radius_mm.{number}=RADIUS_IN_MM, or G10 L12 P{number} R... in the program"
             )
-            what = "write D with the number of the offset behind it" if number == "0" else what
-            sentence = f"{message.partition(':')[0]} mm: expanded, the tool's centre would run on the contour\n{what}"
+            what = "write D with the number of the offset after it" if number == "0" else what
+            sentence = f"{message.partition(':')[0]} mm: expanded, the tool centre would move on the contour\n{what}"
             raise located_error(file or program.source, line, 1, sentence)
 
 
 def _undecided(program: Program, line: int, file: str, sentence: str, machine: Machine) -> ProgramError:
-    """What is wrong, and in a second line the command that goes on."""
+    """Error with the fault, and in a second line the command to continue."""
     text = program.text.split(b"\n", line)[line - 1] if not file or file == program.source else b""
     found = re.search(rb"D\s*(\d+)", text)
     number = str(int(found[1])) if found else "1"
@@ -96,14 +96,14 @@ def _undecided(program: Program, line: int, file: str, sentence: str, machine: M
 
 
 def header_lines(radii_mm: Mapping[int, float]) -> list[str]:
-    """Comments on the radii that were expanded."""
+    """Comments on the expanded radii."""
     return [f"D{number} RADIUS {radius:g} MM EXPANDED - OFFSET DOES NOT ACT" for number, radius in radii_mm.items()]
 
 
 def guard_lines(radii_mm: Mapping[int, float], machine: Machine) -> list[str]:
-    """Program lines that stop where the control's offset is not the one that was expanded.
+    """Program lines that stop the control if its offset differs from the expanded one.
 
-    Offsets that the program sets itself (G10) need none. A drip-fed program cannot hold IF: it stops with M00, and the
+    Offsets set by the program (G10) need none. A drip-fed program cannot contain IF: it stops with M00, and the
     operator compares.
     """
     lines = []
@@ -119,7 +119,7 @@ def guard_lines(radii_mm: Mapping[int, float], machine: Machine) -> list[str]:
             continue
         geometry, wear = {"A": (10000, 0), "B": (11000, 10000), "C": (13000, 12000)}[machine.controller.offset_memory]
         value = f"[#{geometry + number}+#{wear + number}]" if wear else f"#{geometry + number}"
-        # The variable counts mm or inch as the control is set when the guard runs: either will do.
+        # The variable is in mm or inch, as the control is set when the check runs: accept either.
         checks = [
             f"[ABS[{value}-{size:.6f}]GT{slack:.6f}]"
             for size, slack in ((radius, _SLACK_MM), (radius / MM_PER_INCH, _SLACK_MM / MM_PER_INCH))
@@ -132,7 +132,7 @@ _SAME_PLACE_MM = 0.005
 
 
 def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.Region, _core.Region]]:
-    """Regions of a program beside those of the nominal one, found by where they start and end."""
+    """Yield pairs of regions of a program and the nominal one, matched by start and end."""
     if program is nominal:
         yield from ((region, region) for region in program.regions)
         return
@@ -140,8 +140,8 @@ def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.R
         sentence = (warning for warning in nominal.warnings if RADIUS_NOT_KNOWN in warning)
         why = next(sentence, f"{nominal.source}: cutter compensation is on and not expanded").partition(" (")[0]
         raise _core.ArgumentError(
-            f"{why}: the path of the original is not known, and a shaped program cannot be measured against it: set "
-            "input.tool_radius_mm to the radius that it was shaped with, in the machine file or with --set"
+            f"{why}: the path of the original is unknown, so a shaped program cannot be measured against it: set "
+            "input.tool_radius_mm to the radius used for shaping, in the machine file or with --set"
         )
     candidates = iter(program.regions)
     for region in nominal.regions:
@@ -152,7 +152,7 @@ def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.R
         else:
             raise _core.ArgumentError(
                 f"{program.source}: no cut from {_place(region.path.start_mm)} to {_place(region.path.end_mm)} as "
-                f"{nominal.source} has in {nominal.lines(region)}: it was not made from that program; leave out "
+                f"{nominal.source} has in {nominal.lines(region)}: it was not made from that program; omit "
                 "--against"
             )
 

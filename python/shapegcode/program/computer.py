@@ -1,4 +1,4 @@
-"""What this computer offers a run: processors, and memory, which is asked for before it is needed."""
+"""Available processors and memory; memory is checked before it is needed."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from pathlib import Path
 from shapegcode._core import ProgramError
 
 _CGROUP = Path("/sys/fs/cgroup")
-_PER_LINE = 130  # bytes for each line that is read: blocks, path and plan (docs/evidence/benchmarks.md)
+_PER_LINE = 130  # bytes per line read: blocks, path and plan (docs/evidence/benchmarks.md)
 _SMALL_BYTES = 2**20
 MEMORY_NEEDED = "bytes of memory are needed"
-"""Start of the message when there is not enough memory; a batch with a memory limit recognizes it."""
+"""Start of the message when there is not enough memory; recognized by a batch with a memory limit."""
 
 
 def cores() -> int:
-    """Processors that this process may use, by its affinity; SHAPEGCODE_THREADS says another number."""
+    """Number of processors for this process, by its affinity; SHAPEGCODE_THREADS overrides it."""
     stated = os.environ.get("SHAPEGCODE_THREADS", "")
     if stated.isdecimal() and int(stated) > 0:
         return int(stated)
@@ -24,31 +24,31 @@ def cores() -> int:
 
 
 def available_bytes() -> int | None:
-    """Memory that this process may still take: of the machine, of its control group, and of its own limits."""
+    """Memory still available to this process, bytes: of the machine, its control group, and its own limits."""
     found = [_kilobytes("/proc/meminfo", "MemAvailable"), *_of_groups(), *_of_own_limits()]
     known = [value for value in found if value is not None]
     return max(0, min(known)) if known else None
 
 
 def require_memory(source: str, needed: int, what: str) -> None:
-    """Refuse what the memory would not hold."""
+    """Refuse a task that needs more memory than available."""
     available = available_bytes()
     if available is not None and needed > available:
         raise ProgramError(
-            f"{source}:1:1: {what}: some {needed} {MEMORY_NEEDED} and {available} are available; split the "
-            "program, or take a machine with more memory"
+            f"{source}:1:1: {what}: about {needed} {MEMORY_NEEDED} and {available} are available; split the "
+            "program, or use a computer with more memory"
         )
 
 
 def require_memory_for_lines(text: bytes, source: str, per_line: int = _PER_LINE) -> None:
-    """Refuse a program text whose lines the memory would not hold; one of less than a megabyte is not counted."""
+    """Refuse a program whose lines need more memory than available; below a megabyte it is not checked."""
     if len(text) > _SMALL_BYTES:
         lines = text.count(b"\n")
         require_memory(source, lines * per_line, f"{lines} lines are to be read")
 
 
 def _kilobytes(file: str, name: str) -> int | None:
-    """A line "Name:  123 kB" of a file of /proc, in bytes."""
+    """Read a line "Name:  123 kB" of a /proc file, in bytes."""
     with contextlib.suppress(OSError):
         for line in Path(file).read_text().splitlines():
             if line.startswith(f"{name}:"):
@@ -57,7 +57,7 @@ def _kilobytes(file: str, name: str) -> int | None:
 
 
 def _of_groups() -> list[int | None]:
-    """What the control group of this process (version 2) leaves."""
+    """Memory left in the control group (version 2) of this process, bytes."""
     with contextlib.suppress(OSError, ValueError):
         own = Path("/proc/self/cgroup").read_text().partition("::")[2].strip().lstrip("/")
         for folder in {_CGROUP / own, _CGROUP}:
@@ -68,7 +68,7 @@ def _of_groups() -> list[int | None]:
 
 
 def _of_own_limits() -> list[int | None]:
-    """What `ulimit` leaves of address space and data."""
+    """Address space and data left by `ulimit`, bytes."""
     try:
         import resource
     except ModuleNotFoundError:  # not on this system

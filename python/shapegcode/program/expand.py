@@ -22,14 +22,14 @@ class Expansion(Result):
     Attributes:
         program: name of the program.
         machine: name of the machine whose controller read it.
-        text: the plain program; the text to the letter where there was nothing to expand.
+        text: the expanded program; the unchanged text if there was nothing to expand.
         expanded: whether there was something to expand.
-        lines: of the plain program.
-        size_bytes: of the plain program.
-        expanded_radii_mm: radius by D number, "D1", where cutter compensation is in the path now.
-        origins: per line of the plain program the line of the source from which it comes, and its file where that is
-            not the program's; empty where there was nothing to expand.
-        warnings: what the reader noticed.
+        lines: number of lines of the expanded program.
+        size_bytes: size of the expanded program.
+        expanded_radii_mm: radius by D number, "D1", if cutter compensation was expanded.
+        origins: for each line of the expanded program its source line, and the file if it is
+            not the program's; empty if there was nothing to expand.
+        warnings: findings of the reader.
     """
 
     program: str
@@ -44,7 +44,7 @@ class Expansion(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether it is done: always, as what cannot be read is refused."""
+        """Always true: unreadable programs are refused."""
         return True
 
     @property
@@ -55,27 +55,27 @@ class Expansion(Result):
 
     @property
     def next_step(self) -> str:
-        """The one thing to do next, in one sentence."""
+        """What to do next, in one sentence."""
         return self.next_step_after("OUT")
 
     def next_step_after(self, file: str) -> str:
-        """The same with the name of the program that was written.
+        """Next step with the name of the written program.
 
         Args:
-            file: name of it.
+            file: name of the file.
 
         Returns:
             One sentence.
         """
         if self.expanded_radii_mm:
-            return "use it with these radii alone: the offsets in the control do not act."
-        return f"see how long it takes: shapegcode time {file} -m MACHINE."
+            return "use it only with these radii: the offsets in the control have no effect."
+        return f"compute its cycle time: shapegcode time {file} -m MACHINE."
 
     @property
     def notes(self) -> list[str]:
-        """The radii that are in the path now, each in a line."""
+        """The expanded radii, one per line."""
         return [
-            f"{name} = {radius:g} mm is in the path now: the offset in the control does not act"
+            f"{name} = {radius:g} mm was expanded: the offset in the control has no effect"
             for name, radius in self.expanded_radii_mm.items()
         ]
 
@@ -87,22 +87,22 @@ def expand(
     compensation: Literal["expand", "keep"] = "expand",
     program_number: int | str | None = None,
 ) -> Expansion:
-    """Work out subprogram calls, custom macros, coordinate modes, corner words and cutter compensation.
+    """Expand subprogram calls, custom macros, coordinate modes, corner words and cutter compensation.
 
     Args:
-        program: what to expand, or its file; of a `Program` counts how it was read.
+        program: the program, or its file; a `Program` keeps its reading settings.
         machine: whose controller reads it.
-        compensation: "expand": G41/G42 become plain moves of the tool's centre; "keep": they stay as they stand.
-        program_number: which program of a file that holds several: its O number, or an address as in
+        compensation: "expand": G41/G42 become plain moves of the tool's centre; "keep": they stay unchanged.
+        program_number: program of a multi-program file: its O number, or an address as in
             `shapegcode.program.reading`; None: the first.
 
     Returns:
-        The plain program, and where each of its lines comes from.
+        The expanded program, and the source of each of its lines.
 
     Raises:
-        ProgramError: the text is no program that can be read, or its compensation has a radius of 0; the message
+        ProgramError: the program cannot be read, or its compensation has a radius of 0; the message
             starts with ``file:line:column``.
-        ArgumentError: it was read with other settings than the machine has.
+        ArgumentError: it was read with other settings than the machine's.
         OSError: the file cannot be read.
     """
     machine = Machine.of(machine)
@@ -115,9 +115,9 @@ def expand(
         refuse_zero_radius(program)
     core = program.core
     if program.stamp is not None and core.expanded:
-        # The control keeps the switch of the override in a variable: worked out here, it would be overwritten.
+        # The control stores the override switch in a variable, which expansion would overwrite.
         raise _core.ProgramError(
-            f"{program.source}:1:1: written by shapegcode (see its header); it is expanded already, except for the "
+            f"{program.source}:1:1: written by shapegcode (see its header); it is already expanded, except for the "
             "lines that lock the feed override, which only the control can evaluate"
         )
     return Expansion(

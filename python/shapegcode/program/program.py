@@ -1,4 +1,4 @@
-"""A CNC program as the controller reads it: text to the letter, cutting regions, findings."""
+"""A CNC program as read by the controller: exact text, cutting regions, findings."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ _ARC_OFF_RADIUS = "off its radius"
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """A program that was read.
+    """A program read.
 
     Attributes:
-        core: what the core made of it: text, regions (runs of cutting moves between stops), other moves.
+        core: its parsed form in the core: text, regions (sequences of cutting moves between stops), other moves.
         source: name for messages.
-        reading: the machine whose controller read it, and how.
-        unexpanded: the text that was read, where the core's is the plain program that it comes to.
-        folder: where programs that it calls are looked for.
-        number: which program of the text it is, as it was asked for; None: the first.
-        foreign: the plain program that was read, where the text is in another control's words.
+        reading: reading settings, including the machine.
+        unexpanded: the text read, if the core's is the expanded program.
+        folder: folder to search called programs.
+        number: program of the text, as requested; None: the first.
+        foreign: expanded FANUC form, if the text is for another control.
     """
 
     core: _core.ProgramText
@@ -62,23 +62,23 @@ class Program:
         expand_compensation: bool = True,
         collect_alarms: bool = False,
     ) -> Program:
-        """Read a program file as the controller of `machine` would (None: as that of the built-in ``vx500``).
+        """Read a program file like the controller of `machine` (None: of the built-in ``vx500``).
 
-        Programs that it calls are looked for in the file, beside it, and in `input.program_folders`.
+        Called programs are searched in the file, in its folder, and in `input.program_folders`.
 
         Args:
             path: the file; a string of several lines is the program's text itself.
-            machine: whose controller reads it, its file or its built-in name.
-            program_number: which program of a file that holds several: its O number, or an address as in
+            machine: machine whose controller reads it, its file or built-in name.
+            program_number: program of a multi-program file: its O number, or an address as in
                 `shapegcode.program.reading`; None: the first.
-            expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
-            collect_alarms: go on behind an alarm and keep all in `core.alarms`.
+            expand_compensation: G41/G42 become plain moves; False: they are kept unchanged.
+            collect_alarms: continue after an alarm and collect all in `core.alarms`.
 
         Returns:
-            The program: its text to the letter, its cutting regions, what the reader noticed.
+            The program: exact text, cutting regions, findings of the reader.
 
         Raises:
-            ProgramError: the text is no program that can be read; the message starts with ``file:line:column``.
+            ProgramError: the program cannot be read; the message starts with ``file:line:column``.
             OSError: the file cannot be read.
         """
         machine = Machine.of(machine or "vx500")
@@ -109,26 +109,26 @@ class Program:
     ) -> Program:
         """Read a program text; `source` names it in messages.
 
-        Programs that it calls are looked for in the text, in `folder` and in `input.program_folders`.
+        Called programs are searched in the text, in `folder` and in `input.program_folders`.
 
         Args:
             text: the program.
             machine: whose controller reads it; None: the built-in ``vx500``.
             source: names the text in messages.
-            emitted: the text was written by shapegcode: its arcs are FANUC's, whatever the original's were.
-            probe_lines: ascending line numbers behind which the modal state is kept.
-            program_number: which program of a text that holds several: its O number, or an address as in
+            emitted: the text was written by shapegcode: its arcs are FANUC's in any case.
+            probe_lines: ascending line numbers after which the modal state is stored.
+            program_number: program of a multi-program text: its O number, or an address as in
                 `shapegcode.program.reading`; None: the first.
-            expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
-            collect_alarms: go on behind an alarm and keep all in `core.alarms`.
-            folder: where programs that it calls are looked for; None: nowhere but in the text and the machine's
+            expand_compensation: G41/G42 become plain moves; False: they are kept unchanged.
+            collect_alarms: continue after an alarm and collect all in `core.alarms`.
+            folder: folder to search called programs; None: only the text and the machine's
                 folders.
 
         Returns:
-            The program, as `read` gives it.
+            The program, as from `read`.
 
         Raises:
-            ProgramError: the text is no program that can be read; the message starts with ``source:line:column``.
+            ProgramError: the program cannot be read; the message starts with ``source:line:column``.
         """
         machine = Machine.of(machine or "vx500")
         data = text.encode() if isinstance(text, str) else text
@@ -140,7 +140,7 @@ class Program:
             raise located_error(source, line, 1, message)
         reading = Reading(
             machine,
-            # What shapegcode wrote has FANUC's arcs, whatever those of its original were.
+            # An emitted program has FANUC's arcs, whatever its original's.
             emitted=emitted or STAMP_BEGIN in data,
             probe_lines=tuple(probe_lines),
             expand_compensation=expand_compensation,
@@ -152,19 +152,19 @@ class Program:
     def from_parts(
         cls, parts: list[bytes], machine: Machine, *, source: str, probe_lines: Sequence[int] = ()
     ) -> Program:
-        """Read a text that shapegcode has just written and that is still in parts.
+        """Read an emitted program from the parts of its text.
 
         Args:
-            parts: of the text; the list is empty behind it, so that the text stands in memory once.
+            parts: parts of the text; the list is emptied, so that the text is in memory only once.
             machine: whose controller reads it.
             source: names the text in messages.
-            probe_lines: as `from_text` takes them.
+            probe_lines: as in `from_text`.
 
         Returns:
             The program.
 
         Raises:
-            ProgramError: as `from_text` does.
+            ProgramError: as in `from_text`.
         """
         reading = Reading(machine, emitted=True, keeps_calls=True, probe_lines=tuple(probe_lines))
         try:
@@ -174,7 +174,7 @@ class Program:
         return cls(core, source, reading, core.unexpanded if core.expanded else None)
 
     def __reduce__(self) -> tuple[Callable[..., Program], tuple[object, ...]]:
-        """Read again from its text, and from those of the programs that it called."""
+        """Pickle as texts of the program and called programs, which are read again."""
         return _read, (self.text, self.source, self.reading, self.folder, self.number, self.foreign)
 
     def __eq__(self, other: object) -> bool:
@@ -185,17 +185,17 @@ class Program:
         return mine == others and self.view() == other.view()
 
     def __hash__(self) -> int:
-        """By name and size: equal programs have the same ones."""
+        """Hash of name and size, which are equal for equal programs."""
         return hash((self.source, self.size))
 
     def require_machine(self, machine: Machine) -> None:
-        """Refuse a machine that would read this program otherwise than the one that read it.
+        """Refuse a machine that would read this program differently.
 
         Args:
-            machine: on which it is to be simulated, converted, checked or timed.
+            machine: machine for its simulation, conversion, check or timing.
 
         Raises:
-            ArgumentError: with the settings that differ, both values of each, and what to do.
+            ArgumentError: the machine differs; the message gives the settings with both values, and the remedy.
         """
         if differences := self.reading.differences(machine):
             raise _core.ArgumentError(
@@ -204,37 +204,37 @@ class Program:
             )
 
     def refuse_shaped(self, remedy: str) -> None:
-        """Refuse a program that shapegcode has shaped.
+        """Refuse a program that is already shaped.
 
         Args:
             remedy: what to do instead.
 
         Raises:
-            ProgramError: its header says so.
+            ProgramError: its header marks it as shaped.
         """
         if self.stamp is not None:
-            raise ProgramError(f"{self.source}:1:1: shaped by shapegcode already (see its header): {remedy}")
+            raise ProgramError(f"{self.source}:1:1: already shaped by shapegcode (see its header): {remedy}")
 
     @property
     def text(self) -> bytes:
-        """The text that was read, to the letter."""
+        """The exact text read."""
         return self.core.text if self.unexpanded is None else self.unexpanded
 
     @property
     def size(self) -> int:
-        """Bytes of that text."""
+        """Size of the text read, bytes."""
         return self.core.size if self.unexpanded is None else len(self.unexpanded)
 
     def view(self) -> memoryview:
-        """That text without a copy of it."""
+        """View of the text read, without a copy."""
         return self.core.view() if self.unexpanded is None else memoryview(self.unexpanded)
 
     def text_slice(self, begin: int, end: int) -> bytes:
-        """Bytes of that text between two offsets.
+        """Bytes of the text read between two offsets.
 
         Args:
-            begin: of the first byte.
-            end: behind the last one.
+            begin: offset of the first byte.
+            end: offset after the last byte.
 
         Returns:
             The bytes.
@@ -242,11 +242,11 @@ class Program:
         return self.core.slice(begin, end) if self.unexpanded is None else self.unexpanded[begin:end]
 
     def with_verdict(self, *, good: bool, better: bool = False) -> Program:
-        """The emitted program with verdict and mark in its header; a long text is not copied, but changed in place.
+        """Write verdict and mark into the header; a long text is changed in place, not copied.
 
         Args:
-            good: False: nobody should run it.
-            better: it misses a tolerance, as the original does, and is better.
+            good: False: the program should not be run.
+            better: it misses a tolerance, like the original, but is better.
 
         Returns:
             The program.
@@ -254,16 +254,16 @@ class Program:
         if self.unexpanded is not None:
             return replace(self, unexpanded=text_with_verdict(self.unexpanded, good=good, better=better))
         write_verdict(self.core, self.mark, good=good, better=better)
-        return replace(self)  # nothing of it was worked out from the text as it was
+        return replace(self)  # without cached values of the former text
 
     @cached_property
     def mark(self) -> str:
-        """The mark of the plain program's text, which its header holds if the converter wrote it."""
+        """Check value of the expanded program, which an emitted program has in its header."""
         return mark_of(self.core)
 
     @property
     def own_text(self) -> bytes:
-        """The lines of this program alone, of a text that holds several; else the whole text."""
+        """Lines of this program in a multi-program text; else the whole text."""
         text = self.text
         if self.foreign is not None:
             return text
@@ -276,7 +276,7 @@ class Program:
 
     @cached_property
     def kept_calls(self) -> tuple[ProgramPlace, ...]:
-        """Other programs of its file that its plain program still calls; none where it stands in the whole file."""
+        """Programs of its file that the expanded program still calls; empty if the whole file was read."""
         kept = {int(match[1]) for warning in self.core.warnings if (match := _KEPT_CALL.match(warning[3]))}
         if self.unexpanded is None or self.foreign is not None or not kept:
             return ()
@@ -285,29 +285,29 @@ class Program:
 
     @cached_property
     def regions(self) -> list[_core.Region]:
-        """Runs of cutting moves between two stops, in order."""
-        # Made anew by the core at every call: kept, as a program may have a hundred thousand.
+        """Sequences of cutting moves between two stops, in order."""
+        # Cached, as the core builds them at every call and a program may have a hundred thousand.
         return self.core.regions
 
     @cached_property
     def stamp(self) -> Stamp | None:
-        """What its header says, if the converter wrote it; else None."""
+        """Data of its header, if it is an emitted program; else None."""
         return stamp_of(self.own_text) if STAMP_BEGIN in self.text else None
 
     @property
     def shaped_regions(self) -> int:
-        """How many of its regions are blocks that were shaped, as its header and the marks in it say."""
+        """Number of shaped regions, by its header and marks."""
         return sum(region.shaped for region in self.regions)
 
     @property
     def warnings(self) -> list[str]:
-        """What the reader noticed, each ``source:line: text``."""
+        """Findings of the reader, each ``source:line: text``."""
         own = [f"{file or self.source}:{line}: {message}" for line, _, _, message, file in self.core.warnings]
         return own if self.doubt is None else [f"{self.source}:{self.doubt[0]}: {self.doubt[1]}", *own]
 
     @cached_property
     def doubt(self) -> tuple[int, str] | None:
-        """A warning about a word that means another thing on another control, if the control is not recognized."""
+        """Warning about a word with another meaning on another control, if the control is not recognized."""
         is_stated = self.reading.machine.controller.dialect != "auto"
         if is_stated or self.reading.emitted or self.foreign is not None:
             return None
@@ -315,43 +315,43 @@ class Program:
 
     @property
     def expanded_text(self) -> bytes:
-        """The plain program: calls, macros, coordinate modes and (unless kept) cutter compensation worked out.
+        """The expanded program: calls, macros, coordinate modes and (unless kept) cutter compensation resolved.
 
-        The text to the letter where the program holds none of them.
+        The unchanged text if the program has none of them.
         """
         return self.core.text
 
     def place(self, line: int) -> str:
-        """``file:line`` of the source from which a line of the expanded text comes.
+        """Source of a line of the expanded program as ``file:line``.
 
         Args:
-            line: of the expanded text, from 1.
+            line: line of the expanded program, from 1.
 
         Returns:
-            The place in words.
+            The location as text.
         """
         number, file = self.core.origin(line)
         return f"{file or self.source}:{number}"
 
     def source_lines(self, first: int, last: int) -> tuple[int, int]:
-        """Lines of the expanded program as they are reported: those of the source if it is for another control.
+        """Convert lines of the expanded program to reported lines: of the source if it is for another control.
 
         Args:
-            first: of them, from 1.
-            last: of them.
+            first: first line, from 1.
+            last: last line.
 
         Returns:
-            First and last line.
+            First and last reported line.
         """
         if self.foreign is None:
             return first, last
         return int(self.core.origin(first)[0]), int(self.core.origin(last)[0])
 
     def lines(self, region: _core.Region) -> str:
-        """Text with the line numbers of a region: of the source, or of the expanded program.
+        """Line numbers of a region as text: of the source, or of the expanded program.
 
         Args:
-            region: of this program.
+            region: region of this program.
 
         Returns:
             The lines, first to last.
@@ -364,10 +364,10 @@ class Program:
         """The meaning of I, J, K ("absolute" or "incremental") that explains the arcs among its alarms.
 
         Args:
-            data: what it was read from.
+            data: bytes from which it was read.
 
         Returns:
-            The value of `input.arc_centre` with which the whole program reads; empty: neither explains them.
+            The value of `input.arc_centre` with which the whole program is readable; empty: neither.
         """
         if self.foreign is not None:
             return ""
@@ -375,11 +375,11 @@ class Program:
         return _other_arc_centre(data, options, " ".join(message for _, _, _, message, _ in self.core.alarms))
 
     def region_error(self, region: _core.Region, message: str) -> ProgramError:
-        """An error that names the file and the lines of a region.
+        """Error with the file and lines of a region.
 
         Args:
-            region: of this program.
-            message: what is wrong there.
+            region: region of this program.
+            message: the fault.
 
         Returns:
             The error, to be raised.
@@ -417,15 +417,15 @@ def _read(
         core = _core.read_program(data, options)
     except ProgramError as error:
         kind = _other_arc_centre(data, options, str(error))
-        hint = f'; with {kind} I J K the whole program reads: set input.arc_centre = "{kind}"' if kind else ""
+        hint = f'; with {kind} I J K the whole program is readable: set input.arc_centre = "{kind}"' if kind else ""
         raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
-    # The core leaves the byte-order mark out too.
+    # The core skips the byte-order mark too.
     whole = data.removeprefix(codecs.BOM_UTF8) if core.expanded else None
     return Program(core, source, reading, whole, folder, number)
 
 
 def _read_foreign(data: bytes, source: str, reading: Reading, folder: Path | None, foreign: ForeignProgram) -> Program:
-    """A program for another control: its expanded program is read, and messages name its lines."""
+    """Read the expanded form of a program for another control; messages give its own lines."""
     beside = folder if foreign.settings.called_text is not None else None
     try:
         core = _core.read_program(foreign.text.encode("latin-1", "replace"), reading.options(beside, foreign.settings))
@@ -444,39 +444,39 @@ def _read_foreign(data: bytes, source: str, reading: Reading, folder: Path | Non
 
 
 def least_increment_mm(machine: Machine, units: int) -> float:
-    """Least increment of the words of a program in G20 or G21, mm."""
+    """Least increment of words in G20 or G21, mm."""
     controller = machine.controller
     return controller.least_increment_inch * MM_PER_INCH if units == 20 else controller.least_increment_mm
 
 
 def written_increment_mm(machine: Machine, units: int) -> float:
-    """Likewise of the words that `convert` writes, which are finer in some dialects."""
+    """Least increment of emitted words, mm, which are finer in some dialects."""
     decimals = machine.emission.position_decimals
     if decimals is None:
         return least_increment_mm(machine, units)
     return 10.0 ** -(decimals + 1) * MM_PER_INCH if units == 20 else 10.0**-decimals
 
 
-_ON_INCREMENT = 1e-6  # increments: so near to one a position is on it
+_ON_INCREMENT = 1e-6  # in increments: tolerance of a position on the grid
 
 
 def end_off_grid_mm(region: _core.Region, increment_mm: float) -> list[float]:
-    """How far the end of a region lies from the nearest position that its words can name.
+    """Distance of a region's end from the nearest position on its increment, mm, per axis.
 
-    A program that changes between G20 and G21, or that has more digits than the control resolves, may end elsewhere.
+    A program that changes between G20 and G21, or with more digits than the control resolves, may end elsewhere.
     """
     off = [abs(each / increment_mm - round(each / increment_mm)) for each in map(float, region.path.end_mm)]
     return [each * increment_mm if each > _ON_INCREMENT else 0.0 for each in off]
 
 
 def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
-    """Axes at rest through a whole region at a position that no word can give: no word of them may be written."""
+    """Mask of axes at rest in a region at a position off the increment, which no word may command."""
     off_mm = end_off_grid_mm(region, increment_mm)
     return [extent <= 0.0 < off for extent, off in zip(map(float, region.path.extent_mm), off_mm, strict=True)]
 
 
 def _other_arc_centre(data: bytes, options: _core.ReaderOptions, message: str) -> str:
-    """The other meaning of I, J, K, if the whole program can be read with it; else none."""
+    """The other meaning of I, J, K, if the whole program is readable with it; else empty."""
     if _ARC_OFF_RADIUS not in message:
         return ""
     options.absolute_arc_centres = not options.absolute_arc_centres
@@ -489,7 +489,7 @@ def _other_arc_centre(data: bytes, options: _core.ReaderOptions, message: str) -
 
 
 def given_program(program: Program | str | Path, machine: Machine) -> Program:
-    """A program as it is, or read from its file as the controller of `machine` would."""
+    """A given program, or one read from its file like the controller of `machine`."""
     if not isinstance(program, Program):
         return Program.read(program, machine)
     program.require_machine(machine)

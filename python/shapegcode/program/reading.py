@@ -1,5 +1,5 @@
-"""How the core reads a program of a machine: its options, the files of programs that another one
-calls, and files that hold several programs, as a control punches its memory.
+"""Reading of programs by the core: options for a machine, files of programs that another one
+calls, and multi-program files, such as memory dumps of a control.
 """
 
 from __future__ import annotations
@@ -41,28 +41,28 @@ _RETURNS, _ENDS = re.compile(rb"M *0*99(?!\d)"), re.compile(rb"M *0*(?:2|30)(?!\
 class ProgramPlace:
     """One program of a file."""
 
-    index: int  # how many programs stand before it
-    # what picks this one and no other: its number ``O0001``, its name ``<PART>``, either behind its folder
-    # (``/USER/O0001``) where it stands in several; ``#3``, the third one, where nothing else tells them apart
+    index: int  # number of programs before it
+    # unique address: its number ``O0001``, its name ``<PART>``, either after its folder
+    # (``/USER/O0001``) if in several folders; ``#3``, the third one, if nothing else is unique
     address: str
     first_line: int  # from 1
-    text_begin: int  # byte at which its lines begin
-    text_end: int  # byte behind them
+    text_begin: int  # offset of its first byte
+    text_end: int  # offset after its last byte
 
 
 def is_subprogram(text: bytes) -> bool:
-    """Whether a program only returns to who called it: M99, and neither M02 nor M30."""
+    """Whether a program only returns to its caller: M99, and neither M02 nor M30."""
     plain = _COMMENT.sub(b"", text).upper()
     return _RETURNS.search(plain) is not None and _ENDS.search(plain) is None
 
 
 def programs_of(text: bytes) -> tuple[ProgramPlace, ...]:
-    """The programs of a file, in their order."""
+    """Programs of a file, in order."""
     entries = _core.list_programs(text)
     short = [_own_name(entry) for entry in entries]
     long = [f"{entry.folder.rstrip('/')}/{own}" for entry, own in zip(entries, short, strict=True)]
     plain, full = Counter(short), Counter(long)
-    # A line that ends with LF CR CR ends behind both.
+    # A line end may be LF CR CR.
     heads = ((entry.text_begin, text[entry.text_begin : entry.text_begin + 2]) for entry in entries)
     begins = [begin + len(head) - len(head.lstrip(b"\r")) for begin, head in heads]
     ends = [*begins[1:], entries[-1].text_end]
@@ -74,7 +74,7 @@ def programs_of(text: bytes) -> tuple[ProgramPlace, ...]:
 
 
 def place_of(text: bytes, wanted: str, source: str) -> int:
-    """Which program of a text is meant."""
+    """Index of the wanted program of a text."""
     entries, places = _core.list_programs(text), programs_of(text)
     if match := _PLACE.fullmatch(wanted):
         found = [index for index in range(len(places)) if index == int(match[1]) - 1]
@@ -90,20 +90,20 @@ def place_of(text: bytes, wanted: str, source: str) -> int:
         return found[0]
     if found:
         known = ", ".join(places[index].address for index in found)
-        raise _core.ProgramError(f"{source}:1:1: the file holds several programs {wanted}: say which, {known}")
+        raise _core.ProgramError(f"{source}:1:1: the file contains several programs {wanted}: specify one, {known}")
     known = ", ".join(place.address for place in places[:_LISTED])
     more = f" and {len(places) - _LISTED} more" if len(places) > _LISTED else ""
-    raise _core.ProgramError(f"{source}:1:1: the file holds no program {wanted} (but {known}{more})")
+    raise _core.ProgramError(f"{source}:1:1: the file contains no program {wanted} (but {known}{more})")
 
 
 def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
-    """Position of one of several programs in a file, to read it alone."""
+    """Index of a program in a multi-program file, to read it alone; None: read the whole file."""
     try:
         entries = _core.list_programs(text)
     except _core.ProgramError:
         if isinstance(wanted, str):
             raise
-        return None  # the reading says it, with its place
+        return None  # the reader reports it with its location
     if isinstance(wanted, int) and wanted not in [entry.number for entry in entries]:
         return None  # likewise
     index = place_of(text, wanted if isinstance(wanted, str) else f"O{wanted}", source)
@@ -111,13 +111,13 @@ def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
 
 
 def called_from(text: bytes, index: int, kept: Iterable[int]) -> tuple[ProgramPlace, ...]:
-    """Programs of a file that one of them needs on the control, because their calls were not expanded."""
+    """Programs of a file needed by one of them on the control, because calls were not expanded."""
     entries, places = _core.list_programs(text), programs_of(text)
     found: set[int] = set()
     waiting = [(index, number) for number in kept]
     while waiting:
         caller, number = waiting.pop()
-        # The reader looks in the folder of the program that calls first.
+        # The reader searches the caller's folder first.
         same = [at for at, entry in enumerate(entries) if entry.number == number]
         same.sort(key=lambda at: entries[at].folder != entries[caller].folder)
         if not same and number > 9999:
@@ -131,7 +131,7 @@ def called_from(text: bytes, index: int, kept: Iterable[int]) -> tuple[ProgramPl
 
 
 def alone_with(program: bytes | memoryview, text: bytes, needed: Sequence[ProgramPlace]) -> bytes | memoryview:
-    """A program that stands alone, and behind it others as they are in the file that it comes from."""
+    """A program's own text, followed by the needed others of its file."""
     if not needed:
         return program
     whole = bytes(program)
@@ -146,36 +146,36 @@ def _own_name(entry: _core.ProgramEntry) -> str:
 _LISTED = 20  # addresses in a message
 _NO_LIMIT = 2**63
 _ANY_PROGRAM = (0, 99_999_999)
-_PLAIN_LINE = 1000  # characters: a plain program's lines are no longer than the words of a block
-_SHOWN_CHARACTERS = 60  # of a value in a message: a table of tools may be long
+_PLAIN_LINE = 1000  # characters: longest line of an expanded program
+_SHOWN_CHARACTERS = 60  # shown characters of a value in a message, such as a tool table
 
 _CONTROLLER_KEYS = (
     "calculator_decimal_point", "least_increment_mm", "least_increment_inch", "arc_radius_tolerance_mm",
     "offset_memory", "nesting_limit_subprogram", "dialect",
 )  # fmt: skip
-"""Of `controller`: what changes how a text is read; limits of memory and time do not."""
+"""Keys of `controller` that affect reading; limits of memory and time do not."""
 
-_NOT_READ = ("compensation", "material_side")  # of `input`: what is decided of a program that was read
+_NOT_READ = ("compensation", "material_side")  # keys of `input` that do not affect reading
 
 
-Finder = Callable[[int], tuple[str, bytes] | None]  # name and text of a program that another one calls, by its O number
+Finder = Callable[[int], tuple[str, bytes] | None]  # name and text of a called program, by O number
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How a program was read."""
+    """Settings with which a program was read."""
 
     machine: Machine  # whose controller read it
-    emitted: bool = False  # shapegcode wrote the text: its arcs are FANUC's, whatever the original's were
-    keeps_calls: bool = False  # shapegcode has just written it: every call in it was kept
-    probe_lines: tuple[int, ...] = ()  # ascending line numbers behind which the modal state is kept
+    emitted: bool = False  # text written by shapegcode: its arcs are FANUC's in any case
+    keeps_calls: bool = False  # text just emitted: every call in it was kept
+    probe_lines: tuple[int, ...] = ()  # ascending line numbers after which the modal state is stored
     expand_compensation: bool = True  # G41/G42 became plain moves
-    collect_alarms: bool = False  # the reader went on behind an alarm
-    # name and text of programs in other files that it calls, by O number; found when it was read
+    collect_alarms: bool = False  # the reader continued after an alarm
+    # name and text of called programs in other files, by O number
     called: dict[int, tuple[str, bytes]] = dataclasses.field(default_factory=dict)
 
     def options(self, folder: Path | None, foreign: ForeignSettings | None = None) -> _core.ReaderOptions:
-        """Settings with which the core reads a text so; `foreign`: it is the plain program of another control's."""
+        """Options of the core for this reading; `foreign`: the text was expanded from another control's program."""
         options = reader_options(self.machine, emitted=self.emitted)
         options.probe_lines = list(self.probe_lines)
         options.expand_compensation = self.expand_compensation
@@ -190,7 +190,7 @@ class Reading:
         return options
 
     def _called(self, find: Finder, foreign: ForeignSettings | None, number: int) -> tuple[str, bytes] | None:
-        """A program of another file, kept with the reading: it is read again where these files are not."""
+        """Find a program in another file, and store it for reading again without these files."""
         if number not in self.called and (found := find(number)) is not None:
             file, text = found
             if foreign is not None and foreign.called_text is not None:
@@ -201,7 +201,7 @@ class Reading:
         return self.called.get(number)
 
     def differences(self, machine: Machine) -> list[str]:
-        """Settings by which another machine would read the text differently."""
+        """Settings with which another machine would read the text differently."""
         if machine is self.machine:
             return []
         unused = {"input.arc_centre"} if self.emitted else set()
@@ -246,12 +246,12 @@ def _apply(foreign: ForeignSettings, options: _core.ReaderOptions) -> None:
 
 
 def is_program_text(given: object) -> bool:
-    """Whether a string is the text of a program and not the name of a file: it has several lines."""
+    """Whether a string is the text of a program and not a file name: it has several lines."""
     return isinstance(given, str) and ("\n" in given or "\r" in given)
 
 
 def reader_options(machine: Machine, *, emitted: bool = False) -> _core.ReaderOptions:
-    """Settings with which the core reads a program of this machine."""
+    """Options of the core to read a program of this machine."""
     options = _core.ReaderOptions()
     controller, given = machine.controller, machine.input
     options.calculator_decimal_point = controller.calculator_decimal_point
@@ -300,7 +300,7 @@ def _limits(machine: Machine, *, emitted: bool) -> _core.WorkLimits:
     limits.rapid_mm_per_s = [axis.rapid_mm_per_min / 60.0 for axis in axes]
     limits.tool_change_s = machine.times.tool_change_s
     limits.m_function_s = machine.times.m_function_s
-    # What is written for a program within the limits has more blocks and takes a little longer.
+    # An emitted program within the limits has more blocks and takes slightly longer.
     limits.moves = _NO_LIMIT if emitted else controller.max_program_moves
     limits.expansion_moves = _NO_LIMIT if emitted else controller.max_expansion_moves
     limits.seconds = math.inf if emitted else controller.max_program_s
@@ -316,11 +316,11 @@ def _tool_offsets(given: Input) -> dict[int, _core.ToolOffset]:
 
 
 PROGRAM_SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".TAP", ".prg", ".PRG", ".ngc")
-"""Ends of names that programs usually have."""
+"""Usual suffixes of program files."""
 
 
 def program_bytes(path: str | Path, most: int) -> bytes:
-    """Content of a program file."""
+    """Read the content of a program file."""
     with open_file(path) as file, named_errors(path):
         size = min(os.fstat(file.fileno()).st_size, most + 1)
         require_memory(str(path), 2 * size, f"{size} bytes of program text are to be read")
@@ -328,14 +328,14 @@ def program_bytes(path: str | Path, most: int) -> bytes:
 
 
 def given_text(program: str | Path, machine: Machine) -> tuple[bytes, str, Path | None]:
-    """A program's text where it is given or from its file, its name in messages, and the folder of the file."""
+    """Text of a program (given, or from its file), its name in messages, and its folder."""
     if is_program_text(program):
         return str(program).encode(), "<text>", None
     return program_bytes(program, machine.controller.max_program_bytes), str(program), Path(program).parent
 
 
 def program_loader(folders: Sequence[Path], most: int) -> Finder:
-    """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix."""
+    """Make a finder of called programs' files: O0123, O123, 0123 with a usual suffix."""
 
     def load(number: int) -> tuple[str, bytes] | None:
         stems = (f"O{number:04d}", f"O{number}", f"o{number:04d}", f"{number:04d}", f"O{number:08d}")
@@ -363,7 +363,7 @@ _LIKELY = (
 
 
 def signs_of_turning(text: bytes) -> tuple[int, str] | None:
-    """The word that shows that a program is for a lathe; none in a program with Y words or M06."""
+    """Line and words that show a program for a lathe; None with Y words or M06."""
     code = COMMENT.sub(b"", text[:LOOKED_AT_BYTES].upper())
     sure = [(found, meaning) for sign, meaning in _SURE if (found := sign.search(code))]
     likely = [(found, meaning) for sign, meaning in _LIKELY if (found := sign.search(code))]

@@ -1,6 +1,6 @@
-"""The header of an emitted program: written by the converter, read by everything that is given such a program.
+"""The header of an emitted program: written by the converter, read by all commands that get such a program.
 
-Its cautions are those of reports, pages, test cuts and characterization tests too: a sentence, and a comment.
+Its cautions, each a sentence and a comment, are also used in reports, pages, test cuts and characterization tests.
 
 (SHAPEGCODE 0.1.0 MACHINE VX500)
 (VERDICT WITHIN TOLERANCE       )    or (BETTER - TOLERANCE NOT MET     )
@@ -9,11 +9,11 @@ Its cautions are those of reports, pages, test cuts and characterization tests t
 (BLOCK PERIOD 5 MS SHAPER 20 MS ZVD)
 (SET FEED OVERRIDE 100 PCT)
 (NO SINGLE BLOCK IN SHAPED CUTS)
-(RESTART ONLY BEHIND A SHAPED COMMENT OR AT A LISTED N)
+(RESTART ONLY AFTER A SHAPED COMMENT OR AT A LISTED N)
 (FIRST RUN ABOVE THE PART WITHOUT TOOL)
 (TIME CONSTANT AFTER INTERPOLATION 0 MS)
 
-Only capitals, digits, spaces, points and minus signs stand in it: what any control keeps in a comment.
+It contains only capitals, digits, spaces, points and minus signs, which any control keeps in a comment.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from shapegcode import _core
 class Habit:
     """One caution."""
 
-    topic: str  # what it is about, in a word or two
+    topic: str  # topic in a word or two
     comment: str  # for programs: capitals, 60 characters at most
-    sentence: str  # the same for people who read
+    sentence: str  # the same as a sentence
 
 
 OVERRIDE = Habit(
@@ -62,13 +62,13 @@ SINGLE_BLOCK = Habit(
 )
 FEED_HOLD = Habit(
     "feed hold",
-    "AFTER FEED HOLD GO ON AT 100 PCT",
+    "AFTER FEED HOLD RESUME AT 100 PCT",
     "feed hold is safe; the machine may vibrate once, since the control decelerates with its own acceleration; cycle "
     "start resumes the program",
 )
 RESTART = Habit(
     "restart",
-    "RESTART ONLY BEHIND A SHAPED COMMENT OR AT A LISTED N",
+    "RESTART ONLY AFTER A SHAPED COMMENT OR AT A LISTED N",
     "restart only where a cut begins, or at a restart point: other blocks of a shaped cut are not valid restart points",
 )
 FIRST_RUN = Habit(
@@ -80,7 +80,7 @@ FIRST_RUN = Habit(
 
 
 def no_room(room_bytes: int) -> str:
-    """Remedy for a shaped program that does not fit into the memory of the control."""
+    """Remedy for a shaped program that exceeds the memory of the control."""
     return f"convert the original with --max-bytes {room_bytes}; or memory card, data server or drip feed (DNC)"
 
 
@@ -88,10 +88,10 @@ REGION_MARK = "(SHAPED)"  # comment before each shaped region
 
 RAPID_MARK = "(SHAPED RAPID)"  # comment before shaped blocks that replace a rapid
 
-STAMP_BEGIN = b"(SHAPEGCODE "  # how the header begins
+STAMP_BEGIN = b"(SHAPEGCODE "  # start of the header
 
 _WIDTH = 60
-# One length, so that the verdict can take its place without moving a line; likewise the mark of the text.
+# Equal lengths, so that the verdict and the mark of the text can be replaced in place.
 _PENDING, _GOOD, _BETTER, _BAD = (
     b"(VERDICT PENDING                )",
     b"(VERDICT WITHIN TOLERANCE       )",
@@ -101,31 +101,31 @@ _PENDING, _GOOD, _BETTER, _BAD = (
 _NO_MARK = "0" * 8
 _MARK_PENDING = f"(TEXT {_NO_MARK})".encode()
 _COMMENT = re.compile(rb"\(([^()\r\n]*)\)[ \t]*[\r\n]*")
-# What a control or an editor may change without changing the program: comments, blanks, %; then N and O words.
+# Parts that a control or editor may change without effect: comments, blanks, %; then N and O words.
 _ANY_COMMENT = re.compile(rb"\([^()\r\n]*\)")
 _BLANKS = b" \t%"
 _CAPITALS = bytes(range(256)).upper()
-_CHUNK = 1 << 20  # bytes looked at in one go: no second text of a long program
+_CHUNK = 1 << 20  # bytes per step, to avoid a second copy of a long program
 _LINE_HEAD = re.compile(rb"(\n(?:/\d?)?)(?:N\d+(?:[O:]\d+)?|[O:]\d+)")
 
 
 @dataclass(frozen=True)
 class Stamp:
-    """What the header of an emitted program says; texts are as a comment holds them."""
+    """Data in the header of an emitted program; texts are in the characters of comments."""
 
-    version: str  # of shapegcode
-    machine: str  # its name
+    version: str  # version of shapegcode
+    machine: str  # name of the machine
     modes: tuple[str, ...]  # such as "X 46 HZ 0.02", in the order of the machine file
-    block_period_ms: str  # of the shaped blocks
+    block_period_ms: str  # period of the shaped blocks
     shaper_ms: str  # duration of the shaper
-    family: str  # of the shaper; empty: not said
-    own_filter: str  # how the control itself smooths shaped blocks, such as "24 MS" or "48 MS BELL 24 MS"
-    mark: str = _NO_MARK  # of the text, see `text_mark`; eight zeros: not yet known
-    override: str = "ask"  # which of `OVERRIDES` the text is for
+    family: str  # family of the shaper; empty: not stated
+    own_filter: str  # the control's own filter for shaped blocks, such as "24 MS" or "48 MS BELL 24 MS"
+    mark: str = _NO_MARK  # check value of the text, see `text_mark`; eight zeros: not yet known
+    override: str = "ask"  # key of `OVERRIDES` for the text
     notes: tuple[str, ...] = ()  # further lines
 
     def lines(self) -> list[str]:
-        """The header, its verdict still open."""
+        """Lines of the header, with pending verdict."""
         first, *rest = (
             f"({plain_comment(line)[:_WIDTH]})"
             for line in (
@@ -141,7 +141,7 @@ class Stamp:
         return [first, _PENDING.decode(), *rest]
 
     def difference(self, other: Stamp) -> str:
-        """Text on how the machine of another header differs; empty: in nothing that matters."""
+        """Difference of another header's machine as text; empty: no relevant difference."""
         pairs = (
             ("machine", self.machine, other.machine),
             ("modes", ", ".join(self.modes) or "none", ", ".join(other.modes) or "none"),
@@ -154,17 +154,17 @@ class Stamp:
 
 
 def _shown(text: str) -> str:
-    # As far as a comment shows it.
+    # In the form of a comment.
     return plain_comment(text)[: _WIDTH // 2]
 
 
 def plain_comment(text: str) -> str:
-    """Only what a FANUC comment may hold: capitals, digits and plain signs."""
+    """Reduce a text to the characters of FANUC comments: capitals, digits and plain signs."""
     return "".join(c if c.isalnum() or c in " .-" else " " for c in text.upper())
 
 
 def stamp_of(text: bytes) -> Stamp | None:
-    """The header of a program that the converter wrote."""
+    """Parse the header of an emitted program; None without one."""
     begin = text.find(STAMP_BEGIN)
     if begin < 0:
         return None
@@ -196,14 +196,14 @@ def stamp_of(text: bytes) -> Stamp | None:
 def text_mark(text: bytes) -> str:
     """Eight digits: a hash of the motion and functions of a program.
 
-    Comments, blanks, kinds of line end, N words, the program's number and `%` do not count: what a control or an
-    editor changes in passing.
+    Comments, blanks, kinds of line end, N words, the program's number and `%` are ignored, as a control or an
+    editor may change them.
     """
     return _mark_of(_chunks(len(text), text.find, lambda begin, end: text[begin:end]))
 
 
 def _mark_of(chunks: Iterable[bytes]) -> str:
-    """The mark of a text in chunks of whole lines: what does not count never reaches over a line's end."""
+    """Mark of a text in chunks of whole lines; ignored parts never span a line end."""
     mark, is_first = 0, True
     for chunk in chunks:
         kept = _what_counts(chunk)
@@ -214,9 +214,9 @@ def _mark_of(chunks: Iterable[bytes]) -> str:
 
 
 def _what_counts(lines: bytes) -> bytes:
-    """Of whole lines; they end with LF, but for the last, and none of them is empty.
+    """Remove ignored parts from whole lines, which end with LF except the last; none is empty.
 
-    By plain replacing, as a program may have a million lines, and only where there is something to replace.
+    Uses plain replacement only where needed, as a program may have a million lines.
     """
     if b"(" in lines:
         lines = _ANY_COMMENT.sub(b"", lines)
@@ -237,7 +237,7 @@ def _one_end(text: bytes) -> bytes:
 
 
 def text_with_verdict(text: bytes, *, good: bool, better: bool = False) -> bytes:
-    """An emitted program with verdict and mark in its header."""
+    """Write verdict and mark into the header of an emitted program."""
     changes = _changes(text.find, text_mark(text), good=good, better=better)
     if not changes:
         return text
@@ -248,18 +248,18 @@ def text_with_verdict(text: bytes, *, good: bool, better: bool = False) -> bytes
 
 
 def mark_of(program: _core.ProgramText) -> str:
-    """The mark of a program that was read; see `text_mark`."""
+    """Mark of a program read; see `text_mark`."""
     return _mark_of(whole_lines(program))
 
 
 def write_verdict(program: _core.ProgramText, mark: str, *, good: bool, better: bool = False) -> None:
-    """The same in the text of a program that was read; it holds what it held in the same places."""
+    """Write verdict and mark into the text of a program read, in place."""
     for begin, after in _changes(program.find, mark, good=good, better=better):
         program.overwrite(begin, after)
 
 
 def _changes(find: Callable[[bytes], int], mark: str, *, good: bool, better: bool) -> list[tuple[int, bytes]]:
-    """Where the header says something else, and what: as long as what it takes the place of."""
+    """Positions and new bytes of changes in the header, each of the replaced length."""
     open_ones = (_PENDING,) if good else (_PENDING, _GOOD, _BETTER)
     verdicts = [(before, _BAD if not good else _BETTER if better else _GOOD) for before in open_ones]
     wanted = [*verdicts, (_MARK_PENDING, f"(TEXT {mark})".encode())]
@@ -267,7 +267,7 @@ def _changes(find: Callable[[bytes], int], mark: str, *, good: bool, better: boo
 
 
 def whole_lines(program: _core.ProgramText) -> Iterator[bytes]:
-    """The text of a program in chunks of whole lines."""
+    """Yield the text of a program in chunks of whole lines."""
     return _chunks(program.size, program.find, program.slice)
 
 

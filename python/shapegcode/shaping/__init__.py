@@ -1,6 +1,6 @@
-"""Shapers: `bands` to cancel, families in `registry`, the choice in `comparison`, of a conversion in `grid`.
+"""Shapers: modes with `bands`, families in `registry`, `comparison` of designs, `grid`: the choice for a conversion.
 
-Their names can be taken from here too, each loaded on first use.
+Their names are also available here, each loaded on first use.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""What a shaper is designed for: modes, each with the band in which its frequency may lie."""
+"""Modes to cancel, each with the band of its frequency; designs and their figures."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 NO_MODE = (
-    "the machine file gives no vibration mode (axes.x.modes): nothing to shape for; `shapegcode identify --tap-plan` "
+    "the machine file gives no vibration mode (axes.x.modes): nothing to cancel; `shapegcode identify --tap-plan` "
     "describes the test"
 )
-NARROW_PERCENT = 0.2  # half width above which a shaper is designed for the band of a mode
+NARROW_PERCENT = 0.2  # half width above which a shaper is designed for a mode's band
 _SLOWEST_HZ = 0.1  # the period of a load on 25 m of rope; no machine tool has a slower mode
 _FASTEST_HZ = 10_000.0  # as in a machine file
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -27,16 +27,16 @@ _SIZE = r"(?:\d+\.?\d*|\.\d+)"
 _TEXT = re.compile(
     rf"({_NUMBER})(?::({_NUMBER}))?(?:(?:±|\+-|\+/-)({_NUMBER})(%|Hz)?|[-−]({_SIZE})(%|Hz)/?\+({_SIZE})(%|Hz))?"
 )
-VIBRATION_LIMIT = 0.05  # residual ratio that a robust design may leave anywhere in the bands, if no other is asked for
+VIBRATION_LIMIT = 0.05  # default limit of a robust design's residual ratio within the bands
 # Relative difference of durations (or, if none is within the limit, of worst residuals) below which the longer block
 # period is preferred.
 SAME = 0.02
-ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
+ON_GRID = 1e-9  # periods; tolerance for rounding of a quotient
 
 
 @dataclass(frozen=True)
 class ModeBand:
-    """A mode and how far its frequency may be off.
+    """A mode and the uncertainty of its frequency.
 
     Attributes:
         mode: nominal frequency and damping.
@@ -61,10 +61,10 @@ class ModeBand:
 
     @staticmethod
     def hidden_from_json(data: Mapping[str, float]) -> dict[str, Mode]:
-        """The mode, from what the JSON says of it.
+        """Restore the mode from JSON.
 
         Args:
-            data: JSON of such an object.
+            data: JSON of a `ModeBand`.
 
         Returns:
             The hidden field.
@@ -82,10 +82,10 @@ class ModeBand:
         """The mode with its frequency moved by `share` (-1 to 1) of the band's half width.
 
         Args:
-            share: -1 to 1: the lower end of the band to the upper one.
+            share: -1 (lower end of the band) to 1 (upper end).
 
         Returns:
-            The mode of that frequency, with the same damping.
+            The mode at the shifted frequency, with the same damping.
         """
         scale = 1.0 + share * self.uncertainty
         return Mode(self.mode.frequency_hz * scale, self.mode.damping_ratio, self.mode.participation)
@@ -96,17 +96,17 @@ class ModeBand:
 
 
 def parse_mode_band(text: str, uncertainty: float = 0.0) -> ModeBand:
-    """A mode such as ``46``, ``46:0.02±5%``, ``46:0.02+-2.3Hz``, or ``30:0.1-13%+19%`` as that of the band's middle."""
+    """Parse ``46``, ``46:0.02±5%``, ``46:0.02+-2.3Hz``, or ``30:0.1-13%+19%`` to the mode at mid-band."""
     match = _TEXT.fullmatch(text.strip())
     if match is None:
         raise ArgumentError(
-            f"{text!r} is no mode: FREQUENCY[:DAMPING][±BAND], for example 46:0.02±5%, or with both ends 46:0.02-5%+8%"
+            f"{text!r} is not a mode: FREQUENCY[:DAMPING][±BAND], such as 46:0.02±5%, or with both ends 46:0.02-5%+8%"
         )
     frequency_hz, damping = float(match[1]), float(match[2] or 0.0)
     mode = Mode(frequency_hz, damping)
     if not _SLOWEST_HZ <= frequency_hz <= _FASTEST_HZ:
         raise ArgumentError(
-            f"mode frequency {frequency_hz:g} Hz, as typed in {text!r}: must be {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz"
+            f"mode frequency {frequency_hz:g} Hz, in {text!r}: must be {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz"
         )
     if match[3] is not None:
         return ModeBand(mode, float(match[3]) / (frequency_hz if match[4] == "Hz" else 100.0))
@@ -123,11 +123,10 @@ def parse_mode_band(text: str, uncertainty: float = 0.0) -> ModeBand:
 
 
 def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
-    """The modes of all axes of a machine with the bands that it states; equal ones once, with the wider band.
+    """The modes of all axes of a machine with its stated bands; equal ones once, with the wider band.
 
-    Bands as narrow as those of a tap test are ignored: a shaper that is exact at the nominal frequency leaves less
-    there than
-    one with `shaping.vibration_limit` over the whole band. The verdict simulates the ends of the band nevertheless.
+    Bands as narrow as those of a tap test are ignored: there a shaper with zero residual at the nominal frequency is
+    better than one for `shaping.vibration_limit` over the band. The verdict still simulates the ends of the band.
     """
     from shapegcode.model.modes import still_mode
 
@@ -147,7 +146,7 @@ def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
 
 
 def mode_band(given: float | str | Mode | ModeBand, uncertainty: float = 0.0) -> ModeBand:
-    """A mode with its band, from a frequency in Hz, a text as `parse_mode_band` reads it, a mode, or as it is."""
+    """Convert a frequency in Hz, a text for `parse_mode_band`, or a mode to a `ModeBand`."""
     if isinstance(given, Mode):
         return ModeBand(given, uncertainty)
     if isinstance(given, ModeBand):
@@ -156,22 +155,22 @@ def mode_band(given: float | str | Mode | ModeBand, uncertainty: float = 0.0) ->
 
 
 def ms(time_s: float) -> str:
-    """A time, s, in ms."""
+    """Format a time, s, in ms."""
     return f"{time_s * 1e3:.6g} ms"
 
 
 def mode_names(modes: Sequence[Mode]) -> str:
-    """Modes by frequency and damping ratio."""
+    """Format modes by frequency and damping ratio."""
     return ", ".join(f"{mode.frequency_hz:g} Hz (zeta {mode.damping_ratio:g})" for mode in modes)
 
 
 def band_names(bands: Sequence[ModeBand]) -> str:
-    """Modes with their bands, as they are typed."""
+    """Format modes with their bands, as in the command line."""
     return ", ".join(f"{band} Hz" for band in bands)
 
 
 def spoken(bands: Sequence[ModeBand]) -> str:
-    """Modes with their bands in a sentence."""
+    """Format modes with their bands for a sentence."""
 
     def one(band: ModeBand) -> str:
         text = f"{band.mode.frequency_hz:g} Hz"
@@ -188,20 +187,20 @@ def check_times(**times_s: float) -> None:
 
 
 def check_modes_and_times(modes: Sequence[Mode | ModeBand], **times_s: float) -> None:
-    """Refuse no mode, and times that are not finite and above 0."""
+    """Refuse an empty list of modes, and times that are not finite and above 0."""
     if not modes:
         raise ArgumentError("a shaper needs at least one mode: 0 given")
     check_times(**times_s)
 
 
 def whole_periods(duration_s: float, period_s: float) -> int:
-    """How many periods fit into a duration."""
+    """Number of whole periods within a duration."""
     return math.floor(duration_s / period_s + ON_GRID)
 
 
-_EXACT = 1e-3  # of the vibration; impulses that someone typed have four digits
+_EXACT = 1e-3  # residual ratio that counts as zero; typed impulses have four digits
 _TAP = re.compile(rf"\s*({_NUMBER})\s*(ms|s)?\s*:\s*({_NUMBER})\s*")
-_FORM = "TIME:AMPLITUDE,TIME:AMPLITUDE with times in s or with ms behind them, for example 0:0.5,10.87ms:0.5"
+_FORM = "TIME:AMPLITUDE,TIME:AMPLITUDE with times in s, or in ms with the unit, for example 0:0.5,10.87ms:0.5"
 
 
 @dataclass(frozen=True)
@@ -219,12 +218,12 @@ class Design:
     json_exact: ClassVar[tuple[str, ...]] = ("times_s", "amplitudes")
 
     family: str  # name of its row in the registry
-    shaper: Shaper = field(metadata=hidden())  # its impulses
+    shaper: Shaper = field(metadata=hidden())  # impulses
     period_s: float | None  # grid on which its times lie and its zeros are exact, s; None: times are continuous
     residual: float  # largest residual ratio of the modes at their nominal frequencies
-    worst_residual: float  # the same over the modes' bands
-    exact: bool = True  # whether the modes without a band are cancelled, to a thousandth
-    # whether no other design of the comparison is at least as good in everything and better in something
+    worst_residual: float  # largest residual ratio over the modes' bands
+    exact: bool = True  # the modes without a band are cancelled, to a thousandth
+    # Pareto-optimal: no other design is at least as good in every figure and better in one
     pareto: bool = False
 
     @property
@@ -259,16 +258,16 @@ class Design:
 
     @staticmethod
     def hidden_from_json(data: Mapping[str, Sequence[float]]) -> dict[str, Shaper]:
-        """The shaper, from what the JSON says of it."""
+        """Restore the shaper from JSON."""
         return {"shaper": Shaper(data["times_s"], data["amplitudes"])}
 
     def radial_error_um(self, speed_mm_per_s: float, radius_mm: float) -> float:
-        """By how much a circle comes out too small, µm: variance*v²/(2R)."""
+        """Radius error of a circle (too small), µm: variance*v²/(2R)."""
         return self.variance_s2 * speed_mm_per_s**2 / (2.0 * radius_mm) * 1e3
 
 
 def evaluate(family: str, shaper: Shaper, bands: Sequence[ModeBand], period_s: float | None = None) -> Design:
-    """The figures of a shaper for modes and their bands; the worst residual is proven to 1e-6 of it."""
+    """Compute a shaper's figures for modes and bands; the worst residual is proven to 1e-6 relative."""
     residual = max(shaper.residual_ratio(band.mode) for band in bands)
     worst = max(_worst(shaper, band).residual_ratio for band in bands)
     exact = all(shaper.residual_ratio(band.mode) <= _EXACT for band in bands if not band.uncertainty)
@@ -286,12 +285,12 @@ def _worst(shaper: Shaper, band: ModeBand) -> WorstResidual:
 
 @dataclass(frozen=True)
 class DesignOptions:
-    """What a design may be."""
+    """Limits of a design."""
 
     period_s: float | None = None  # grid on which the impulses must lie, s; None: continuous times
     max_duration_s: float = 0.25  # longest shaper, s
     max_abs_sum: float = 10.0  # largest sum of the impulses' magnitudes
-    # residual ratio that a family with a tolerated residual (EI, SI, robust) may leave
+    # residual limit of families with a tolerated residual (EI, SI, robust)
     vibration_limit: float = VIBRATION_LIMIT
     taps: Shaper | None = None  # the shaper of the family `taps`; no other family uses it
 
@@ -299,12 +298,12 @@ class DesignOptions:
     def grid_period_s(self) -> float:
         """The period of the grid, s."""
         if self.period_s is None:
-            raise ArgumentError("this family is designed on a grid: give its period")
+            raise ArgumentError("this family is designed on a grid: specify its period")
         return self.period_s
 
 
 def parse_taps(given: str | Sequence[Any] | dict[str, Any]) -> Shaper:
-    """A shaper from text, or from what a JSON or TOML file holds."""
+    """Parse a shaper from text, or from values of a JSON or TOML file."""
     if isinstance(given, str):
         text = given.strip()
         if not text.startswith(("[", "{")):
@@ -312,16 +311,16 @@ def parse_taps(given: str | Sequence[Any] | dict[str, Any]) -> Shaper:
             for part in text.split(","):
                 match = _TAP.fullmatch(part)
                 if match is None:
-                    raise ArgumentError(f"{part.strip()!r} is no impulse: {_FORM}")
+                    raise ArgumentError(f"{part.strip()!r} is not an impulse: {_FORM}")
                 taps.append((float(match[1]) * (1e-3 if match[2] == "ms" else 1.0), float(match[3])))
             return Shaper(*zip(*taps, strict=True))
         try:
             given = json.loads(text)
         except json.JSONDecodeError as error:
-            raise ArgumentError(f"the impulses are no JSON: {error}") from error
+            raise ArgumentError(f"the impulses are not valid JSON: {error}") from error
     if isinstance(given, dict):
         if set(given) != {"times_s", "amplitudes"}:
-            raise ArgumentError(f"impulses as a table have the keys times_s and amplitudes: given {', '.join(given)}")
+            raise ArgumentError(f"impulses as a table need the keys times_s and amplitudes: given {', '.join(given)}")
         return Shaper(_numbers(given["times_s"]), _numbers(given["amplitudes"]))
     pairs = [_numbers(pair) for pair in given]
     if any(len(pair) != 2 for pair in pairs):
@@ -330,21 +329,21 @@ def parse_taps(given: str | Sequence[Any] | dict[str, Any]) -> Shaper:
 
 
 def on_grid(shaper: Shaper, period_s: float) -> Shaper:
-    """The shaper, if its times are multiples of a period (s)."""
+    """Return the shaper if its times are multiples of a period (s), else raise."""
     for time_s in shaper.times_s.tolist():
         steps = time_s / period_s
         if abs(steps - round(steps)) > ON_GRID * max(1.0, steps):
             raise DesignError(
                 f"the impulse at {ms(time_s)} is not on the {ms(period_s)} grid, nearest "
-                f"{ms(round(steps) * period_s)}; rounding would undo the zeros: design on the grid"
+                f"{ms(round(steps) * period_s)}; rounding would destroy the zeros: design on the grid"
             )
     return shaper
 
 
 def _numbers(values: Any) -> list[float]:
     if isinstance(values, str | bytes) or not isinstance(values, Sequence):
-        raise ArgumentError(f"a list of numbers is wanted among the impulses: given {values!r}")
+        raise ArgumentError(f"the impulses must be lists of numbers: given {values!r}")
     for value in values:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ArgumentError(f"{value!r} is no number of the impulses")
+            raise ArgumentError(f"{value!r} is not a number")
     return [float(value) for value in values]

@@ -1,4 +1,4 @@
-"""The choice among shapers: every family that can be designed, which designs are worth a look, and which to take."""
+"""Compares shapers: designs every family, marks the useful designs, and recommends one."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ from shapegcode.shaping.result import (
 )
 from shapegcode.shaping.robust import least_worst
 
-_SLOWEST_PERIODS = 3.0  # longest shaper where none is stated: three-hump EI of the slowest mode and of a faster one
-_ROBUST = "robust"  # the family of which a design is shown even if it leaves more than the limit
-_OWN_TAPS = "taps"  # the family of impulses that the user gives
-_MOST_PERIODS = 5000  # of the longest shaper: finer grids are as good as continuous times
+_SLOWEST_PERIODS = 3.0  # default longest shaper: three-hump EI of the slowest mode and of a faster one
+_ROBUST = "robust"  # the family whose best design is shown even above the limit
+_OWN_TAPS = "taps"  # the family of the user's impulses
+_MOST_PERIODS = 5000  # periods in the longest shaper: finer grids are as good as continuous times
 _NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of cycles per period
 
 
@@ -68,30 +68,30 @@ def choose_shaper(
     Args:
         modes: frequencies in Hz of undamped modes, texts such as ``46:0.02±5%`` (Hz, damping ratio, band), modes or
             bands; one or several; empty: those of the machine.
-        machine: its modes, unless some are given, and its controller: the block periods worth trying.
-        uncertainty: half width of the band, relative, of modes that state none.
-        periods_s: grids on which the impulses may lie, s; None among them: continuous times too. None: with a machine
+        machine: source of the modes, unless given, and of the block periods to try.
+        uncertainty: relative half width of the band of modes given without a band.
+        periods_s: grids on which the impulses may lie, s; None among them: also continuous times. None: with a machine
             its block period or the best few, without one continuous times and the best few multiples of 1 ms.
         families: names of the families to compare; None: all.
         max_duration_s: longest shaper in s; None: three periods of the slowest mode, and the machine's limit if that
-            is not enough.
+            is too short.
         max_abs_sum: largest sum of the impulses' magnitudes.
-        vibration_limit: largest worst residual ratio of the design to take; None: the machine's
+        vibration_limit: limit of the worst residual ratio; None: the machine's
             `shaping.vibration_limit`, without a machine 0.05.
         objective: "shortest", "contour" (least contour cost) or "robust" (least worst residual).
-        allow_negative: whether a design with negative impulses may be taken.
+        allow_negative: allow a design with negative impulses.
         taps: a shaper of the user's own, compared with the others: as text ("0:.5,10.9ms:.5") or as it is.
-        on_progress: called with the share of the work done, 0 to 1.
+        on_progress: called with the completed fraction, 0 to 1.
 
     Returns:
-        Every design with what it costs and leaves, the one to take and why.
+        Every design with its figures, the recommended one and the reason.
 
     Raises:
         ArgumentError: neither modes nor a machine with modes, equal modes, or a value outside its range.
         DesignError: a mode cannot be cancelled on any of the grids, or no family has a design within the limits.
     """
     machine = None if machine is None else Machine.of(machine)
-    # Arrays are lists, too, and their numbers Python's.
+    # Convert arrays to lists of Python numbers.
     several: list[float | str | Mode | ModeBand] = np.atleast_1d(np.asarray(modes, dtype=object)).tolist()
     periods = None if periods_s is None else np.asarray(periods_s, dtype=object).tolist()
     families = None if families is None else np.asarray(families, dtype=object).tolist()
@@ -129,7 +129,7 @@ def choose_shaper(
         return compared(usual_s)
     longest_s = machine.shaping.max_duration_s
     if usual_s < longest_s:
-        # Long shapers take long to find, and are wanted only where there is no short one.
+        # Long shapers take long to find, and are needed only without a short one.
         with contextlib.suppress(DesignError):
             result = compared(usual_s)
             if result.ok and result.design.exact:
@@ -147,10 +147,10 @@ def choose(
     allow_negative: bool = False,
     on_progress: Callable[[float], None] = lambda _: None,
 ) -> Recommendation:
-    """Design every family on every kind of times, compare, and recommend."""
+    """Design every family on each grid and at continuous times, compare, and recommend."""
     options = options or DesignOptions()
     _check(bands, periods_s, options, objective)
-    # The user's impulses only where there are some.
+    # The user's impulses only if given.
     names = [row.name for row in FAMILIES if row.name != _OWN_TAPS] if families is None else list(families)
     rows = [family_named(name) for name in dict.fromkeys([*names, *([] if options.taps is None else [_OWN_TAPS])])]
     wanted = list(dict.fromkeys(periods_s))
@@ -198,9 +198,9 @@ def _check(
         raise ArgumentError("a shaper needs at least one mode: 0 given")
     for (first, one), (second, other) in itertools.combinations(enumerate(bands, start=1), 2):
         if (one.mode.frequency_hz, one.mode.damping_ratio) == (other.mode.frequency_hz, other.mode.damping_ratio):
-            raise ArgumentError(f"modes {first} and {second} are equal ({one}): give each mode once")
+            raise ArgumentError(f"modes {first} and {second} are equal ({one}): specify each mode once")
     if not periods_s:
-        raise ArgumentError("a comparison needs at least one kind of times: 0 periods given")
+        raise ArgumentError("a comparison needs at least one period, or None for continuous times: 0 given")
     positive = [("max_duration_s", options.max_duration_s), ("vibration_limit", options.vibration_limit)]
     positive += [("period", period_s) for period_s in periods_s if period_s is not None]
     for name, value in positive:
@@ -210,21 +210,21 @@ def _check(
     if options.max_duration_s > _MOST_PERIODS * finest_s:
         raise ArgumentError(
             f"a shaper of {ms(options.max_duration_s)} on a grid of {ms(finest_s)} has up to "
-            f"{options.max_duration_s / finest_s:.3g} impulses, at most {_MOST_PERIODS} can be searched: take a longer "
+            f"{options.max_duration_s / finest_s:.3g} impulses, at most {_MOST_PERIODS} can be searched: use a longer "
             "period or a shorter duration"
         )
     if objective not in OBJECTIVES:
-        raise ArgumentError(f"{objective!r} is no objective: {', '.join(OBJECTIVES)}")
+        raise ArgumentError(f"{objective!r} is not an objective: {', '.join(OBJECTIVES)}")
 
 
 def _aliases(bands: Sequence[ModeBand], period_s: float) -> str:
-    """Why a mode cannot be cancelled on a grid, empty if all can: at the grid's instants it seems to stand still."""
+    """Why a mode cannot be cancelled on a grid (it aliases to 0 Hz); empty if all can."""
     for band in bands:
         cycles = abs(band.mode.pole.imag) * period_s / (2.0 * math.pi)
         if cycles > 0.5 and abs(cmath.exp(band.mode.pole * period_s) - 1.0) < _NEAR_ONE:
             return (
                 f"the mode at {band.mode.frequency_hz:g} Hz cannot be cancelled on a grid of {ms(period_s)}: its "
-                f"{cycles:.4g} cycles per period look like standing still there; take another period"
+                f"{cycles:.4g} cycles per period alias to 0 Hz; use another period"
             )
     return ""
 
@@ -236,7 +236,7 @@ def _least_worst(
     options: DesignOptions,
     found: Sequence[Design],
 ) -> list[Design]:
-    """What leaves least within the longest duration, on each grid; none if one without negative impulses is good."""
+    """Least worst design of the longest duration on each grid; none if a non-negative design meets the limit."""
     wanted = any(row.name == _ROBUST for row in rows) and any(band.uncertainty for band in bands)
     if not wanted or any(not each.negative and is_within(each, options.vibration_limit) for each in found):
         return []
@@ -254,9 +254,9 @@ def _never_tried(
 ) -> Iterator[Refusal]:
     for row in rows:
         if not row.on_grid and None not in usable:
-            yield Refusal(row.name, usable[0], "is designed at continuous times only")
+            yield Refusal(row.name, usable[0], "is designed only at continuous times")
         if not row.continuous and usable == [None]:
-            yield Refusal(row.name, None, "is designed on a grid: give a period")
+            yield Refusal(row.name, None, "is designed on a grid: specify a period")
     for row, period_s in itertools.product(rows, periods_s):
         if period_s is not None and period_s not in usable and row.on_grid:
             yield Refusal(row.name, period_s, _aliases(bands, period_s))

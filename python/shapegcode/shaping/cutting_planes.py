@@ -1,10 +1,10 @@
 """Taps on a grid whose residual stays below a bound over whole frequency bands: linear programs with cuts.
 
 The condition ``|R(w)| <= v`` for every frequency w of a band is infinitely many second-order cones. Each of them
-holds exactly when ``Re(e^{-ja} R(w)) <= v`` for every direction a, which is linear in the taps. So a linear program
-with some (w, a) is a relaxation: its optimum is a lower bound on what any design can reach. The taps that it returns
-are swept over the bands, and where they break the bound the plane (w, a = arg R(w)) that cuts them off is added.
-Bound and sweep close in on the optimum from both sides, and the search ends when they meet.
+is equivalent to ``Re(e^{-ja} R(w)) <= v`` for every direction a, which is linear in the taps. So a linear program
+with some (w, a) is a relaxation: its optimum is a lower bound for any design. Its taps
+are swept over the bands, and where they exceed the bound the cutting plane (w, a = arg R(w)) is added.
+Bound and sweep enclose the optimum, and the search ends when they meet.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from shapegcode._core import DesignError
 from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import ModeBand
 
-# Tolerance and presolve: now and then the solver gives up, or goes round in circles, at the first of them.
+# Tolerance and presolve: occasionally the solver fails or cycles with the first of them.
 _WAYS = ((1e-10, False), (1e-9, True), (1e-9, False), (1e-8, True), (1e-7, True), (1e-7, False))
-_MOST_PIVOTS = 20  # per unknown and condition; some 1 is usual
+_MOST_PIVOTS = 20  # per unknown and condition; about 1 is usual
 
 
 class _Quiet(highspy.Highs):
-    """HiGHS without its callbacks: nobody listens, they take as long as a small program, and 1.16 prints a notice."""
+    """HiGHS without callbacks: they take as long as a small program, and 1.16 prints a notice."""
 
     def __init__(self) -> None:
         super(highspy.Highs, self).__init__()
@@ -37,12 +37,12 @@ class _Quiet(highspy.Highs):
 
 
 _FREE: list[_Quiet] = []
-"""Solvers whose program is no longer needed: a new one takes a third of the time of a small program."""
+"""Free solvers for reuse: creating one takes a third of the time of a small program."""
 
 
 def _solver() -> _Quiet:
     try:
-        return _FREE.pop()  # in one step: another thread may take the last one
+        return _FREE.pop()  # atomic: another thread may take the last one
     except IndexError:
         return _Quiet()
 
@@ -53,7 +53,7 @@ def _give_back(solver: _Quiet) -> None:
 
 
 class LinearProgram:
-    """Least ``cost @ x`` over x between two bounds, under linear conditions that may be added to."""
+    """Minimises ``cost @ x`` between bounds, under linear constraints that can be added."""
 
     def __init__(self, lower: FloatArray, upper: FloatArray, equal: tuple[FloatArray, FloatArray]) -> None:
         """Bounds of each unknown, (n,); matrix and right-hand side of the equations."""
@@ -81,10 +81,10 @@ class LinearProgram:
         self._solver.changeColBounds(column, lower, upper)
 
     def solve(self) -> FloatArray | None:
-        """The least cost."""
+        """Minimise; None if infeasible."""
         pivots = _MOST_PIVOTS * (len(self._columns) + self._rows)
         for attempt, (tolerance, presolve) in enumerate(_WAYS):
-            if attempt:  # from the beginning
+            if attempt:  # restart
                 self._solver.clearSolver()
             if tolerance != self._tolerance or attempt:
                 self._set(
@@ -124,7 +124,7 @@ class LinearProgram:
 
 
 class TapProgram:
-    """Taps of least cost under equations and planes; one unknown more is by how much the planes are exceeded."""
+    """Taps of least cost under equations and planes; an additional unknown is the excess over the planes."""
 
     def __init__(
         self, equal: tuple[FloatArray, FloatArray], *, signed: bool, largest: float = math.inf, last_tap: float = 0.0
@@ -137,7 +137,7 @@ class TapProgram:
         self._program = LinearProgram(least, np.full(matrix.shape[1], largest), (matrix, right))
 
     def add_planes(self, planes: FloatArray, above: FloatArray) -> None:
-        """Planes below their limits, but for the excess."""
+        """Add planes with their limits plus the excess."""
         self._program.add_below(np.hstack([*self._parts(planes), np.full((len(planes), 1), -1.0)]), above)
 
     def limit_magnitudes(self, total: float) -> None:
@@ -145,7 +145,7 @@ class TapProgram:
         self._program.add_below(np.append(np.ones(2 * self._count), 0.0)[None, :], np.array([total]))
 
     def solve(self, cost: FloatArray | None, most: float) -> tuple[FloatArray, float] | None:
-        """Taps of least cost whose excess is at most that; without a cost those of the least excess, and it."""
+        """Taps of least cost with at most that excess, and the excess; without a cost the taps of least excess."""
         objective = np.zeros(self._count) if cost is None else cost
         width = len(objective) * (1 + self._signed)
         self._program.set_cost(np.append(np.resize(objective, width), 1.0 if cost is None else 0.0))
@@ -162,19 +162,19 @@ class TapProgram:
 
 ComplexArray = NDArray[np.complex128]
 SAME_RESIDUAL = 1e-3  # relative gap between the lower bound and the design at which the design counts as optimal
-NO_RESIDUAL = 1e-6  # residual ratio that counts as none: no gap is pursued below it
-_STEP_RAD = 0.1  # of the sweep, seen from the middle of the shaper; the peaks are refined
+NO_RESIDUAL = 1e-6  # residual ratio that counts as zero: no smaller gap is pursued
+_STEP_RAD = 0.1  # sweep step as phase from the middle of the shaper; peaks are refined
 _FEWEST_STEPS = 8
 _MOST_ROUNDS = 60
-_STARTS = 5  # frequencies of a band at which every search begins
-_BOUNDS_SHARE = 0.5  # of the worst residual: a plane that the taps come less close to did not bound them
+_STARTS = 5  # initial frequencies of a band in every search
+_BOUNDS_SHARE = 0.5  # of the worst residual: planes with less were not active
 _SAME_VALUE = 1e-6  # relative
 _BESIDE = np.array([-1.0, 0.0, 1.0])
 _QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * math.pi
 
 
 class Bounds(NamedTuple):
-    """What a search for the least worst residual found."""
+    """Result of a search for the least worst residual."""
 
     taps: FloatArray
     """Best taps at 0, 1 ... periods."""
@@ -186,20 +186,20 @@ class Bounds(NamedTuple):
 
 @dataclass
 class CutPool:
-    """Planes found so far, per band: angular frequency and direction. Good for every duration.
+    """Planes found so far, per band: angular frequency and direction. Valid for every duration.
 
-    Directions are counted from the phase of an impulse in the middle of the shaper, where that of the best design
+    Directions are relative to the phase of an impulse in the middle of the shaper, where that of the best design
     hardly depends on its duration.
     """
 
     omegas: list[list[float]]
     directions: list[list[float]]
     starts: int = 0
-    """Planes of each band that are never taken out."""
+    """Planes of each band that are never removed."""
 
     @classmethod
     def around(cls, bands: Sequence[ModeBand]) -> CutPool:
-        """Four directions at a few frequencies of every band, for a start."""
+        """Start with four directions at a few frequencies of every band."""
         pool = cls([], [], _STARTS * len(_QUARTERS))
         for band in bands:
             low, high = _ends(band)
@@ -231,7 +231,7 @@ class _Band:
         at = np.flatnonzero((size >= padded[:-2]) & (size >= padded[2:]))
         omegas, step = self.omegas[at], self.omegas[1] - self.omegas[0] if len(self.omegas) > 1 else 0.0
         for _ in range(2 if step else 0):
-            # At an end of the band from beside it: a maximum may lie between the end and the frequency next to it.
+            # Include the ends of the band: a maximum may lie between an end and its neighbour.
             centres = _within(omegas, self.low + step, self.high - step)
             three = centres[:, None] + step * _BESIDE
             left, middle, right = (np.abs(self.residual(taps, three.ravel())) ** 2).reshape(-1, 3).T
@@ -250,14 +250,14 @@ class _Band:
 class TapProblem:
     """Taps at 0, 1 ... `last` periods, sum 1, under conditions on their residual over bands."""
 
-    # where the residual is bounded; angular frequencies are swept, the damping ratio is the nominal one
+    # bands of bounded residual; the frequency is swept, the damping ratio is nominal
     bands: Sequence[ModeBand]
     period_s: float  # of the grid, s
     last: int  # number of periods
     equalities: tuple[FloatArray, FloatArray]  # matrix and right-hand side of the linear conditions, the sum among them
     max_abs_sum: float | None  # largest sum of the taps' magnitudes; None: no tap is negative
     pool: CutPool  # planes, shared between problems of different duration
-    last_tap: float = 0.0  # the tap at `last` periods is at least that
+    last_tap: float = 0.0  # least value of the tap at `last` periods
     largest: float = math.inf  # largest magnitude of a tap
     _bands: list[_Band] = field(init=False)
     _rows: list[list[FloatArray]] = field(init=False)
@@ -270,10 +270,10 @@ class TapProblem:
         self._rows = [[] for _ in self.bands]
 
     def least_worst(self, limit: float | None = None) -> Bounds | None:
-        """Taps with the least worst residual, or None; with a limit the search ends once its side is known."""
+        """Taps with the least worst residual, or None; a search with a limit ends once it is met or disproved."""
         best = np.zeros(self.last + 1)
         lower, upper = 0.0, math.inf
-        # far below what is asked for the program would be degenerate, and the solver may go round in circles
+        # far below the limit the program would be degenerate, and the solver may cycle
         floor = 0.5 * NO_RESIDUAL if limit is None else 0.5 * limit
         for _ in range(_MOST_ROUNDS):
             found = self._solve(None, floor)
@@ -295,7 +295,7 @@ class TapProblem:
         )
 
     def cheapest(self, cost: FloatArray, limit: float) -> FloatArray | None:
-        """Taps of least cost (of their magnitudes if signed) with a residual below the limit, or None."""
+        """Taps of least cost (sum of magnitudes if signed) with a residual below the limit, or None."""
         for _ in range(_MOST_ROUNDS):
             found = self._solve(cost, limit)
             if found is None:
@@ -305,7 +305,7 @@ class TapProblem:
         return None
 
     def _add_cuts(self, taps: FloatArray, bound: float) -> float:
-        """Cut off what exceeds the bound; the largest residual over the bands, seen at the last period."""
+        """Add planes where the bound is exceeded; returns the largest residual over the bands."""
         worst = 0.0
         for band, omegas, directions in zip(self._bands, self.pool.omegas, self.pool.directions, strict=True):
             where, values = band.peaks(taps)
@@ -317,7 +317,7 @@ class TapProblem:
         return worst
 
     def _forget(self, taps: FloatArray, worst: float) -> None:
-        """Remove cutting planes that do not bound the result from the pool."""
+        """Remove inactive cutting planes from the pool."""
         self._program = None if self._bands else self._program
         for rows, omegas, directions in zip(self._rows, self.pool.omegas, self.pool.directions, strict=True):
             keep = [
@@ -349,13 +349,13 @@ class TapProblem:
         return self._program
 
     def _solve(self, cost: FloatArray | None, limit: float) -> tuple[FloatArray, float] | None:
-        """The linear program with the planes so far: least cost below the limit, or the least bound above it."""
+        """Solve the linear program with the current planes: least cost within the limit, or the least excess."""
         found = self._with_planes(limit).solve(cost, 0.0)
         return None if found is None else (found[0], found[1] + limit)
 
 
 def _within(values: FloatArray, low: float, high: float) -> FloatArray:
-    """As np.clip, which takes three times as long for a few values."""
+    """Like np.clip, but three times as fast for a few values."""
     return np.asarray(np.minimum(np.maximum(values, low), high))
 
 

@@ -1,4 +1,4 @@
-"""On what a conversion is written: the block period and the shaper on it, chosen for a machine."""
+"""Block period of a conversion and the shaper on its grid, chosen for a machine."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from shapegcode.shaping.bands import (
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.track import MovingMode, ShaperTrack, design_per_axis, design_track, shaper_fir
 
-_ASSUMED_TICK_S = 0.001  # interpolation period where no machine states one
+_ASSUMED_TICK_S = 0.001  # interpolation period without a machine
 _LONGEST_BLOCK_PERIOD_S = 0.02
 _PERIODS_COMPARED = 3
-_FINEST_SHARE = 1.0 / 32.0  # of the fastest mode's period: a finer grid is as good as continuous times
+_FINEST_SHARE = 1.0 / 32.0  # of the fastest mode's period; finer grids are as good as continuous times
 _WHOLE = 1e-6  # interpolation periods
 _ROUNDING = 1e-9  # relative
 
@@ -43,22 +43,22 @@ class BlockPeriodCandidate:
     """One row of the comparison of block periods."""
 
     period_s: float  # block period, s, a whole multiple of the interpolation period
-    shaper: Shaper | None  # best on that grid; None: there is none
-    refusal: str = ""  # why there is none; empty if there is one
-    # largest residual ratio over the modes' bands, proven; None: no shaper, or no mode states a band
+    shaper: Shaper | None  # best on that grid; None: no design
+    refusal: str = ""  # why there is no design; else empty
+    # largest residual ratio over the modes' bands, proven; None: no shaper, or no mode with a band
     worst_residual: float | None = None
-    note: str = ""  # a sentence for the report where the shaper leaves more than the vibration limit; else empty
+    note: str = ""  # a sentence for the report if the shaper exceeds the vibration limit; else empty
 
 
 @dataclass(frozen=True)
 class BlockPeriodChoice:
-    """The chosen block period, its shaper, and what it was chosen from."""
+    """The chosen block period, its shaper, and all candidates."""
 
     period_s: float  # block period, s
     shaper: Shaper  # best on its grid
-    candidates: tuple[BlockPeriodCandidate, ...]  # every period that was tried, ascending, the chosen one among them
-    worst_residual: float | None  # largest residual ratio over the modes' bands, proven; None: no mode states a band
-    note: str  # a sentence for the report where the shaper leaves more than the vibration limit; else empty
+    candidates: tuple[BlockPeriodCandidate, ...]  # every tried period, ascending, including the chosen one
+    worst_residual: float | None  # largest residual ratio over the modes' bands, proven; None: no mode with a band
+    note: str  # a sentence for the report if the shaper exceeds the vibration limit; else empty
 
 
 def choose_block_period(
@@ -69,33 +69,33 @@ def choose_block_period(
     max_duration_s: float = 0.25,
     vibration_limit: float = VIBRATION_LIMIT,
 ) -> BlockPeriodChoice:
-    """Block period on which the shortest non-negative shaper is shortest.
+    """Choose the block period with the shortest non-negative shaper.
 
     Every whole multiple of the interpolation period from the controller's block time up to `max_block_period_s` is
-    tried. The shortest duration wins; among durations within 2 % of it the longest period does, because it writes the
+    tried. The shortest duration wins; within 2 % of it the longest period wins, because it needs the
     fewest blocks.
 
-    A mode without a band is cancelled exactly; where any states one, the shaper leaves at most `vibration_limit`
-    anywhere in the bands. If no period has such a design within `max_duration_s`, the one with the least worst residual
-    of that duration is taken, and `note` of the result says so; among worst residuals within 2 % of each other the
+    A mode without a band is cancelled exactly; if any has a band, the residual ratio is at most `vibration_limit`
+    within the bands. If no period has such a design within `max_duration_s`, the one with the least worst residual
+    of that duration is used, and reported in `note`; among worst residuals within 2 % of each other the
     longest period wins.
 
     Args:
-        modes: to cancel, with or without bands, at least one.
+        modes: modes to cancel, with or without bands, at least one.
         interpolation_period_s: of the controller, s, above 0.
-        block_time_s: what the controller needs for a block, s, at least 0; no block is shorter.
+        block_time_s: shortest time of a block in the controller, s, at least 0.
         max_block_period_s: longest block period, s; the path is sampled once per block.
         max_duration_s: longest shaper, s.
         vibration_limit: largest residual ratio over the bands, above 0 and below 1.
 
     Returns:
-        The period, its shaper, the worst residual over bands, and all candidates. Where modes state bands the contour
-        cost is made least for the chosen one only.
+        The period, its shaper, the worst residual over bands, and all candidates. If modes have bands, the contour
+        cost is minimised only for the chosen one.
 
     Raises:
         ArgumentError: no mode, a value outside its range, or no multiple of the interpolation period in the range.
         DesignError: no candidate has a design: modes without a band cannot be cancelled within `max_duration_s`, or
-            every grid has a frequency of the bands that completes a whole number of cycles per period.
+            in every grid a frequency within the bands aliases to 0 Hz.
 
     Source: this project.
     """
@@ -118,7 +118,7 @@ def choose_block_period(
             return _choice(max(near, key=lambda each: each.period_s), candidates)
     raise DesignError(
         f"no block period from {ms(periods_s[0])} to {ms(periods_s[-1])} in steps of {ms(interpolation_period_s)} has "
-        f"a shaper without negative impulses within {ms(max_duration_s)} for {band_names(bands)}; the first says: "
+        f"a shaper without negative impulses within {ms(max_duration_s)} for {band_names(bands)}; on the first: "
         f"{candidates[0].refusal}"
     )
 
@@ -126,7 +126,7 @@ def choose_block_period(
 def robust_candidate(
     bands: Sequence[ModeBand], period_s: float, max_duration_s: float = 0.25, vibration_limit: float = VIBRATION_LIMIT
 ) -> BlockPeriodCandidate:
-    """What :func:`choose_block_period` would take on one given period."""
+    """The candidate of :func:`choose_block_period` on one period."""
     check_modes_and_times(bands, period_s=period_s, max_duration_s=max_duration_s)
     candidate = _candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=True)
     if candidate.shaper is None and any(band.uncertainty for band in bands):
@@ -172,7 +172,7 @@ def _choice(chosen: BlockPeriodCandidate, candidates: tuple[BlockPeriodCandidate
 def _candidate(
     bands: Sequence[ModeBand], period_s: float, max_duration_s: float, limit: float, *, least_cost: bool = False
 ) -> BlockPeriodCandidate:
-    """The shortest design on a grid, without the search for hints that a refusal by itself would make."""
+    """Shortest design on a grid; a refusal is without the search for hints."""
     if not any(band.uncertainty for band in bands):
         try:
             shaper = shortest_non_negative([band.mode for band in bands], period_s, max_duration_s)
@@ -193,7 +193,7 @@ def _candidate(
 def _fallback(
     refused: BlockPeriodCandidate, bands: Sequence[ModeBand], max_duration_s: float, limit: float
 ) -> BlockPeriodCandidate:
-    """The least worst design of the longest duration, and the sentence that says so; else the refusal as it is."""
+    """The least worst design of the longest duration, with a note; else the unchanged refusal."""
     from shapegcode.shaping.robust import Task, best_within, unreachable
 
     task = Task.checked(bands, refused.period_s)
@@ -217,7 +217,7 @@ def check_block_period(period_s: float, machine: Machine) -> None:
     ticks = period_s / tick_s
     if round(ticks) < 1 or abs(ticks - round(ticks)) > _WHOLE:
         raise ArgumentError(
-            f"block period {period_s * 1e3:g} ms is no whole multiple of the interpolation period {tick_s * 1e3:g} ms"
+            f"block period {period_s * 1e3:g} ms is not a multiple of the interpolation period {tick_s * 1e3:g} ms"
         )
     if period_s < block_time_s * (1.0 - _ROUNDING):
         raise ArgumentError(
@@ -229,7 +229,7 @@ def check_block_period(period_s: float, machine: Machine) -> None:
 def candidate_periods(
     bands: Sequence[ModeBand], machine: Machine | None, max_duration_s: float, vibration_limit: float = 0.05
 ) -> list[float]:
-    """The block periods worth comparing, ascending, s: those on which a non-negative shaper is shortest."""
+    """Block periods to compare, ascending, s: those with the shortest non-negative shapers."""
     from shapegcode.shaping.robust import Task, shortest_below
 
     if machine is not None and machine.emission.block_period_s is not None:
@@ -241,10 +241,10 @@ def candidate_periods(
         tick_s = _ASSUMED_TICK_S * max(1, math.ceil(least_s / _ASSUMED_TICK_S))
     first = max(1, math.ceil(least_s / tick_s - _WHOLE))
     last = max(first + _PERIODS_COMPARED - 1, math.floor(_LONGEST_BLOCK_PERIOD_S / tick_s + _WHOLE))
-    every: list[tuple[float, float]] = []  # duration, and the period with a minus: of equal durations the longer one
+    every: list[tuple[float, float]] = []  # duration and negative period: of equal durations the longer period first
     for multiple in range(first, last + 1):
         period_s = multiple * tick_s
-        # What is longer than the worst of the best so far need not be found.
+        # Shapers longer than the worst of the best so far are not searched.
         longest_s = max_duration_s
         if len(every) >= _PERIODS_COMPARED:
             longest_s = min(longest_s, max(every[_PERIODS_COMPARED - 1][0], (1.0 + SAME) * every[0][0]))
@@ -259,27 +259,27 @@ def candidate_periods(
     return sorted([taken, *others[: _PERIODS_COMPARED - 1]])
 
 
-_STROKES_S = (0.25, 0.4, 0.7)  # at the feed: how a ripple meets a mode's own motion depends on the length
+_STROKES_S = (0.25, 0.4, 0.7)  # moves at the feed: the phase of ripple and a mode's vibration depends on the length
 
 
 @dataclass(frozen=True)
 class Grid:
-    """On what a conversion is written: block period and the shaper on it."""
+    """Grid of a conversion: block period and shaper."""
 
     block_period_s: float  # T_B
     shaper: _core.Shaper  # the design, times on the block grid
-    fir: _core.Fir  # the same in whole block periods
+    fir: _core.Fir  # as a filter in whole block periods
     # shapers along an axis, used instead where its position is known; None: no mode varies with position
     track: ShaperTrack | None = None
     family: str = ""  # name of the design's row in the registry of families
-    note: str = ""  # what a user should know of the choice; empty: nothing
+    note: str = ""  # remark on the choice for the user; may be empty
     # a shaper for each of X, Y, Z in whole block periods, used instead; empty: the one for all
     axis_firs: tuple[_core.Fir, ...] = ()
-    per_axis_duration_s: float | None = None  # how long such shapers would be, s; None: not looked for, or not shorter
+    per_axis_duration_s: float | None = None  # duration of shapers per axis, s; None: not searched, or not shorter
 
     @property
     def shapers(self) -> tuple[_core.Shaper, ...]:
-        """All shapers that may act."""
+        """All shapers that may be used."""
         return (self.shaper, *(node.shaper for node in (self.track.nodes if self.track else ())))
 
     @property
@@ -293,27 +293,27 @@ class Grid:
 def make_grid(
     block_period_s: float, shaper: _core.Shaper, track: ShaperTrack | None = None, *, family: str = "", note: str = ""
 ) -> Grid:
-    """Grid of a shaper whose times are whole block periods, and of shapers that follow an axis."""
+    """Make the grid of a shaper in whole block periods, and of shapers that follow an axis."""
     return Grid(block_period_s, shaper, shaper_fir(shaper, block_period_s), track, family, note)
 
 
 def choose_grid(
     machine: Machine | str | Path, block_period_s: float | None = None, *, fastest_mm_per_s: float | None = None
 ) -> Grid:
-    """Block period and shaper for all modes of a machine, and shapers that follow moving modes.
+    """Choose block period and shaper for all modes of a machine, and shapers that follow moving modes.
 
-    With `shaping.family` = "auto" the shortest shaper without negative impulses that leaves at most
-    `shaping.vibration_limit` of the vibration anywhere in the modes' stated bands; exact where no band is stated. With
+    With `shaping.family` = "auto" the shortest shaper without negative impulses with at most
+    `shaping.vibration_limit` residual ratio within the modes' stated bands; exact without a band. With
     a named family its shortest one. An override-tolerant program (`Machine.bears_override`) gets the
     period that suits other feed overrides, see `best_for_overrides`.
 
     Args:
         machine: modes and controller.
-        block_period_s: a period to use; None: `emission.block_period_s`, or the best one.
-        fastest_mm_per_s: the fastest feed that is programmed; None: the slowest of the axes' largest feeds.
+        block_period_s: the period to use; None: `emission.block_period_s`, or the best one.
+        fastest_mm_per_s: fastest programmed feed; None: the slowest of the axes' largest feeds.
 
     Returns:
-        The grid: block period, shaper for all axes, shapers for stretches of the moving axis.
+        The grid: block period, shaper for all axes, shapers along the followed axis.
 
     Raises:
         DesignError: no shaper exists within `shaping.max_duration_s`.
@@ -350,14 +350,14 @@ def choose_grid(
             period = best_for_overrides(designs, machine, feed)
     if period is not None:
         best = robust_candidate(bands, period, shaping.max_duration_s, shaping.vibration_limit)
-    assert best.shaper is not None  # what is chosen exists
+    assert best.shaper is not None  # a chosen candidate has a shaper
     track = None if moving_axis(machine) is None else shaper_track(machine, best.period_s)
     grid = make_grid(best.period_s, best.shaper, track, family=family, note=best.note)
     return _per_axis(grid, machine, exact=family == "non-negative")
 
 
 def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
-    """The grid with a shaper for each axis where the machine file asks for it, or with a note of its duration."""
+    """Add a shaper for each axis if the machine file requests it; else note its duration."""
     wanted = machine.shaping.per_axis
     possible = exact and grid.track is None and machine.shaping.contour != "off"
     if not possible:
@@ -373,7 +373,7 @@ def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
         if wanted:
             raise _core.DesignError(
                 f"no shapers of equal mean delay for each axis within {longest * 1e3:g} ms on a "
-                f"{grid.block_period_s * 1e3:g} ms grid; the one for all axes lasts {grid.shaper.duration_s * 1e3:g} ms"
+                f"{grid.block_period_s * 1e3:g} ms grid; the one for all axes takes {grid.shaper.duration_s * 1e3:g} ms"
             )
         return grid
     if wanted:
@@ -385,7 +385,7 @@ def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
 def _of_family(
     name: str, bands: list[ModeBand], machine: Machine, period_s: float | None, feed_mm_per_s: float
 ) -> Grid:
-    """The shortest shaper of a family, on one grid or on the one on which it is shortest."""
+    """Shortest shaper of a family, on one grid or on the best grid."""
     from shapegcode.shaping.registry import design
 
     shaping = machine.shaping
@@ -407,14 +407,14 @@ def _of_family(
     note = ""
     if best.worst_residual > shaping.vibration_limit:
         note = (
-            f"the {name} shaper leaves up to {best.worst_residual:.1%} of the vibration within the modes' bands, "
+            f"the {name} shaper has a residual of up to {best.worst_residual:.1%} within the modes' bands, "
             f"shaping.vibration_limit is {shaping.vibration_limit:.1%}"
         )
     return make_grid(period, best.shaper, family=name, note=note)
 
 
 def shaper_track(machine: Machine, period_s: float) -> ShaperTrack:
-    """Shapers for all modes of a machine along the axis over which some of them vary."""
+    """Design shapers for all modes of a machine along the axis with which some of them vary."""
     axis = moving_axis(machine)
     if axis is None:
         raise _core.ArgumentError("no mode of the machine file varies with the position of an axis (frequency_over)")
@@ -431,7 +431,7 @@ def shaper_track(machine: Machine, period_s: float) -> ShaperTrack:
 def override_vibration_um(
     block_period_s: float, shaper: _core.Shaper, model: MachineModel, feed_mm_per_s: float
 ) -> float:
-    """Largest residual vibration of straight moves in equal blocks, over the feed overrides."""
+    """Largest residual vibration of straight moves in equal blocks over the feed overrides, µm."""
     moves = np.array([float(bool(modes)) for modes in excited_modes(model.machine)])
     speed = feed_mm_per_s * math.sqrt(moves.sum())
     fir = shaper_fir(shaper, block_period_s)
@@ -454,7 +454,7 @@ def override_vibration_um(
 
 
 def best_for_overrides(designs: Iterable[tuple[float, _core.Shaper]], machine: Machine, feed_mm_per_s: float) -> float:
-    """The period of least duration times vibration at other overrides, which counts as the residual floor at least."""
+    """Period with the least duration × vibration at other overrides (vibration at least the residual floor)."""
     model = MachineModel(machine)
     floor_um = max(machine.tolerance.residual_floor_um, 1e-3)
 

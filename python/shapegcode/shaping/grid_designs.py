@@ -1,8 +1,8 @@
-"""Shapers on a sample grid: what defines a family, imposed exactly there, and the shortest taps that meet it.
+"""Shapers on a sample grid: the defining conditions of a family are imposed there, and met by the shortest taps.
 
-Rounding the times of a continuous design to a grid undoes its zeros. So a family is taken here by the
-conditions that define it, and the shortest taps on the grid that meet them are looked for: zeros, with their
-multiplicity, hold at ``z = e^{s*period}`` to rounding; a tolerated residual holds over its whole band, proven by
+Rounding the times of a continuous design to a grid destroys its zeros. So a family is given here by its
+defining conditions, and the shortest taps on the grid that meet them are searched: zeros, with their
+multiplicity, are at ``z = e^{s*period}`` to rounding; a residual limit is met over its whole band, proven by
 :func:`shapegcode._core.worst_residual`. A zero is linear in the taps; limits on the residual: see `cutting_planes`.
 """
 
@@ -31,23 +31,23 @@ from shapegcode.shaping.bands import (
 )
 from shapegcode.shaping.cutting_planes import NO_RESIDUAL, SAME_RESIDUAL, CutPool, TapProblem
 
-RESIDUAL_LIMIT = 1e-10  # largest residual ratio of a design that is handed out; the usual one is 1e-16 to 1e-15
+RESIDUAL_LIMIT = 1e-10  # largest residual ratio of a returned design; usual values are 1e-16 to 1e-15
 
-_SAME_CONDITION = 1e-13  # relative singular value below which two modes ask for the same thing on this grid
-_SUPPORT_THRESHOLDS = (1e-9, 1e-7, 1e-13)  # magnitudes above one of these are taps
-_SAME_OBJECTIVE = 1e-9  # of the squared duration
-_LONGER = 4  # times the longest duration: how far a refusal looks for what would do
+_SAME_CONDITION = 1e-13  # relative singular value below which two modes' conditions coincide on this grid
+_SUPPORT_THRESHOLDS = (1e-9, 1e-7, 1e-13)  # smaller magnitudes are no taps; tried in order
+_SAME_OBJECTIVE = 1e-9  # relative to the squared duration
+_LONGER = 4  # times the longest duration: range in which a refusal searches a sufficient duration
 _HINT_PERIODS = 400  # longest grid that a refusal searches, periods
 
 
 def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s: float = 0.25) -> Shaper:
-    """Shortest shaper with non-negative impulses on a grid that cancels every mode exactly there.
+    """Design the shortest non-negative shaper on a grid with zero residual at every mode.
 
     The number of periods is the smallest for which the conditions (sum 1, both parts of each mode's sum zero)
     have a non-negative solution. Among the solutions of that duration the one with the least second central
-    moment, the contour cost, is taken: exactly, not only against a fixed centre. Modes that ask for the same
-    thing on this grid (equal ones, or aliases of one another) count once. The taps of the optimiser are
-    solved again in full precision and checked.
+    moment, the contour cost, is chosen, with the true centre, not a fixed one. Modes with the same
+    conditions on this grid (equal ones, or aliases of one another) count once. The optimiser's taps are
+    re-solved in full precision and checked.
 
     Args:
         modes: Modes to cancel, at least one; one above the grid's Nyquist frequency is fine.
@@ -60,7 +60,7 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
 
     Raises:
         ArgumentError: No mode, or a period or duration that is not finite and positive.
-        DesignError: No such shaper within `max_duration_s`; the message tells what the polynomial would be.
+        DesignError: No such shaper within `max_duration_s`; the message describes the polynomial design.
 
     Source: this project.
     """
@@ -73,7 +73,7 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
 
 
 def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: float, *, title: str) -> Shaper:
-    """Shortest shaper with taps at multiples of a period that meets the conditions.
+    """Design the shortest shaper with taps at multiples of a period that meets the conditions.
 
     Among the shapers of the shortest duration, one without negative impulses has the least second central moment (the
     contour cost; under a limit to 0.1 %), one with them the least sum of magnitudes.
@@ -91,27 +91,27 @@ def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: fl
     if further > most:
         longer = search.shortest(further)
         if longer is not None:
-            raise DesignError(f"{text}; the shortest lasts {ms(longer.duration_s)}")
+            raise DesignError(f"{text}; the shortest takes {ms(longer.duration_s)}")
         text += f", nor within {ms(further * period_s)}"
     raise DesignError(f"{text}; {_polynomial(conditions, period_s)}; try another period")
 
 
 def _polynomial(conditions: Conditions, period_s: float) -> str:
     if not conditions.zeros:
-        return "there is no zero from which a polynomial could be made"
+        return "without zeros there is no polynomial design"
     try:
         shaper = Shaper([0.0], [1.0])
         for zero in conditions.zeros:
             for _ in range(zero.multiplicity):
                 shaper = _core.convolve(shaper, grid_polynomial([zero.mode], period_s))
     except ShapegcodeError as error:
-        return f"nor is there a polynomial: {error}"
-    return f"the polynomial with its zeros lasts {ms(shaper.duration_s)} with sum|a| {shaper.abs_sum:.4g}"
+        return f"nor is there a polynomial design: {error}"
+    return f"the polynomial with its zeros takes {ms(shaper.duration_s)} with sum|a| {shaper.abs_sum:.4g}"
 
 
 @dataclass(frozen=True)
 class Zero:
-    """A mode of which nothing may be left: `multiplicity` - 1 derivatives of the residual vanish with it."""
+    """A mode with zero residual, and zero derivatives of the residual up to order `multiplicity` - 1."""
 
     mode: _core.Mode
     multiplicity: int = 1
@@ -119,16 +119,16 @@ class Zero:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What a shaper must satisfy."""
+    """Conditions on a shaper."""
 
     zeros: tuple[Zero, ...] = ()  # met to rounding
-    bands: tuple[ModeBand, ...] = ()  # over which no more than the limit is left
-    limit: float = NO_RESIDUAL  # residual ratio
+    bands: tuple[ModeBand, ...] = ()  # bands in which the residual is limited
+    limit: float = NO_RESIDUAL  # residual ratio within `bands`
     largest_tap: float | None = None  # None: no tap is negative; else: the largest magnitude of a tap, either sign
 
 
 class _GridSearch:
-    """The linear programs of one set of conditions; the planes that were found are good for every duration."""
+    """The linear programs of one set of conditions; the planes found are valid for every duration."""
 
     def __init__(self, conditions: Conditions, period_s: float) -> None:
         self._conditions, self._period_s = conditions, period_s
@@ -141,10 +141,10 @@ class _GridSearch:
         cycles_s = cycles_s or sum(1.0 / band.mode.frequency_hz for band in self._conditions.bands)
         start = max(1, math.ceil(cycles_s / self._period_s))
         too_few = 0
-        if self._conditions.largest_tap is None:  # within less than half a cycle positive impulses do not cancel
+        if self._conditions.largest_tap is None:  # positive impulses cannot cancel within less than half a cycle
             half_cycles_s = (0.5 / zero.mode.frequency_hz for zero in self._conditions.zeros)
             too_few = max((math.ceil(each / self._period_s - 1e-9) - 1 for each in half_cycles_s), default=0)
-        # A solution stays one with further taps at zero.
+        # Further zero taps keep a solution valid.
         last = smallest_enough(lambda last: self._feasible(self._problem(last)) is not None, start, most, too_few)
         while last is not None and last <= most:
             problem = self._problem(last)
@@ -152,7 +152,7 @@ class _GridSearch:
                 shaper = polished(taps, problem.equalities, self._period_s, threshold, self._conditions.largest_tap)
                 if shaper is not None and self._meets(shaper):
                     return shaper
-            last += 1  # what the linear program took for feasible was so within its tolerance only
+            last += 1  # the linear program was feasible only within its tolerance
         return None
 
     def _problem(self, last: int) -> TapProblem:
@@ -172,7 +172,7 @@ class _GridSearch:
         feasible = self._feasible(problem)
         if feasible is None:
             return
-        inner = (1.0 - 0.4 * SAME_RESIDUAL) * self._conditions.limit  # room for the gap of the planes and for the proof
+        inner = (1.0 - 0.4 * SAME_RESIDUAL) * self._conditions.limit  # margin for the gap of the planes and the proof
 
         def cheapest(cost: FloatArray) -> FloatArray | None:
             with suppress(DesignError):
@@ -222,7 +222,7 @@ def smallest_enough(
     is_enough: Callable[[int], bool], start: int, most: int, too_few: int = 0, *, growth: float = 2.0,
     precision: float = 0.0,
 ) -> int | None:  # fmt: skip
-    """The smallest number that is enough, to a relative precision: growing, then halving; None: it exceeds `most`."""
+    """Smallest sufficient number, to a relative precision, by growing, then bisection; None: above `most`."""
     enough = min(most, start)
     while enough < most and not is_enough(enough):
         too_few, enough = enough, max(enough + 1, math.ceil(growth * enough))
@@ -233,7 +233,7 @@ def smallest_enough(
 
 
 def halved(is_enough: Callable[[int], bool], too_few: int, enough: int, precision: float = 0.0) -> int:
-    """The smallest number that is enough, by halving; to a relative precision it may exceed the smallest."""
+    """Smallest sufficient number by bisection, to a relative precision."""
     while enough - too_few > max(1, math.floor(precision * enough)):
         middle = (too_few + enough) // 2
         if is_enough(middle):
@@ -244,20 +244,20 @@ def halved(is_enough: Callable[[int], bool], too_few: int, enough: int, precisio
 
 
 def refined(columns: FloatArray, right: FloatArray, taps: FloatArray) -> FloatArray:
-    """Taps that meet ``columns @ taps == right`` to rounding, from such that nearly do."""
-    for _ in range(3):  # the second removes what the first one's rounding left, the third nothing
+    """Refine taps to meet ``columns @ taps == right`` to rounding."""
+    for _ in range(3):  # the second removes the first one's rounding error, the third has no effect
         taps = taps + np.linalg.lstsq(columns, right - columns @ taps, rcond=1e-14)[0]
     return taps
 
 
 class _Corner(NamedTuple):
-    """Taps at the lower edge of what their first two moments can be, and the slope of a line that supports it there."""
+    """Taps on the lower boundary of the feasible first two moments, and the slope of the supporting line there."""
 
     taps: FloatArray
     mean: float
     second: float
     slope: float | None
-    """None: the edge ends here, the line is vertical."""
+    """None: the boundary ends here with a vertical line."""
 
     @property
     def variance(self) -> float:
@@ -267,11 +267,11 @@ class _Corner(NamedTuple):
 def lower_hull(
     cheapest: Callable[[FloatArray], FloatArray | None], last: int, tolerance: float = 0.0
 ) -> list[FloatArray]:
-    """Taps among which the second central moment is least: corners of the lower edge of the first two moments.
+    """Candidates for the least second central moment: corners of the lower boundary of the first two moments.
 
     The second central moment is concave in the taps, so no convex program minimises it; but it is least at one of
-    these corners, and each of them has the least of a linear cost. Stretches of the edge where the supporting lines
-    of their ends prove that nothing better lies are left out.
+    these corners, each of which minimises a linear cost. Parts of the boundary where the supporting lines
+    at their ends exclude a better solution are skipped.
     """
     time = np.arange(last + 1) / last
     moments = np.vstack([time, time**2])
@@ -305,7 +305,7 @@ def lower_hull(
 
 
 def _least_between(left: _Corner, right: _Corner) -> float:
-    """Lower bound on the second central moment between two corners, from the lines that support the edge there."""
+    """Lower bound on the second central moment between two corners, from their supporting lines."""
     if left.slope is None or right.slope is None or right.slope - left.slope <= _SAME_OBJECTIVE:
         return -math.inf
     rise = right.second - left.second + left.slope * left.mean - right.slope * right.mean
@@ -318,9 +318,9 @@ def polished(
     taps: FloatArray, conditions: tuple[FloatArray, FloatArray], period_s: float, threshold: float,
     largest: float | None = None,
 ) -> Shaper | None:  # fmt: skip
-    """Taps above a threshold, solved again to rounding; None if they then miss a condition or change their sign.
+    """Re-solve the taps above a threshold to rounding; None if they then miss a condition or change sign.
 
-    Without a largest magnitude no tap is negative; taps of that magnitude stay.
+    Without a largest magnitude no tap is negative; taps at that magnitude are kept.
     """
     matrix, right = conditions
     support = np.flatnonzero(np.abs(taps) > threshold)
@@ -338,9 +338,9 @@ def polished(
 def _none_exists(modes: Sequence[Mode], period_s: float, max_duration_s: float) -> str:
     try:
         polynomial = grid_polynomial(modes, period_s)
-        what_exists = f"the shortest polynomial lasts {ms(polynomial.duration_s)} with sum|a| {polynomial.abs_sum:.4g}"
+        what_exists = f"the shortest polynomial takes {ms(polynomial.duration_s)} with sum|a| {polynomial.abs_sum:.4g}"
     except ShapegcodeError as error:
-        what_exists = f"nor is there a polynomial: {error}"
+        what_exists = f"nor is there a polynomial design: {error}"
     return (
         f"no non-negative design within {ms(max_duration_s)} on a {ms(period_s)} grid for modes "
         f"{mode_names(modes)}; {what_exists}; try another period"

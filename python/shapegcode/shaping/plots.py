@@ -1,4 +1,4 @@
-"""The pictures of ``shapegcode shaper``: what the designs cost, what they leave, and what they do to a step."""
+"""The pictures of ``shapegcode shaper``: duration, residual, impulses and step response of the designs."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 _CURVES = 6
 _LEAST_RATIO = 1.02
 _RATIO_STEP = 0.02
-_BRANCH_SWINGS = 1.0  # of the slower mode: minimal shapers of interest are shorter
+_BRANCH_SWINGS = 1.0  # cycles of the slower mode: longer minimal shapers are of no interest
 _FREQUENCIES = 601
 _PERIODS_IN_DURATION = 2.0
 _SAMPLES_OF_A_STEP = 3000
-_SWINGS_SHOWN = 3.0  # of the slowest mode, behind the longest shaper
+_SWINGS_SHOWN = 3.0  # cycles of the slowest mode after the longest shaper
 Shapers = Recommendation | Shaper | Mapping[str, Shaper]
 
 
 def plots_of(result: Recommendation) -> dict[str, Plot]:
-    """Its pictures by name; the branches only for two modes that have some."""
+    """Pictures by name; branches only for two modes with minimal shapers."""
     found: dict[str, Plot] = {
         "shaper-pareto": partial(plot_pareto, result),
         "shaper-sensitivity": partial(plot_sensitivity, result),
@@ -45,7 +45,7 @@ def plots_of(result: Recommendation) -> dict[str, Plot]:
 
 
 def selected(result: Recommendation) -> list[Design]:
-    """The designs worth a curve: what is recommended, then one of each family, those on the Pareto front first."""
+    """Designs to draw: the recommended one, then one of each family, those on the Pareto front first."""
     indices = list(dict.fromkeys(each for each in (result.recommended, result.recommended_on_grid) if each is not None))
     negative = result.allow_negative or result.design.negative
     shown = [index for index in result.shown() if negative or not result.designs[index].negative]
@@ -71,7 +71,7 @@ def _taps(each: Design) -> tuple[float, ...]:
 def _shapers_and_bands(
     result: Shapers, modes: Sequence[float | str | Mode | ModeBand]
 ) -> tuple[Mapping[str, Shaper], Sequence[ModeBand]]:
-    """Shapers by their names in a legend: those of a comparison that are worth a curve; and the modes."""
+    """Shapers to draw by name in the legend, and the modes."""
     if isinstance(result, Recommendation):
         shapers = {
             f"{each.family}, {each.duration_s * 1e3:.4g} ms"
@@ -85,11 +85,11 @@ def _shapers_and_bands(
 def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
     """What does less vibration cost? Worst residual and contour cost over duration.
 
-    Designs on the Pareto front are filled, what is recommended is ringed.
+    Designs on the Pareto front are filled, the recommended one is ringed.
 
     Args:
         result: the comparison.
-        ax: whose place is divided; None: a new figure.
+        ax: axes to divide; None: a new figure.
 
     Returns:
         The upper panel.
@@ -138,18 +138,18 @@ def plot_sensitivity(
 
     Args:
         result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, or shapers by name.
-        modes: of shapers, to be marked: as `choose_shaper` takes them; empty: undamped, up to two periods per shaper
+        modes: to mark, for shapers: as `choose_shaper` takes them; empty: undamped, up to two periods per shaper
             duration.
         ax: where to draw; None: a new figure.
 
     Returns:
-        The axes that were drawn into.
+        The axes of the plot.
     """
     shapers, bands = _shapers_and_bands(result, modes)
     vibration_limit = result.vibration_limit if isinstance(result, Recommendation) else None
     panel = plot.axes(ax, size_inch=(9.0, 5.4), title="Residual vibration at other frequencies")
     panel.text(
-        1.0, 1.01, "a curve that comes down to 0 turns there: an amplitude has no sign", ha="right", fontsize=8,
+        1.0, 1.01, "curves turn at 0, as an amplitude has no sign", ha="right", fontsize=8,
         color="#555555", transform=panel.transAxes,
     )  # fmt: skip
     longest_s = max(shaper.duration_s for shaper in shapers.values())
@@ -186,11 +186,11 @@ def plot_sensitivity(
 
 
 def plot_impulses(result: Shapers, ax: Axes | None = None) -> Axes:
-    """Which impulses have they? One panel for each shaper.
+    """Plot the impulses, one panel for each shaper.
 
     Args:
         result: a comparison (one panel for each of `selected`), a shaper, or shapers by name.
-        ax: whose place is divided; None: a new figure.
+        ax: axes to divide; None: a new figure.
 
     Returns:
         The upper panel.
@@ -210,12 +210,12 @@ def plot_impulses(result: Shapers, ax: Axes | None = None) -> Axes:
 
 
 def plot_steps(result: Shapers, ax: Axes | None = None, *, modes: Sequence[float | str | Mode | ModeBand] = ()) -> Axes:
-    """What becomes of a unit step (the staircase), and how do the modes follow? Grey: unshaped.
+    """Plot a shaped unit step (staircase) and the response of the modes. Grey: unshaped.
 
     Args:
         result: a comparison (one curve for each of `selected`), a shaper, or shapers by name.
-        modes: that follow shapers, at least one: as `choose_shaper` takes them.
-        ax: whose place is divided; None: a new figure.
+        modes: modes that respond, for shapers, at least one: as `choose_shaper` takes them.
+        ax: axes to divide; None: a new figure.
 
     Returns:
         The upper panel.
@@ -233,7 +233,7 @@ def plot_steps(result: Shapers, ax: Axes | None = None, *, modes: Sequence[float
     unit, scale = _time_unit(until_s)
     panels = plot.column(
         ax, 1 + len(nominal), size_inch=(9.0, 2.2 + 1.9 * (1 + len(nominal))),
-        title="A step behind each shaper, and how the modes follow (grey: unshaped)",
+        title="Step after each shaper, and response of the modes (grey: unshaped)",
     )  # fmt: skip
     curves = [("", Shaper([0.0], [1.0]), plot.GREY)]
     for number, (label, shaper) in enumerate(shapers.items()):
@@ -257,21 +257,21 @@ def plot_steps(result: Shapers, ax: Axes | None = None, *, modes: Sequence[float
 
 
 def plot_branches(result: Recommendation, ax: Axes | None = None) -> Axes:
-    """How long are the minimal shapers if the faster of two modes is another one?
+    """Plot the duration of minimal shapers over the frequency of the faster of two modes.
 
     Args:
         result: a comparison for two modes.
         ax: where to draw; None: a new figure.
 
     Returns:
-        The axes that were drawn into.
+        The axes of the plot.
 
     Raises:
         ValueError: another number of modes, or no minimal shaper within the longest duration.
     """
     branches = _branches(result)
     if branches is None:
-        raise ValueError(f"{len(result.modes)} modes have no branches to draw: there are some of two")
+        raise ValueError(f"{len(result.modes)} modes have no branches: branches exist for two modes")
     return _draw_branches(branches, result, ax)
 
 
@@ -295,21 +295,21 @@ def _draw_branches(branches: MinimalBranches, result: Recommendation, ax: Axes |
 
 
 def _branches(result: Recommendation) -> MinimalBranches | None:
-    """All minimal shapers of two modes around their ratio, the slower one held; None for another number of modes."""
+    """All minimal shapers of two modes around their ratio, the slower one fixed; None for another number of modes."""
     if len(result.modes) != 2:
         return None
     slow, fast = sorted((band.mode for band in result.modes), key=lambda mode: mode.frequency_hz)
     ratio = fast.frequency_hz / slow.frequency_hz
     lowest = max(_LEAST_RATIO, 0.6 * ratio)
     ratios = np.arange(lowest, max(1.4 * ratio, lowest + 0.2), _RATIO_STEP)
-    # No more than the search takes at the largest ratio, and not more curves than one can tell apart.
+    # Limited by the search at the largest ratio, and by the number of curves that can be distinguished.
     longest_s = min(result.max_duration_s, _BRANCH_SWINGS / slow.frequency_hz, 99.0 / (ratios[-1] * slow.frequency_hz))
     branches = minimal_branches(slow, fast.damping_ratio, ratios.tolist(), longest_s)
     return branches if np.isfinite(branches.times_s).any() else None
 
 
 def residual_curve(shaper: Shaper, frequencies_hz: FloatArray, modes: Sequence[Mode]) -> FloatArray:
-    """Residual ratio over frequency, with the damping ratios of the modes and between them what lies between."""
+    """Residual ratio over frequency, with the damping ratio interpolated between the modes."""
     known = sorted((mode.frequency_hz, mode.damping_ratio) for mode in modes) or [(0.0, 0.0)]
     damping = np.interp(frequencies_hz, [frequency for frequency, _ in known], [ratio for _, ratio in known])
     return np.asarray(shaper.residual(frequencies_hz, damping))
@@ -320,9 +320,9 @@ def _time_unit(longest_s: float) -> tuple[str, float]:
 
 
 def shaped_step(shaper: _core.Shaper, period_s: float, until_s: float) -> FloatArray:
-    """A unit step behind a shaper: the staircase of its impulses at 0, one period, ... at least `until_s`.
+    """Shaped unit step: staircase of the impulses at 0, one period, ... up to at least `until_s`.
 
-    All is one period late, so that the first sample is at rest. An impulse between two samples is shared by both so
+    Delayed by one period, so that the first sample is at rest. An impulse between two samples is split between them so
     that its time is kept; its step takes two periods.
     """
     times_s = np.arange(round(until_s / period_s) + 2) * period_s

@@ -1,4 +1,4 @@
-"""The families of shapers: one row each, with its source and where it is valid."""
+"""The families of shapers: one row each, with source and validity."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.robust import minimax_robust
 
 _SAME_POLE = 1e-9  # relative
-_SLACK = 1e-9  # of a limit: forgives rounding
+_SLACK = 1e-9  # tolerance of a limit, for rounding
 
 
 @dataclass(frozen=True)
 class Family:
     """A row of the registry."""
 
-    name: str  # short name, as it is typed and as it stands in reports
-    title: str  # what people call it
-    source: str  # where it comes from; in full in docs/evidence/references.md
-    validity: str  # for which modes and on which times it exists, and what it does not do
+    name: str  # short name, as in options and reports
+    title: str  # full name
+    source: str  # source; in full in docs/evidence/references.md
+    validity: str  # modes and times for which it exists, and its limits
     continuous: bool  # whether it can be designed at continuous times
     on_grid: bool  # whether it can be designed on a grid
-    # all shapers of the family for the bands, the preferred one first; raises DesignError, which says what is nearest,
-    # if there is none
+    # all shapers of the family for the bands, preferred one first; raises DesignError, which names the nearest design,
+    # if none exists
     solve: Callable[[Sequence[ModeBand], DesignOptions], Sequence[Shaper]]
 
 
@@ -41,7 +41,7 @@ def _shortest_non_negative(bands: Sequence[ModeBand], options: DesignOptions) ->
 def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
     if not any(band.uncertainty for band in bands):
         raise DesignError(
-            f"no mode states a band to design for (of those in a machine file, up to {NARROW_PERCENT:g} % are taken as "
+            f"no mode has a band to design for (those in a machine file up to {NARROW_PERCENT:g} % count as "
             "exact): a robust design is the non-negative one"
         )
     return _mirrored(bands, options, mirrored=False)
@@ -81,22 +81,22 @@ FAMILIES: tuple[Family, ...] = (
     ),
     Family(
         "ei", "extra-insensitive, one hump", "Singhose, Seering and Singer 1994; damped: this project",
-        "modes damped up to some .7; leaves the vibration limit at the nominal frequency", True, True,
+        "modes damped up to about 0.7; residual at the vibration limit at the nominal frequency", True, True,
         solvers.hump_ei("EI", 1),
     ),
     Family(
         "ei2", "extra-insensitive, two humps", "Singhose, Porter, Tuttle and Singer 1997; damped: this project",
-        "modes damped up to some .45; zero at the nominal frequency, the vibration limit on both sides", True, True,
+        "modes damped up to about 0.45; zero at the nominal frequency, the vibration limit on both sides", True, True,
         solvers.hump_ei("two-hump EI", 2),
     ),
     Family(
         "ei3", "extra-insensitive, three humps", "Singhose, Porter, Tuttle and Singer 1997; damped: this project",
-        "modes damped up to some .3; leaves the vibration limit at the nominal frequency", True, True,
+        "modes damped up to about 0.3; residual at the vibration limit at the nominal frequency", True, True,
         solvers.hump_ei("three-hump EI", 3),
     ),
     Family(
         "si", "specified insensitivity", "Singhose, Seering and Singer 1996; linear programs: this project",
-        "any modes with their bands, all at once; leaves up to the vibration limit; without a grid its times lie "
+        "any modes with their bands, all at once; residual up to the vibration limit; without a grid its times are "
         "1/64 of the fastest period apart", True, True, solvers.specified,
     ),
     Family(
@@ -110,7 +110,7 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "minimal", "one impulse more than modes",
         "Park, Hong and Danielson 2009 (paper 002), eq. 4-17; searches of this project",
-        "one to six modes, damped or not, at continuous times (on a grid the polynomial stands for it); exact at the "
+        "one to six modes, damped or not, at continuous times (on a grid replaced by the polynomial); exact at the "
         "nominal frequencies only; impulses may be negative", True, False, solvers.solve_minimal,
     ),
     Family(
@@ -127,7 +127,7 @@ FAMILIES: tuple[Family, ...] = (
         "modes with a band; one without is cancelled exactly; no impulse is negative", False, True, _robust,
     ),
     Family(
-        "mirrored", "the same read backwards: a contour comes out alike in both directions", "this project",
+        "mirrored", "robust and symmetric in time: equal contours in both directions", "this project",
         "modes with a band or without one, which is cancelled exactly; no impulse is negative; longer than robust",
         False, True, _mirrored,
     ),
@@ -165,15 +165,15 @@ FAMILIES: tuple[Family, ...] = (
 
 
 def family_named(name: str) -> Family:
-    """The row of that name."""
+    """Find a family by name."""
     rows = {row.name: row for row in FAMILIES}
     if name not in rows:
-        raise ArgumentError(f"{name!r} is no family of shapers: {', '.join(rows)}")
+        raise ArgumentError(f"{name!r} is not a family of shapers: {', '.join(rows)}")
     return rows[name]
 
 
 def distinct(bands: Sequence[ModeBand]) -> list[ModeBand]:
-    """The bands, modes whose poles agree within 1e-9 once, with the wider band: no family shall cancel a mode twice."""
+    """The bands, modes whose poles agree within 1e-9 once, with the wider band: so that no mode is cancelled twice."""
     kept: list[ModeBand] = []
     for band in bands:
         pole = band.mode.pole
@@ -187,15 +187,15 @@ def distinct(bands: Sequence[ModeBand]) -> list[ModeBand]:
 
 
 def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None = None) -> list[Design]:
-    """All shapers of a family for some modes, judged, the preferred one first."""
+    """Design and evaluate all shapers of a family for some modes, the preferred one first."""
     options = options or DesignOptions()
     row = family_named(name)
     if not bands:
         raise ArgumentError("a shaper needs at least one mode: 0 given")
     if options.period_s is None and not row.continuous:
-        raise ArgumentError(f"{name} is designed on a grid: give its period")
+        raise ArgumentError(f"{name} is designed on a grid: specify its period")
     if options.period_s is not None and not row.on_grid:
-        raise ArgumentError(f"{name} has no design on a grid: leave the period out ({row.validity})")
+        raise ArgumentError(f"{name} has no design on a grid: omit the period ({row.validity})")
     found = row.solve(distinct(bands), options)
     most_s, most_sum = options.max_duration_s, options.max_abs_sum
     within = [
@@ -207,7 +207,7 @@ def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None =
     if found and not within:
         nearest = min(found, key=lambda shaper: shaper.duration_s)
         raise DesignError(
-            f"{name} lasts {ms(nearest.duration_s)} with sum|a| {nearest.abs_sum:.4g}: the limits are {ms(most_s)} and "
+            f"{name} takes {ms(nearest.duration_s)} with sum|a| {nearest.abs_sum:.4g}: the limits are {ms(most_s)} and "
             f"{most_sum:.4g}"
         )
     return [evaluate(name, shaper, bands, options.period_s) for shaper in within]

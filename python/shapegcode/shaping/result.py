@@ -1,4 +1,4 @@
-"""A comparison of shapers: how designs rank, which one to take and why in words; tables, the answer, the next step."""
+"""Result of a comparison of shapers: ranking, recommendation and reason; tables, the answer, the next step."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from shapegcode.results.table import Column, Table
 from shapegcode.shaping.bands import SAME, Design, ModeBand, ms, spoken
 from shapegcode.shaping.registry import FAMILIES
 
-NO_RESIDUAL = 1e-9  # a residual ratio below this is none: what is left is the rounding of the solver
+NO_RESIDUAL = 1e-9  # a smaller residual ratio counts as zero: it is the solver's rounding
 
-_CONVERTED = {"non-negative", "robust"}  # what a conversion takes by itself
+_CONVERTED = {"non-negative", "robust"}  # families that a conversion uses by default
 _FOR_GRIDS = {row.name for row in FAMILIES if not row.continuous}
-_DIGITS = 9  # designs that agree in so many digits are equally good
-_ROUNDING = 1e-6  # a design made for a limit may miss it by so much, relative
+_DIGITS = 9  # figures equal in this many digits are equally good
+_ROUNDING = 1e-6  # relative tolerance of a limit
 
 
 def _merits(each: Design) -> tuple[float, float, float, float]:
-    """What is better small: duration, worst residual, contour cost (either sign), sum of magnitudes."""
+    """Figures to minimise: duration, worst residual, magnitude of the contour cost, sum of magnitudes."""
     values = (each.duration_s, max(each.worst_residual, NO_RESIDUAL), abs(each.variance_s2), each.abs_sum)
     duration, residual, contour, magnitudes = (float(f"{value:.{_DIGITS}g}") for value in values)
     return duration, residual, contour, magnitudes
@@ -35,26 +35,26 @@ OBJECTIVES = {
     "contour": "the one with the least contour cost",
     "robust": "the one with the least worst residual",
 }
-"""Objectives by name, and how the reason calls the winner."""
+"""Objectives by name, with the winner's description in the reason."""
 
 
 def _order(each: Design, objective: str) -> tuple[float, ...]:
-    """What is least in the design to take, then the family of which an equally good one is taken."""
+    """Sort key: the least is taken; the family breaks ties."""
     duration, residual, contour, _ = _merits(each)
     fewest_blocks = -(each.period_s or 0.0)  # the longest period
     rank = 0.0 if each.family in _CONVERTED else 1.0 if each.family in _FOR_GRIDS else 2.0
-    if objective == "shortest":  # what is left is within the limit
+    if objective == "shortest":  # the residual is within the limit
         return duration, fewest_blocks, rank, contour, residual
     first, last = (contour, residual) if objective == "contour" else (residual, contour)
     return first, duration, fewest_blocks, last, rank
 
 
 def pareto_front(designs: Sequence[Design]) -> list[bool]:
-    """For each design whether no other one is at least as good in everything and better in something.
+    """For each design: True if no other one is at least as good in every figure and better in one.
 
     Compared are duration, worst residual, magnitude of the contour cost and sum of the taps' magnitudes, each to nine
-    digits, a residual below 1e-9 as none. A design on a grid serves where continuous times are asked for, not the
-    other way round: so designs on grids are compared with each other only.
+    digits, a residual below 1e-9 as zero. A design on a grid is also valid at continuous times, not the
+    reverse, so designs on grids are compared only with each other.
     """
     if not designs:
         return []
@@ -70,13 +70,13 @@ def pareto_front(designs: Sequence[Design]) -> list[bool]:
 def recommend(
     designs: Sequence[Design], vibration_limit: float, objective: str = "shortest", allow_negative: bool = False
 ) -> int:
-    """Index of the design to take.
+    """Index of the recommended design.
 
-    Of the designs without negative impulses (of all with `allow_negative`, or where every design has some) those whose
-    worst residual is at most the limit compete for the objective, and of these, if there are any, those that cancel the
-    modes that state no band; if there is none within the limit, the one that leaves least is taken. Of equally short
-    ones on grids, to 2 %, the one with the longest period is taken, because it writes the fewest blocks; of equal ones
-    the family that a conversion takes by itself, then one that is made for grids.
+    Candidates are the designs without negative impulses (all, with `allow_negative` or if every design has some) with a
+    worst residual within the limit; of these, if any, those that cancel the modes without a stated band. The best by
+    the objective is taken; without a candidate, the one with the least worst residual. Of equally short designs on
+    grids, to 2 %, the one with the longest period is taken (fewest blocks), then the family that `convert` uses, then
+    one made for grids.
     """
     if not designs:
         raise ArgumentError("there is no design to choose from: 0 given")
@@ -93,7 +93,7 @@ def recommend(
 
 
 def _competing(designs: Sequence[Design], limit: float, allow_negative: bool) -> tuple[list[int], list[int]]:
-    """Designs that may be taken; those within the limit, of them those that cancel the modes without a band."""
+    """Allowed designs; and those within the limit, if possible those that cancel the modes without a band."""
     indices = [index for index, each in enumerate(designs) if allow_negative or not each.negative]
     indices = indices or list(range(len(designs)))
     good = [index for index in indices if is_within(designs[index], limit)]
@@ -101,14 +101,14 @@ def _competing(designs: Sequence[Design], limit: float, allow_negative: bool) ->
 
 
 def is_within(each: Design, vibration_limit: float) -> bool:
-    """Whether the worst residual is at most the limit, but for rounding."""
+    """Whether the worst residual is within the limit, apart from rounding."""
     return each.worst_residual <= vibration_limit * (1.0 + _ROUNDING)
 
 
 def reason_for(
     designs: Sequence[Design], index: int, bands: Sequence[ModeBand], limit: float, objective: str, allow_negative: bool
 ) -> str:
-    """Why `recommend` takes the design of that index, in a sentence."""
+    """Reason why `recommend` takes this design, in a sentence."""
     taken = designs[index]
     indices, among = _competing(designs, limit, allow_negative)
     good, leaves = len(among), _left(taken.worst_residual)
@@ -119,55 +119,55 @@ def reason_for(
         exactly = f" and which cancel{'' if good > 1 else 's'} {spoken(unstated)}" if unstated and taken.exact else ""
         text = (
             f"{OBJECTIVES[objective]} of {good} {kind}design{'' if good == 1 else 's'} whose worst residual over "
-            f"{spoken(bands)} stays within {_left(limit)}{exactly} (it leaves {leaves})"
+            f"{spoken(bands)} stays within {_left(limit)}{exactly} (residual {leaves})"
         )
     else:
         text = (
             f"none of {len(indices)} {kind}design{'' if len(indices) == 1 else 's'} stays within {_left(limit)} "
-            f"over {spoken(bands)}; this one leaves least, {leaves}"
+            f"over {spoken(bands)}; this one has the least, {leaves}"
         )
         others = [each for each in designs if each.negative and is_within(each, limit)]
         if others and not allow_negative:
             other = min(others, key=lambda each: _order(each, "shortest"))
-            text += f"; with negative impulses {other.family} ({ms(other.duration_s)}) would leave less"
+            text += f"; with negative impulses {other.family} ({ms(other.duration_s)}) would stay within it"
     return text + ("; every design has negative impulses" if only_negative else "")
 
 
 def _left(ratio: float) -> str:
-    return "nothing" if ratio < NO_RESIDUAL else f"{_percent(ratio)} %"
+    return "zero" if ratio < NO_RESIDUAL else f"{_percent(ratio)} %"
 
 
 _MARK, _GRID_MARK = "=>", "->"
-_PARETO_OF_A_FAMILY = 3  # rows, beside the preferred one
-_SPEED_MM_PER_S, _RADIUS_MM = 200.0, 20.0  # at which the contour cost is shown
+_PARETO_OF_A_FAMILY = 3  # additional rows to the preferred one
+_SPEED_MM_PER_S, _RADIUS_MM = 200.0, 20.0  # for which the contour cost is shown
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """A family that has no design."""
+    """A family without a design."""
 
     family: str  # name of its row in the registry
     period_s: float | None  # grid on which it was tried, s; None: continuous times
-    reason: str  # why there is none, with what is nearest where the family knows
+    reason: str  # why there is none, with the nearest design if known
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Recommendation(Result):
-    """A comparison of shapers and the one to take.
+    """A comparison of shapers and the recommended one.
 
     Attributes:
-        modes: what is to be cancelled.
+        modes: modes to cancel.
         designs: every design, in the order of the registry and of the periods.
-        recommended: index of the design to take.
-        reason: why it is that one, in a sentence.
+        recommended: index of the recommended design.
+        reason: reason for the recommendation, in a sentence.
         refused: families without a design.
-        objective: what is least in the design to take: "shortest", "contour" or "robust".
-        allow_negative: whether a design with negative impulses may be taken.
-        vibration_limit: largest worst residual ratio of the design to take.
-        max_duration_s: longest shaper that was looked for, s.
+        objective: figure to minimise: "shortest", "contour" or "robust".
+        allow_negative: designs with negative impulses are allowed.
+        vibration_limit: limit of the worst residual ratio.
+        max_duration_s: longest searched shaper, s.
         max_abs_sum: largest sum of the impulses' magnitudes.
-        machine: whose modes they are: its name, of the command as -m names it; None: the modes were given.
-        warnings: none as a rule.
+        machine: name of the machine of the modes (in the command, the value of -m); None: modes were given.
+        warnings: usually none.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "recommended_on_grid": int | None}
@@ -187,27 +187,27 @@ class Recommendation(Result):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Every family that has a design."""
+        """Methods of every family with a design."""
         return tuple(f"shaper {each.family}" for each in self.designs)
 
     @property
     def design(self) -> Design:
-        """The design to take."""
+        """The recommended design."""
         return self.designs[self.recommended]
 
     @property
     def ok(self) -> bool:
-        """Whether the worst residual of the design to take stays within the vibration limit."""
+        """Whether the worst residual of the recommended design is within the vibration limit."""
         return is_within(self.design, self.vibration_limit)
 
     @property
     def recommended_on_grid(self) -> int | None:
-        """Index of the design to take of those on a grid, which alone can be written as blocks; None: there is none."""
+        """Index of the best design on a grid, as needed to write blocks; None: no such design."""
         return self._best_of([index for index, each in enumerate(self.designs) if each.period_s is not None])
 
     @property
     def best_by_period(self) -> dict[float, int]:
-        """Index of the design to take on each grid, by its period in s, ascending."""
+        """Index of the best design on each grid, by its period in s, ascending."""
         indices: dict[float, list[int]] = {}
         for index, each in enumerate(self.designs):
             if each.period_s is not None:
@@ -223,13 +223,13 @@ class Recommendation(Result):
 
     @property
     def answer(self) -> str:
-        """What to take, how long it lasts and what it leaves."""
+        """The recommended design, its duration and its residual."""
         word = "take" if self.ok else "NONE is good enough; best is"
-        return f"{word} {_spoken(self.design)}, leaves {self._left(self.design)}"
+        return f"{word} {_spoken(self.design)}, {self._left(self.design)}"
 
     @property
     def next_step(self) -> str:
-        """The one thing to do next, in one sentence."""
+        """Next command or measurement, in one sentence."""
         if not self.ok:
             return (
                 "measure the frequencies more closely (a narrower band), or allow more: --max-duration, "
@@ -244,41 +244,41 @@ class Recommendation(Result):
         best = self.designs[index]
         options = f"--shaper {best.family} --block-period {(best.period_s or 0.0) * 1e3:.6g}ms -o shaped.nc"
         if best.family == "taps":
-            return "impulses of your own cannot be written by convert: take a family, or use the Python interface"
+            return "your own impulses cannot be used by convert: choose a family, or use the Python interface"
         if self.machine is None:
             return (
-                f"put the modes into a machine file (shapegcode machine init -o mine.toml), then "
+                f"write the modes to a machine file (shapegcode machine init -o mine.toml), then "
                 f"shapegcode convert part.nc -m mine.toml {options}"
             )
         return f"shapegcode convert part.nc -m {self.machine} {options}"
 
     def notes(self) -> list[str]:
-        """Why it is that one; what to take for blocks where that is another one; the best of each grid."""
-        lines = [f"{_MARK} {'recommended' if self.ok else 'the best there is'}: {self.reason}"]
+        """Reason of the recommendation; the best design for blocks if another one; the best of each grid."""
+        lines = [f"{_MARK} {'recommended' if self.ok else 'best available'}: {self.reason}"]
         index = self.recommended_on_grid
         if index is not None and index != self.recommended:
             other = self.designs[index]
-            lines.append(f"{_GRID_MARK} for the blocks of a program: {_spoken(other)}, leaves {self._left(other)}")
+            lines.append(f"{_GRID_MARK} for the blocks of a program: {_spoken(other)}, {self._left(other)}")
         best = [self.designs[index] for index in self.best_by_period.values()]
         if len(best) > 1:
             lines.append(f"best of each grid: {'; '.join(map(_spoken, best))}")
         return lines
 
     def _left(self, each: Design) -> str:
-        among = "within the bands of" if any(band.uncertainty for band in self.modes) else "of"
+        among = "within the bands of" if any(band.uncertainty for band in self.modes) else "at"
         where = f"{among} {spoken(self.modes)}"
         if each.worst_residual < NO_RESIDUAL:
-            return f"nothing {where}"
-        return f"at most {_percent(each.worst_residual)} % {where} (limit {_percent(self.vibration_limit)} %)"
+            return f"zero residual {where}"
+        return f"residual at most {_percent(each.worst_residual)} % {where} (limit {_percent(self.vibration_limit)} %)"
 
     def shown(self, *, everything: bool = False) -> list[int]:
         """Indices of the designs for a table, shortest first.
 
-        What is recommended, at all and for each grid; of each family at continuous times the preferred design and the
+        The recommended designs, overall and for each grid; per family at continuous times the preferred design and the
         shortest ones of the Pareto front, and on grids the shortest one of all.
 
         Args:
-            everything: all designs instead.
+            everything: return all designs.
 
         Returns:
             Indices of `designs`.
@@ -291,7 +291,7 @@ class Recommendation(Result):
             families.setdefault((each.family, each.period_s is None), []).append(index)
 
         def length(index: int) -> tuple[float, float]:
-            # Of equally long ones the longest period: it writes the fewest blocks.
+            # Of equal durations the longest period: it needs the fewest blocks.
             return round(self.designs[index].duration_s, 9), -(self.designs[index].period_s or 0.0)
 
         for (_, continuous), members in families.items():
@@ -303,15 +303,15 @@ class Recommendation(Result):
     def tables(
         self, speed_mm_per_s: float = _SPEED_MM_PER_S, radius_mm: float = _RADIUS_MM, *, everything: bool = False
     ) -> list[Table]:
-        """The designs with what they cost and leave; the families without one, and why.
+        """Designs with their figures; families without a design, and why.
 
         Args:
-            speed_mm_per_s: at which the contour cost is shown.
-            radius_mm: of the arc on which it is shown.
+            speed_mm_per_s: speed for which the contour cost is shown.
+            radius_mm: radius of the arc for which it is shown.
             everything: all designs, not only those of `shown`.
 
         Returns:
-            One table, or two where a family was refused.
+            One table, or two if a family was refused.
         """
         found = [self._designs_table(speed_mm_per_s, radius_mm, everything)]
         return [*found, self._refused_table()] if self.refused else found
@@ -336,7 +336,7 @@ class Recommendation(Result):
             Column("Pareto", value=lambda each: "yes" if each.pareto else None, text=True),
         )
         left_out = len(self.designs) - len(rows)
-        caption = f"arc: by how much R{radius_mm:g} mm comes out too small at {speed_mm_per_s:g} mm/s"
+        caption = f"arc: radius error (too small) of R{radius_mm:g} mm at {speed_mm_per_s:g} mm/s"
         return Table(
             f"shapers for {', '.join(map(str, self.modes))}", columns, rows,
             caption=caption + (f"; {left_out} more designs: --verbose shows them" if left_out else ""),
@@ -344,7 +344,7 @@ class Recommendation(Result):
         )  # fmt: skip
 
     def _refused_table(self) -> Table:
-        """The same reason on several kinds of times is one row."""
+        """Table of refusals; the same reason on several grids is one row."""
         times: dict[tuple[str, str], list[float | None]] = {}
         for refusal in self.refused:
             times.setdefault((refusal.family, refusal.reason), []).append(refusal.period_s)
@@ -361,7 +361,7 @@ class Recommendation(Result):
 
 
 def families_table() -> Table:
-    """Every family of the registry: what it is, where it comes from, where it is valid."""
+    """Every family of the registry: name, source, validity."""
     columns = (
         Column("family", value="name", text=True),
         Column("what", value="title", text=True),
@@ -375,7 +375,7 @@ def families_table() -> Table:
 
 
 def times_name(period_s: float | None) -> str:
-    """Kind of times in words."""
+    """Grid or continuous times, in words."""
     return "continuous" if period_s is None else f"{period_s * 1e3:.4g} ms grid"
 
 

@@ -1,6 +1,6 @@
 """Robust shapers on a sample grid: the least worst residual over frequency bands, and the shortest one below a limit.
 
-What is best is proven, by `cutting_planes` and a sweep; a mode without a band (uncertainty 0) is cancelled exactly.
+The optimum is proven by `cutting_planes` and a sweep; a mode without a band (uncertainty 0) is cancelled exactly.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ from shapegcode.shaping.grid_designs import (
     smallest_enough,
 )
 
-_LONGER = 4  # times the longest duration: how far a refusal looks for what would do
-_OTHER_PERIODS = (0.5, 0.75, 1.25, 1.5, 2.0)  # of the refused one: what a refusal looks at
-_HINT_PRECISION = 0.05  # relative, of the duration that would do
+_LONGER = 4  # times the longest duration: range in which a refusal searches a sufficient duration
+_OTHER_PERIODS = (0.5, 0.75, 1.25, 1.5, 2.0)  # other periods tried by a refusal, relative to the refused one
+_HINT_PRECISION = 0.05  # relative precision of the sufficient duration
 _HINT_PERIODS = 500  # longest grid that a refusal searches, periods
 _NO_TAP = 1e-9  # smaller amplitudes are the solver's round-off
-_GROWTH = 1.4  # of the number of periods while it is searched
-_WHOLE = 1e-3  # cycles per period from a whole number
-# Where the best use of the last periods of a damped mode is to wait, a tap this large marks their end.
+_GROWTH = 1.4  # growth factor of the number of periods in the search
+_WHOLE = 1e-3  # tolerance of a whole number of cycles per period
+# If the optimum for a damped mode ends with periods of waiting, a tap this large marks their end.
 _LAST_TAP = 1e-3
 _SAME_VARIANCE = 5e-3  # relative
 
@@ -56,11 +56,11 @@ def least_worst(
     max_abs_sum: float = 10.0,
     zeros_at_nominal: bool = False,
 ) -> RobustDesign:
-    """Taps on a grid whose worst residual over the bands is least, for a given duration.
+    """Design taps on a grid with the least worst residual over the bands, for a given duration.
 
     The optimum is proven to 0.1 %: `worst_residual` is at most that much above `least_possible` (a residual below
-    1e-6 counts as none). The exception is a damped mode on a grid where the best use of the last periods is to wait:
-    the residual counts from the last tap, so the shaper is then shorter, or a last tap of 0.001 marks the end.
+    1e-6 counts as zero). The exception is a damped mode whose optimum ends with periods of waiting:
+    the residual is taken from the last tap, so the shaper is then shorter, or a last tap of 0.001 marks the end.
 
     Source: this project.
     """
@@ -68,7 +68,7 @@ def least_worst(
     check_times(duration_s=duration_s)
     if not task.wide:
         raise ArgumentError(
-            f"no mode states a band ({band_names(bands)}): nothing to make least; ask for the shortest exact design"
+            f"no mode states a band ({band_names(bands)}): nothing to minimise; use the shortest exact design"
         )
     last = task.periods(duration_s)
     found = best_within(task, last)
@@ -90,10 +90,10 @@ def minimax_robust(
     mirrored: bool = False,
     hints: bool = True,
 ) -> RobustDesign:
-    """Shortest taps on a grid that leave at most a given share of the vibration anywhere in the bands.
+    """Design the shortest taps on a grid with at most a given residual ratio within the bands.
 
     The number of periods is the smallest for which the least worst residual is below the limit (to 0.1 %). Among the
-    non-negative designs of that duration the one with the least second central moment, the contour cost, is taken
+    non-negative designs of that duration the one with the least second central moment, the contour cost, is chosen
     (to 0.5 %); with negative impulses, the one with the least sum of magnitudes.
 
     Source: this project.
@@ -110,7 +110,7 @@ def minimax_robust(
 
 
 def _hints(task: Task, limit: float, max_duration_s: float) -> str:
-    """What the longest allowed duration reaches, which one would do, and which other period."""
+    """Hints for a refusal: what the longest allowed duration reaches; a sufficient duration; another period."""
     text = ""
     if not unreachable(task):
         most = task.periods(max_duration_s)
@@ -121,7 +121,7 @@ def _hints(task: Task, limit: float, max_duration_s: float) -> str:
             text += f"; {no_exact(task, most * task.period_s)}"
         longest = min(_LONGER * most, max(_HINT_PERIODS, most))
         enough = smallest_below(task, limit, longest, too_few=most, precision=_HINT_PRECISION)
-        text += f"; {ms(enough * task.period_s)} would do" if enough else f"; nor does {ms(longest * task.period_s)} do"
+        text += f"; {ms(enough * task.period_s)} suffices" if enough else f"; {ms(longest * task.period_s)} do not"
     return f"{text}; {_other_period(task, limit, max_duration_s)}"
 
 
@@ -137,7 +137,7 @@ def _other_period(task: Task, limit: float, max_duration_s: float) -> str:
         if enough is not None:
             if enough * other.period_s < shortest_s:
                 shortest_s = enough * other.period_s
-                shortest_text = f"on a period of {ms(other.period_s)} a design of {ms(shortest_s)} would do"
+                shortest_text = f"on a period of {ms(other.period_s)} a design of {ms(shortest_s)} would suffice"
             continue
         found = best_within(other, most)
         if found is not None and found.worst_residual < least:
@@ -152,7 +152,7 @@ def _percent(ratio: float) -> str:
 
 @dataclass(frozen=True)
 class RobustDesign:
-    """A shaper on a grid, its worst residual, and how much better any other one could be."""
+    """A shaper on a grid, its worst residual, and a proven lower bound."""
 
     shaper: Shaper  # the taps; times are multiples of `period_s`
     period_s: float  # period of the grid, s
@@ -162,14 +162,14 @@ class RobustDesign:
 
 @dataclass(frozen=True)
 class Task:
-    """What is asked for, whatever the duration."""
+    """Design task for any duration."""
 
     bands: tuple[ModeBand, ...]  # modes with their bands; one without a band is cancelled exactly
     period_s: float  # of the grid, s
     max_abs_sum: float | None  # largest sum of the taps' magnitudes; None: no tap is negative
     zeros_at_nominal: bool  # every mode is cancelled exactly at its nominal frequency
     pool: CutPool  # planes found so far
-    mirrored: bool = False  # the taps are the same read backwards
+    mirrored: bool = False  # the taps are symmetric in time
 
     @classmethod
     def checked(
@@ -181,7 +181,7 @@ class Task:
         zeros_at_nominal: bool = False,
         mirrored: bool = False,
     ) -> Task:
-        """The task, its values checked."""
+        """Create a task from checked values."""
         check_modes_and_times(bands, period_s=period_s)
         if not (math.isfinite(max_abs_sum) and max_abs_sum >= 1.0):
             raise ArgumentError(f"max_abs_sum is {max_abs_sum}: must be finite and at least 1, the sum of the impulses")
@@ -190,16 +190,16 @@ class Task:
 
     @property
     def wide(self) -> list[ModeBand]:
-        """The modes whose residual is bounded over a band."""
+        """Modes with a residual limit over a band."""
         return [band for band in self.bands if band.uncertainty]
 
     @property
     def exact(self) -> list[Mode]:
-        """The modes that are cancelled exactly."""
+        """Modes that are cancelled exactly."""
         return [band.mode for band in self.bands if self.zeros_at_nominal or not band.uncertainty]
 
     def periods(self, duration_s: float) -> int:
-        """Whole periods within a duration."""
+        """Number of whole periods within a duration."""
         return whole_periods(duration_s, self.period_s)
 
     def conditions(self, last: int) -> tuple[FloatArray, FloatArray]:
@@ -215,11 +215,11 @@ class Task:
         return TapProblem(self.wide, self.period_s, last, self.conditions(last), self.max_abs_sum, self.pool, last_tap)
 
     def at_period(self, period_s: float) -> Task:
-        """The same on another grid."""
+        """The same task on another grid."""
         return replace(self, period_s=period_s, pool=CutPool.around(self.wide))
 
     def finished(self, taps: FloatArray, lower: float) -> RobustDesign | None:
-        """The taps without round-off, their zeros solved again to rounding, judged; None if that breaks them."""
+        """Remove round-off, re-solve the zeros to rounding, and evaluate; None if the taps become invalid."""
         if self.mirrored:
             taps = 0.5 * (taps + taps[::-1])
         largest = None if self.max_abs_sum is None else math.inf
@@ -231,7 +231,7 @@ class Task:
 
 
 def shortest_below(task: Task, limit: float, max_duration_s: float, *, least_cost: bool = True) -> RobustDesign | None:
-    """The shortest design whose worst residual is below the limit, of least contour cost or any one, or None."""
+    """Shortest design with a worst residual below the limit, of least contour cost if requested; else None."""
     most = task.periods(max_duration_s)
     if not task.wide and task.max_abs_sum is None and not task.mirrored:
         with suppress(DesignError):
@@ -245,7 +245,7 @@ def shortest_below(task: Task, limit: float, max_duration_s: float, *, least_cos
         found = _within(task, last, limit, least_cost)
         if found is not None:
             return found
-        last += 1  # the taps did not survive full precision
+        last += 1  # the taps became invalid in full precision
     return None
 
 
@@ -257,12 +257,12 @@ def best_within(task: Task, last: int) -> RobustDesign | None:
     found = task.finished(bounds.taps, bounds.lower)
     if found is None:
         raise DesignError(
-            f"the design of {ms(last * task.period_s)} on a {ms(task.period_s)} grid does not survive being "
+            f"the design of {ms(last * task.period_s)} on a {ms(task.period_s)} grid becomes invalid when "
             f"solved in full precision for modes {band_names(task.bands)}; try another period"
         )
     reached = max((1.0 + SAME_RESIDUAL) * bounds.upper, NO_RESIDUAL)
     if found.worst_residual > reached:
-        # The best use of the last periods was to wait, and the residual counts from the last tap.
+        # The optimum ends with periods of waiting, and the residual is taken from the last tap.
         last = smallest_below(task, reached, last) or last
         for last_tap in (0.0, _LAST_TAP):
             ended = task.problem(last, last_tap).least_worst()
@@ -273,7 +273,7 @@ def best_within(task: Task, last: int) -> RobustDesign | None:
 
 
 def _below(task: Task, last: int, limit: float) -> Bounds | None:
-    # mirrored taps stay so with a zero at each end, so a period more helps them or the one before
+    # symmetric taps stay symmetric with a zero at each end, so compare with one period more
     for periods in (last, last - 1) if task.mirrored and last else (last,):
         bounds = task.problem(periods).least_worst(limit)
         if bounds is not None and bounds.upper <= limit:
@@ -284,9 +284,9 @@ def _below(task: Task, last: int, limit: float) -> Bounds | None:
 def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, precision: float = 0.0) -> int | None:
     """Smallest number of periods that stays below the limit, or None if it exceeds `most`.
 
-    A design stays one with further taps at zero, so growing and then halving finds it. The start is half a period of
-    each mode, what zero vibration takes, or `too_few`, if that is known not to suffice. With a relative `precision`
-    the answer suffices, but may exceed the smallest by that much.
+    Further zero taps keep a design valid, so growing and then bisection finds it. The start is half a period of
+    each mode, the duration of ZV, or `too_few`, which is known not to suffice. With a relative `precision`
+    the result suffices, but may exceed the smallest by that much.
     """
     start = max(1.0, sum(0.5 / band.mode.frequency_hz for band in task.bands) / task.period_s, _GROWTH * too_few)
     return smallest_enough(
@@ -296,7 +296,7 @@ def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, pre
 
 
 def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesign | None:
-    """A design of `last` periods below the limit, that of least contour cost if asked for; None if none survives."""
+    """A design of `last` periods below the limit, with the least contour cost if requested; None if none is valid."""
     for last_tap in (0.0, _LAST_TAP):
         problem = task.problem(last, last_tap)
         bounds = problem.least_worst(limit)
@@ -305,7 +305,7 @@ def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesi
             break
     else:
         return None
-    inner = (1.0 - 0.4 * SAME_RESIDUAL) * limit  # room for the gap of the planes and for the proof
+    inner = (1.0 - 0.4 * SAME_RESIDUAL) * limit  # margin for the gap of the planes and the proof
     candidates = []
     if least_cost and task.max_abs_sum is None:
         candidates = lower_hull(lambda cost: problem.cheapest(cost, inner), last, _SAME_VARIANCE)
@@ -320,7 +320,7 @@ def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesi
 
 
 def no_exact(task: Task, duration_s: float) -> str:
-    """Why the modes without a band have no design of a duration, for a message."""
+    """Message: modes without a band have no design of this duration."""
     taps = "non-negative impulses" if task.max_abs_sum is None else f"impulses with sum|a| up to {task.max_abs_sum:g}"
     if task.mirrored:
         taps = f"mirrored {taps}"
@@ -328,21 +328,21 @@ def no_exact(task: Task, duration_s: float) -> str:
 
 
 def refusal(task: Task, limit: float, max_duration_s: float) -> str:
-    """That there is no design below the limit, and the reason if it is known, for a message."""
+    """Message: no design is below the limit, with the reason if known."""
     reason = unreachable(task)
     if not task.wide:
         return no_exact(task, max_duration_s) + (f"; {reason}" if reason else "")
     return (
-        f"no design within {ms(max_duration_s)} on a {ms(task.period_s)} grid leaves at most {100.0 * limit:.3g} % of "
+        f"no design within {ms(max_duration_s)} on a {ms(task.period_s)} grid keeps below {100.0 * limit:.3g} % for "
         f"{band_names(task.bands)}" + (f"; {reason}" if reason else "")
     )
 
 
 def unreachable(task: Task) -> str:
-    """What no non-negative shaper of this grid can reduce, for a message; empty if there is nothing.
+    """Message: a frequency that no non-negative shaper of this grid can reduce; empty if none.
 
-    At a frequency with a whole number of cycles per period every tap adds to the others: what a shaper seems
-    to take away is only what dies out while it lasts.
+    At a frequency with a whole number of cycles per period all taps add in phase: a shaper then reduces vibration only
+    by its decay during the shaper.
     """
     if task.max_abs_sum is not None:
         return ""

@@ -1,6 +1,6 @@
-"""How each family is designed: at continuous times, and on a grid from the conditions that define it.
+"""Solvers of each family: at continuous times, and on a grid from its defining conditions.
 
-Families of one mode serve several by convolution, one mode after the other, on either kind of times.
+Families of one mode are extended to several by convolution, at continuous times and on a grid.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ Solve = Callable[[Sequence[ModeBand], DesignOptions], Sequence[_core.Shaper]]
 """All shapers of a family for some bands, the preferred one first."""
 _STEPS_PER_PERIOD = 64  # of the fastest frequency: time grid of the SI shaper at continuous times
 _PER_PERIOD = (40, 80, 160, 320)  # steps of the time grid in a period of the fastest mode
-_NEIGHBOURS = 2.5  # steps: taps closer than this are one tap between them
+_NEIGHBOURS = 2.5  # steps: closer taps are merged into one tap between them
 _NEWTON_STEPS = 30
 _RESIDUAL = 1e-13
 _SMALLEST_TAP = 1e-9
-_FIRST = 0.7  # of the usual length: no kernel without negative samples is shorter, so the search begins there
+_FIRST = 0.7  # of the usual length: start of the search; no kernel without negative samples is shorter
 _FURTHEST = 2.5
-_STRIDES = 40  # of the usual length: how coarsely the first kernel is looked for, before the steps are halved
+_STRIDES = 40  # of the usual length: first search step, before bisection
 _MOST_SAMPLES = 20_000
 _WHOLE = 1e-9
-_CLEARLY = 1e-3  # of the largest sample: a negative one that what rounding left does not lift
-_SINGULAR = 1e-12  # relative singular value below which two conditions ask for the same thing on this grid
-_SPANS = (1.0, 2.0)  # durations of the convolved ZV that are searched, one after the other
+_CLEARLY = 1e-3  # of the largest sample: a negative sample beyond rounding error
+_SINGULAR = 1e-12  # relative singular value below which two conditions coincide on this grid
+_SPANS = (1.0, 2.0)  # searched durations relative to the convolved ZV, in order
 _MOST_PERIODS = 100.0 - 1e-6  # of the fastest mode: the limit of minimal_shapers
-_PROVEN_MODES = 3  # more modes take too many boxes for a proof; the starts alone search them
+_PROVEN_MODES = 3  # more modes need too many boxes for a proof; they are searched from starts only
 
 
 def _one_after_the_other(of_one: Callable[[_core.Mode, DesignOptions], _core.Shaper]) -> Solve:
@@ -51,7 +51,7 @@ def _defined(
     continuous: Callable[[_core.Mode, DesignOptions], _core.Shaper],
     conditions: Callable[[_core.Mode, DesignOptions], Conditions],
 ) -> Solve:
-    """A closed form at continuous times; on a grid the shortest taps that meet the conditions that define it."""
+    """A closed form at continuous times; on a grid the shortest taps that satisfy its defining conditions."""
 
     def of_one(mode: _core.Mode, options: DesignOptions) -> _core.Shaper:
         if options.period_s is None:
@@ -63,7 +63,7 @@ def _defined(
 
 
 def repeated(name: str, zeros: int) -> Solve:
-    """ZV, ZVD, ZVDD ...: that many zeros at each mode; on a grid the shortest non-negative impulses that have them."""
+    """ZV, ZVD, ZVDD ...: *zeros* zeros at each mode; on a grid the shortest non-negative impulses with these zeros."""
     return _defined(
         name,
         lambda mode, _options: _core.repeated_zv(mode, zeros),
@@ -72,7 +72,7 @@ def repeated(name: str, zeros: int) -> Solve:
 
 
 def hump_ei(name: str, humps: int) -> Solve:
-    """EI with that many humps; on a grid its zeros, and its residual between the outermost ones."""
+    """EI with *humps* humps; on a grid from its zeros, and its residual between the outermost ones."""
 
     def conditions(mode: _core.Mode, options: DesignOptions) -> Conditions:
         zeros_hz = _core.extra_insensitive(mode, options.vibration_limit, humps).zeros_hz
@@ -102,13 +102,13 @@ negative = _defined(
 
 
 def specified(bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:
-    """SI: the shortest non-negative impulses that leave at most the vibration limit over every band."""
+    """SI: the shortest non-negative impulses with a residual within the vibration limit over every band."""
     limit, period_s = options.vibration_limit, options.period_s
     if not 0.0 < limit < 1.0:
         raise _core.ArgumentError(f"the vibration limit is {limit:.4g}: it must be above 0 and below 1")
     if period_s is None:
         period_s = 1.0 / (_STEPS_PER_PERIOD * max(band.shifted(1.0).frequency_hz for band in bands))
-    title = f"SI shaper with {limit:.4g} left for {mode_names([band.mode for band in bands])}"
+    title = f"SI shaper with residual {limit:.4g} for {mode_names([band.mode for band in bands])}"
     conditions = Conditions(bands=tuple(bands), limit=limit)
     return [shortest_on_grid(conditions, period_s, options.max_duration_s, title=title)]
 
@@ -119,26 +119,26 @@ def simultaneous(bands: Sequence[ModeBand], options: DesignOptions) -> list[_cor
 
 
 def user_taps(_bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:
-    """The taps that were given, on the grid if there is one."""
+    """The user's taps, checked against the grid if there is one."""
     if options.taps is None:
-        raise _core.ArgumentError("the family taps judges impulses that are given: none are")
+        raise _core.ArgumentError("the family taps evaluates the user's impulses: none are given")
     return [options.taps if options.period_s is None else on_grid(options.taps, options.period_s)]
 
 
 def simultaneous_zv(modes: Sequence[_core.Mode], max_duration_s: float) -> _core.Shaper:
-    """Shortest shaper with non-negative impulses at continuous times that cancels every mode."""
+    """Design the shortest non-negative shaper at continuous times with zero residual at every mode."""
     fastest_hz = max(mode.frequency_hz for mode in modes)
     title = f"simultaneous shaper without negative impulses for {mode_names(modes)}"
     conditions = Conditions(zeros=tuple(Zero(mode) for mode in modes))
     for per_period in _PER_PERIOD:
         step_s = 1.0 / (per_period * fastest_hz)
-        # the exact solution may be shorter than that of the grid by a step or two
+        # the exact solution may be a step or two shorter than that on the grid
         try:
             start = shortest_on_grid(conditions, step_s, max_duration_s + 2.0 * step_s, title=title)
         except _core.DesignError as error:
             one_by_one_s = _core.convolved_zv(modes).duration_s
             raise _core.DesignError(
-                f"no {title} within {ms(max_duration_s)}; one ZV after the other lasts {ms(one_by_one_s)}"
+                f"no {title} within {ms(max_duration_s)}; the convolved ZV shapers take {ms(one_by_one_s)}"
             ) from error
         shaper = _polished(*_merged(start, _NEIGHBOURS * step_s), modes)
         if shaper is not None and shaper.duration_s <= max_duration_s * (1.0 + 1e-9):
@@ -150,7 +150,7 @@ def simultaneous_zv(modes: Sequence[_core.Mode], max_duration_s: float) -> _core
 
 
 def _merged(shaper: _core.Shaper, distance_s: float) -> tuple[FloatArray, FloatArray]:
-    """Times and amplitudes with neighbouring taps as one, at their mean time."""
+    """Merge neighbouring taps at their mean time; times and amplitudes."""
     groups: list[list[int]] = []
     for index, time_s in enumerate(shaper.times_s):
         if groups and time_s - shaper.times_s[groups[-1][-1]] <= distance_s:
@@ -163,7 +163,7 @@ def _merged(shaper: _core.Shaper, distance_s: float) -> tuple[FloatArray, FloatA
 
 
 def _polished(times_s: FloatArray, amplitudes: FloatArray, modes: Sequence[_core.Mode]) -> _core.Shaper | None:
-    """Newton on all amplitudes and times; None if it ends at no non-negative shaper that cancels the modes."""
+    """Newton iteration on all amplitudes and times; None unless it ends at a non-negative exact shaper."""
     poles = np.array([mode.pole for mode in modes])
     scale = float(np.abs(poles).max())
     count = len(times_s)
@@ -181,7 +181,7 @@ def _polished(times_s: FloatArray, amplitudes: FloatArray, modes: Sequence[_core
             return None
         if size < best[0]:
             best = (size, times_s, amplitudes)
-        # the last tap's time also scales the sums; that changes no zero, so the Newton steps leave it out
+        # the last tap's time also scales the sums, without effect on zeros; the Newton steps omit this
         change = np.linalg.lstsq(np.hstack([by_amplitude, by_time]), error, rcond=1e-10)[0]
         amplitudes = amplitudes - change[:count]
         times_s = times_s - np.concatenate([[0.0], change[count:]]) / scale
@@ -195,19 +195,19 @@ def _polished(times_s: FloatArray, amplitudes: FloatArray, modes: Sequence[_core
 def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bool = False) -> Solve:
     """A polynomial kernel with zeros at these multiples of each mode.
 
-    Source: D. Butyugin's smoothers of the printer firmware Kalico; their derivation on a grid: this project.
+    Source: D. Butyugin's smoothers of the printer firmware Kalico; derivation on a grid: this project.
     """
 
     def of_one(mode: _core.Mode, options: DesignOptions) -> _core.Shaper:
         period_s = options.grid_period_s
         usual = periods / (mode.frequency_hz * period_s)
-        # one step more than unknowns: the two ends carry no sample
+        # one step more than unknowns: both ends have no sample
         fewest = max(2 * len(ratios) + 2, math.ceil((1.0 - _WHOLE if at_least else _FIRST) * usual))
         most = max(2 * fewest, int(_FURTHEST * usual))
         title = f"{name} for {mode_names([mode])} on a {ms(period_s)} grid"
         if usual > _MOST_SAMPLES:
             raise _core.DesignError(
-                f"{title} would take {usual:.0f} samples: at most {_MOST_SAMPLES}; take a longer period"
+                f"{title} would take {usual:.0f} samples: at most {_MOST_SAMPLES}; use a longer period"
             )
 
         def taps(steps: int) -> FloatArray | None:
@@ -226,7 +226,7 @@ def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bo
 
 
 def _first(good: Callable[[int], bool], fewest: int, most: int, stride: int) -> int | None:
-    """The smallest good count from `fewest` to `most`, found by strides and then by halves; None: there is none."""
+    """Smallest good count from `fewest` to `most`, by strides, then bisection; None: none is good."""
     count = next((each for each in range(fewest, most + 1, stride) if good(each)), None)
     if count is None:
         return None
@@ -241,7 +241,7 @@ def _samples(mode: _core.Mode, ratios: tuple[float, ...], period_s: float, steps
     rows = [np.ones(len(x))]
     for index, ratio in enumerate(ratios):
         pole = _core.Mode(ratio * mode.frequency_hz, mode.damping_ratio).pole
-        # what each sample leaves at the last one; a double zero cancels the derivative too
+        # residual of each sample at the last one; a double zero also cancels the derivative
         terms = np.exp((pole.real * (len(x) - 1 - np.arange(len(x))) + 1j * pole.imag * np.arange(len(x))) * period_s)
         terms = terms * x ** ratios[:index].count(ratio)
         rows += [terms.real, terms.imag]
@@ -250,7 +250,7 @@ def _samples(mode: _core.Mode, ratios: tuple[float, ...], period_s: float, steps
     taps = basis @ np.linalg.lstsq(matrix @ basis, target, rcond=_SINGULAR)[0]
     if float(taps.min()) < -_CLEARLY * float(taps.max()):
         return None
-    for _ in range(2):  # what rounding left of the zeros
+    for _ in range(2):  # correct rounding errors of the zeros
         taps = taps + np.linalg.lstsq(matrix, target - matrix @ taps, rcond=_SINGULAR)[0]
     if float(np.abs(matrix @ taps - target).max()) > RESIDUAL_LIMIT or float(taps.min()) <= 0.0:
         return None
@@ -260,11 +260,11 @@ def _samples(mode: _core.Mode, ratios: tuple[float, ...], period_s: float, steps
 def _other_period(highest_hz: float, period_s: float) -> str:
     if 2.0 * highest_hz * period_s > 1.0:
         return f"a period below {ms(0.5 / highest_hz)} resolves its highest zero, {highest_hz:.4g} Hz"
-    return "it is for modes that are damped less"
+    return "it is for modes with less damping"
 
 
 def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:
-    """Minimal shapers of the bands' nominal modes: those without negative impulses first, each part by duration.
+    """Minimal shapers of the bands' nominal modes: those without negative impulses first, each group by duration.
 
     Searched up to the duration of the convolved ZV, and, only if there is none, up to twice that; never beyond
     `options.max_duration_s` or 100 periods of the fastest mode.
@@ -285,8 +285,8 @@ def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[_co
 def _none_found(modes: Sequence[_core.Mode], found: _core.MinimalShapers) -> str:
     names = ", ".join(f"{mode.frequency_hz:g} Hz" for mode in modes)
     what = (
-        f"no minimal shaper of {names} lasts up to {ms(found.max_duration_s)} with sum|a| up to {found.max_abs_sum:g}"
+        f"no minimal shaper of {names} takes up to {ms(found.max_duration_s)} with sum|a| up to {found.max_abs_sum:g}"
     )
     if found.complete:
-        return what + ": proven; allow a longer one"
+        return what + ": proven; increase the limit"
     return f"{what} was found from {found.starts} starts, proven up to {ms(found.complete_up_to_s)}"

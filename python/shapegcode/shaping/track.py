@@ -1,6 +1,6 @@
-"""Shapers that follow modes along an axis: one design per node, shared linearly in between (`_core.FollowingFir`).
+"""Shapers that follow modes along an axis: one design per node, interpolated linearly (`_core.FollowingFir`).
 
-All have the same mean delay where the grid permits it: then the speed along the path does not change either.
+If the grid permits, all have the same mean delay, so that the speed along the path does not change.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from shapegcode.shaping.bands import check_times, whole_periods
 from shapegcode.shaping.cutting_planes import LinearProgram
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, refined, shortest_non_negative
 
-_LOOKS = 16  # positions between two nodes at which the residual is looked at
-_SUPPORT = 1e-9  # amplitudes above this are taps
-_LONGER = 1.3  # how much longer shapers may become for a common mean delay
+_LOOKS = 16  # positions between two nodes at which the residual is checked
+_SUPPORT = 1e-9  # smaller amplitudes are no taps
+_LONGER = 1.3  # factor by which a common mean delay may lengthen shapers
 _SAME_MEAN = 1e-9  # periods
 NodeDesign = Callable[[Sequence[Mode]], Shaper]
-_MEANS = 9  # mean delays that are compared
-_POINT = 1e-8  # periods: means that differ by less are one
+_MEANS = 9  # number of compared mean delays
+_POINT = 1e-8  # periods: means closer than this are equal
 
 
 def shaper_fir(shaper: Shaper, period_s: float) -> Fir:
-    """A shaper in whole periods of its grid."""
+    """Convert a shaper to a filter in whole periods of its grid."""
     return Fir([round(time / period_s) for time in shaper.times_s], list(shaper.amplitudes))
 
 
 @dataclass(frozen=True)
 class MovingMode:
-    """A mode and how it depends on the position of the axis that is followed."""
+    """A mode and its variation with the position of the followed axis."""
 
     mode: Mode  # nominal frequency and damping
-    table: ModeTable | None = None  # over the axis' position; None: the mode stays
+    table: ModeTable | None = None  # over the axis' position; None: constant
 
     def at(self, position_mm: float) -> Mode:
-        """The mode where the axis stands at `position_mm`."""
+        """The mode at an axis position."""
         return self.mode if self.table is None else self.table.mode_at(self.mode, position_mm)
 
 
@@ -50,8 +50,8 @@ class MovingMode:
 class TrackNode:
     """A position of the axis and the shaper for it."""
 
-    position_mm: float  # of the axis, in the coordinates of the tables
-    modes: tuple[Mode, ...]  # what the shaper cancels there
+    position_mm: float  # axis position, in the coordinates of the tables
+    modes: tuple[Mode, ...]  # modes cancelled at this position
     shaper: Shaper  # the taps, on the grid
 
 
@@ -75,7 +75,7 @@ class ShaperTrack:
         return VaryingFir([shaper_fir(node.shaper, self.period_s) for node in self.nodes])
 
     def following(self, offset_mm: float = 0.0) -> FollowingFir:
-        """The filter that follows the axis."""
+        """Filter that follows the axis."""
         return FollowingFir(self.filters, self.axis, [node.position_mm - offset_mm for node in self.nodes])
 
 
@@ -90,7 +90,7 @@ def design_track(
     most_nodes: int = 100,
     design: NodeDesign | None = None,
 ) -> ShaperTrack:
-    """Shapers along an axis that keep the residual of every mode below a limit, also halfway between the nodes."""
+    """Design shapers along an axis with every mode's residual below a limit, also between the nodes."""
     low, high = span_mm
     if not modes:
         raise ArgumentError("a shaper needs at least one mode: 0 given")
@@ -119,14 +119,14 @@ def design_track(
             return ShaperTrack(axis, period_s, tuple(nodes), max([ends, *residuals]))
         if len(positions) + len(middles) > most_nodes:
             raise DesignError(
-                f"{len(positions)} shapers between {low:g} and {high:g} mm leave up to {max(residuals):.3g} of the "
-                f"vibration, limit {residual_limit:g}; more than {most_nodes} are not tried"
+                f"{len(positions)} shapers between {low:g} and {high:g} mm have a residual up to {max(residuals):.3g}, "
+                f"limit {residual_limit:g}; more than {most_nodes} are not tried"
             )
         positions = sorted([*positions, *middles])
 
 
 def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s: float | None = None) -> Shaper | None:
-    """Non-negative shaper of a mean delay, of least second central moment, that cancels every mode exactly."""
+    """Non-negative shaper with a given mean delay and zero residual at every mode, of least second central moment."""
     found = taps_of_mean(modes, period_s, periods, mean_s)
     if found is None or found[0][0] != 0:
         return None
@@ -137,7 +137,7 @@ def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s:
 def taps_of_mean(
     modes: Sequence[Mode], period_s: float, periods: int, mean_s: float | None = None
 ) -> tuple[NDArray[np.intp], FloatArray] | None:
-    """Delays in periods and taps of `shaper_of_mean`, whose first delay need not be zero; its arguments."""
+    """Delays in periods and taps of `shaper_of_mean`; the first delay may be above zero."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
     cost = steps / periods
@@ -155,7 +155,7 @@ def taps_of_mean(
 
 
 def _vertices(matrix: FloatArray, right: FloatArray, *costs: FloatArray) -> list[FloatArray | None]:
-    """The taps without negative ones that meet the conditions at each least cost; None: there are none."""
+    """Non-negative taps that meet the conditions, of least value for each cost; None: infeasible."""
     count = matrix.shape[1]
     program = LinearProgram(np.zeros(count), np.full(count, math.inf), (matrix, right))
     found: list[FloatArray | None] = []
@@ -178,7 +178,7 @@ def _conditions(modes: Sequence[Mode], period_s: float, steps: FloatArray) -> tu
 
 
 def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_s: float) -> list[Shaper]:
-    """One shaper for each set of modes, with equal mean delays where the grid permits it, else as close as it does."""
+    """One shaper for each set of modes, with mean delays equal, or as close as the grid permits."""
     shortest = [shortest_non_negative(modes, period_s, max_duration_s) for modes in found]
     fewest = max(round(shaper.duration_s / period_s) for shaper in shortest)
     most = min(whole_periods(max_duration_s, period_s), math.ceil(_LONGER * fewest))
@@ -197,7 +197,7 @@ def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_
 
 
 def mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[float, float]:
-    """Least and largest mean delay of non-negative impulses, in periods."""
+    """Smallest and largest mean delay of non-negative exact shapers, in periods."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
     least, largest = _vertices(matrix, right, steps / periods, -steps / periods)
@@ -207,7 +207,7 @@ def mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[fl
 
 
 def _worst_between(left: TrackNode, right: TrackNode, modes: Sequence[MovingMode]) -> float:
-    """Largest residual ratio of a mode for increments that begin between two nodes."""
+    """Largest residual ratio of a mode for increments started between two nodes."""
     times = sorted({*left.shaper.times_s.tolist(), *right.shaper.times_s.tolist()})
     first, second = (
         np.array([dict(zip(s.times_s.tolist(), s.amplitudes.tolist(), strict=True)).get(t, 0.0) for t in times])
@@ -222,10 +222,10 @@ def _worst_between(left: TrackNode, right: TrackNode, modes: Sequence[MovingMode
 
 
 def design_per_axis(axis_modes: Sequence[Sequence[Mode]], period_s: float, max_duration_s: float) -> list[Fir] | None:
-    """Shortest non-negative filters, one for each axis, of one mean delay, that cancel the axis' own modes exactly.
+    """Shortest non-negative filters, one for each axis, with a common mean delay, zero residual at the axis' own modes.
 
-    The longest of them is as short as the grid permits; among the mean delays that all axes can have, the one with
-    the least sum of second central moments is taken. An axis without modes is only delayed.
+    The longest of them is as short as the grid permits; of the mean delays possible for all axes, the one with
+    the least sum of second central moments is chosen. An axis without modes is only delayed.
 
     Source: this project.
     """
@@ -263,7 +263,7 @@ def _of_mean(axis_modes: Sequence[Sequence[Mode]], period_s: float, periods: int
         if found is None:
             return None
         delays, taps = found
-        # What is left of a mode does not depend on when the first tap comes.
+        # A mode's residual does not depend on the time of the first tap.
         shaper = Shaper(((delays - delays[0]) * period_s).tolist(), taps.tolist())
         if max(shaper.residual_ratio(mode) for mode in modes) > RESIDUAL_LIMIT:
             return None

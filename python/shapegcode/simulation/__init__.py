@@ -1,1 +1,1 @@
-"""A program simulated on the machine: figures and motion."""
+"""Simulation of a program on the machine: figures and motion."""

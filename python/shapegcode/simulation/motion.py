@@ -1,4 +1,4 @@
-"""A motion that passes by: its largest values and envelopes are kept, and it is written to files piece by piece."""
+"""Streams a motion: stores its largest values and envelopes, and writes it to files piece by piece."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class MotionEnvelope:
     """Minimum and maximum of several curves over equal intervals of samples, as short as their number allows."""
 
     def __init__(self, most: int = _BUCKETS) -> None:
-        """At most *most* intervals, 2 or more."""
+        """Create an envelope of at most *most* intervals, 2 or more."""
         self._most = most
         self._low = self._high = self._rest = np.empty((0, 0))
         self.samples_per_bucket = 1
 
     def add(self, values: FloatArray) -> None:
-        """Further samples, (k, curves)."""
+        """Add samples, (k, curves)."""
         if not self._rest.shape[1]:
             self._low = self._high = self._rest = np.empty((0, values.shape[1]))
         rest = np.concatenate([self._rest, values])
@@ -49,7 +49,7 @@ class MotionEnvelope:
         """Join pairs of intervals; an odd last one goes back to the waiting samples."""
         pairs = len(self._low) // 2
         if len(self._low) % 2:
-            # Its two extremes stand for it until its stretch is full.
+            # Its two extremes represent it until its interval is full.
             extremes = np.repeat(self._low[-1:], self.samples_per_bucket, axis=0)
             extremes[-1] = self._high[-1]
             self._rest = np.concatenate([extremes, self._rest])
@@ -60,7 +60,7 @@ class MotionEnvelope:
     def result(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Middle of each interval in samples since the first, (n,); minimum and maximum, (n, curves)."""
         if not self._rest.shape[1]:
-            raise ValueError("no sample: an envelope needs one or more")
+            raise ValueError("no sample: an envelope needs at least one")
         low, high = self._low, self._high
         starts = np.arange(len(low), dtype=np.float64) * self.samples_per_bucket
         middles = starts + (self.samples_per_bucket - 1) / 2
@@ -76,16 +76,16 @@ class MotionRecorder:
     """Largest values of a motion, axis by axis, and its curves as envelopes."""
 
     def __init__(self, period_s: float) -> None:
-        """Of a motion whose samples are one period apart."""
+        """Record a motion sampled once per period."""
         self._period_s = period_s
         self._begin_s = self._end_s = 0.0
-        self.samples = 0  # that have passed
+        self.samples = 0  # number of samples so far
         self._largest: dict[str, FloatArray] = {}
         self._velocity: FloatArray | None = None
         self._envelope = MotionEnvelope()
 
     def add(self, chunk: Chunk) -> None:
-        """Further samples."""
+        """Add samples."""
         if not self.samples:
             self._begin_s = float(chunk.time_s[0])
         before = chunk.velocity_mm_per_s[:1] if self._velocity is None else self._velocity
@@ -117,7 +117,7 @@ class MotionRecorder:
         csv: str | None = None,
         npz: str | None = None,
     ) -> Motion:
-        """What has passed."""
+        """The motion so far."""
         middles, low, high = self._envelope.result()
         return Motion(
             lines=lines,
@@ -135,7 +135,7 @@ class MotionRecorder:
 
 
 _COPY_BYTES = 1 << 20
-_ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same motion gives the same bytes
+_ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # equal motions give equal bytes
 
 
 WriteMotion = Callable[[Chunk], None]  # appends the rows of a chunk to a file
@@ -157,7 +157,7 @@ def _csv(stream: BinaryIO) -> WriteMotion:
 
 
 class _Npz:
-    """One temporary file per column, put together at the end: an archive holds them one after the other."""
+    """One temporary file per column, joined at the end, as an archive stores columns one after the other."""
 
     def __init__(self, folder: Path | None, files: contextlib.ExitStack) -> None:
         self._folder = folder
@@ -168,7 +168,7 @@ class _Npz:
     def write(self, chunk: Chunk) -> None:
         for name, column in {**chunk.columns(), "kind": chunk.kind}.items():
             if name not in self._columns:
-                # The stack closes it, and then it is gone.
+                # Deleted when the stack closes it.
                 file = self._files.enter_context(tempfile.TemporaryFile(dir=self._folder))  # noqa: SIM115
                 self._columns[name] = (file, column.dtype)
             self._columns[name][0].write(np.ascontiguousarray(column).data)
@@ -200,7 +200,7 @@ def _header(stream: object, dtype: np.dtype[np.generic], shape: tuple[int, ...])
 
 @contextlib.contextmanager
 def csv_file(path: str | Path) -> Iterator[WriteMotion]:
-    """A CSV file of `kind` and `Chunk.columns`, their names first, shortest numbers; ``-`` is standard output."""
+    """A CSV file of `kind` and `Chunk.columns`, with a header, shortest numbers; ``-`` is standard output."""
     if path == "-":
         yield _csv(sys.stdout.buffer)
         sys.stdout.buffer.flush()
@@ -211,10 +211,10 @@ def csv_file(path: str | Path) -> Iterator[WriteMotion]:
 
 @contextlib.contextmanager
 def npz_file(path: str | Path) -> Iterator[WriteMotion]:
-    """A NumPy archive of `Chunk.columns`, `kind` and its names; it takes twice the room in its folder meanwhile."""
+    """A NumPy archive of `Chunk.columns`, `kind` and its names; needs twice its size in its folder meanwhile."""
     target = Path(path).resolve()
     with named_errors(path), contextlib.ExitStack() as files, replaced_file(path) as stream:
-        # Beside the file, where there is room for it; not beside a device.
+        # In the file's folder, which has space; not in that of a device.
         npz = _Npz(target.parent if target.is_file() or not target.exists() else None, files)
         yield npz.write
         npz.finish(stream)

@@ -1,4 +1,4 @@
-"""The pictures of a simulation: the motion of each axis over time, and the region that vibrates most."""
+"""The pictures of a simulation: the motion of each axis over time, and the region with most vibration."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 _COMMAND, _RESPONSE = plot.COLOURS[1], plot.COLOURS[0]
 _MOVES_MM = 1e-9
-_DENSE = 0.2  # share of the panel's height
-# Label of the axis, factor from the curve's own unit, and which curves it shows: number, colour, name.
+_DENSE = 0.2  # ratio to the panel's height
+# Label of the axis, factor from the curve's own unit, and curves: number, colour, name.
 _Row = tuple[str, float, tuple[tuple[int, str, str], ...]]
 _ROWS: tuple[_Row, ...] = (
     ("position\nin mm", 1.0, ((0, _COMMAND, "command"), (1, _RESPONSE, "response"))),
@@ -33,7 +33,7 @@ _ROWS: tuple[_Row, ...] = (
 
 
 def plots_of(simulation: Simulation) -> dict[str, Plot]:
-    """Its pictures by name."""
+    """Pictures of a simulation, by name."""
     found: dict[str, Plot] = {}
     if simulation.motion is not None:
         found["motion"] = partial(plot_motion, simulation.motion)
@@ -49,13 +49,13 @@ def _worst_region(simulation: Simulation) -> SimulatedRegion:
 
 
 def plot_motion(motion: Motion, ax: Axes | None = None) -> Axes:
-    """How does each axis move, and how far is the table from its command?
+    """Plot the motion of each axis, and the deviation of table from command.
 
-    One column for each axis that moves. A long motion is drawn as the band between the least and the largest value of
-    each stretch of time, so that no peak is lost.
+    One column for each axis that moves. A long motion is drawn as the band between minimum and maximum of
+    each interval, so that no peak is lost.
 
     Args:
-        motion: what was simulated.
+        motion: the simulated motion.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -87,7 +87,7 @@ def plot_motion(motion: Motion, ax: Axes | None = None) -> Axes:
 
 
 def _band(panel: Axes, times: FloatArray, low: FloatArray, high: FloatArray, colour: str, name: str) -> None:
-    """A curve, or the band of several samples; a wide one is light, so that it does not pass for a solid."""
+    """A curve, or the band of several samples; a wide one is light, so that it does not look solid."""
     width = high - low
     tall = float(high.max() - low.min())
     dense = tall > 0 and float(np.median(width)) > _DENSE * tall
@@ -95,6 +95,6 @@ def _band(panel: Axes, times: FloatArray, low: FloatArray, high: FloatArray, col
         panel.fill_between(times, low, high, color=colour, alpha=0.3 if dense else 1.0, linewidth=0)
     if dense:
         panel.plot(times, np.array([low, high]).T, color=colour, linewidth=0.5)
-        panel.plot([], [], color=colour, alpha=0.4, linewidth=6, label=f"{name}, minimum to maximum of each section")
+        panel.plot([], [], color=colour, alpha=0.4, linewidth=6, label=f"{name}, minimum to maximum of each interval")
     else:
         panel.plot(times, (low + high) / 2, color=colour, linewidth=0.9, label=name)

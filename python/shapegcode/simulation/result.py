@@ -1,4 +1,4 @@
-"""What a simulation shows: each cutting region from rest to rest, and the motion of the whole program in time."""
+"""Result of a simulation: each cutting region from rest to rest, and the motion of the whole program."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from shapegcode.results.page.model import Figure
 
 
-# With a feed drive what is left between command and table is vibration and the lag of the servo loop.
+# With a feed drive the difference of command and table is vibration and servo lag.
 _LEAST_SHOWN_UM = 0.005
 _NAMES = {"modal": ("residual vibration", "peak vibration"), "feed-drive": ("error after the stop", "largest error")}
 
@@ -30,66 +30,66 @@ _NAMES = {"modal": ("residual vibration", "peak vibration"), "feed-drive": ("err
 class RegionRun:
     """One cutting region simulated."""
 
-    lines: tuple[int, int]  # first and last of the program, from 1
+    lines: tuple[int, int]  # first and last line of the program, from 1
     shaped: bool  # simulated as shaped blocks
     was_rapid: bool  # shaped blocks in place of a rapid
     time_s: float  # until the set-points rest
-    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis once the set-points rest
-    # from that instant until it stays within the band; None: not within the limit, or no band
+    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis after the set-points rest
+    # time from then until it stays within the band; None: not within the limit, or no band
     settling_time_s: Xyz[float | None]
     period_s: float = field(metadata=hidden())  # time between two samples
-    path: _core.Path = field(metadata=hidden())  # what it is measured against
-    # what the core measured, with the samples that were recorded
+    path: _core.Path = field(metadata=hidden())  # path against which it is measured
+    # measured by the core, with the recorded samples
     figures: _core.SimulationFigures = field(metadata=hidden())
-    # simulates it again and keeps as many samples as one says
+    # simulates it again with the given number of recorded samples
     replay: Callable[[int], _core.SimulationFigures] = field(metadata=hidden())
 
     @property
     def command_mm(self) -> FloatArray:
-        """Set-points after every filter, (n, 3); the decay after the stop included."""
+        """Set-points after all filters, (n, 3), including the decay after the stop."""
         return self.figures.recorded_command
 
     @property
     def response_mm(self) -> FloatArray:
-        """The table at the same instants, (n, 3)."""
+        """Table positions at the same instants, (n, 3)."""
         return self.figures.recorded_response
 
 
 @dataclass(frozen=True)
 class ShapedFigures:
-    """The regions of a program that are shaped blocks, in the worse of both rules of timing, as `convert` reports them.
+    """Figures of the shaped regions of a program, with the worse rule of block timing, as in `convert`.
 
-    Shaped rapids are left out.
+    Without shaped rapids.
     """
 
-    regions: int  # how many there are
+    regions: int  # number of regions
     cutting_time_s: float  # until the set-points rest
-    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis once the set-points rest
+    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis after the set-points rest
     peak_vibration_um: Xyz[float]  # before that
-    contour_error_um: Tracks[ContourError]  # against the path that the simulation names
+    contour_error_um: Tracks[ContourError]  # against the path named in the simulation
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A whole program in time, or some of its lines: its largest values, and its curves as envelopes.
+    """Motion of a whole program, or some of its lines: largest values, and curves as envelopes.
 
     Attributes:
-        lines: first and last that are looked at; None: all.
-        every: of how many samples one is in the files.
-        samples: how many there are.
-        end_s: time of the last one.
+        lines: first and last line shown; None: all.
+        every: the files have every *every*-th sample.
+        samples: number of samples.
+        end_s: time of the last sample.
         largest_speed_mm_per_min: of the command.
         largest_acceleration_mm_per_s2: of the command, by second difference.
-        largest_error_um: |response - command|.
-        largest_motor_force_n: with feed drives.
-        largest_friction_force_n: likewise.
-        csv: file that was written.
-        npz: likewise.
-        program: its name.
-        times_s: middle of each of n stretches of time.
-        low: least value in each stretch, (n, curves, 3): command and response (mm), speed of the command (mm/s), its
+        largest_error_um: largest |response - command|.
+        largest_motor_force_n: largest motor force, with feed drives.
+        largest_friction_force_n: largest friction force, likewise.
+        csv: CSV file written.
+        npz: NumPy file written.
+        program: name of the program.
+        times_s: middle of each of n intervals.
+        low: minimum in each interval, (n, curves, 3): command and response (mm), speed of the command (mm/s), its
             acceleration (mm/s²), response minus command (mm), with feed drives force of the motor and friction (N).
-        high: largest value, likewise.
+        high: maximum, likewise.
     """
 
     lines: tuple[int, int] | None
@@ -109,7 +109,7 @@ class Motion:
     npz: str | None = field(default=None, metadata=sparse())
 
     def table(self) -> Table:
-        """Its largest values by axis."""
+        """Table of the largest values by axis."""
         forces = (("force of the motor N", self.largest_motor_force_n), ("friction N", self.largest_friction_force_n))
         rows: list[tuple[str, Xyz[float], float, int]] = [
             ("speed of the command m/min", self.largest_speed_mm_per_min, 1e-3, 2),
@@ -127,31 +127,31 @@ class Motion:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Simulation(Result):
-    """A program simulated on the machine's model as it is; figures are the largest of its cutting regions.
+    """A program simulated unchanged on a model of the machine; figures are the largest of its cutting regions.
 
     Attributes:
         program: name of the program.
         machine: name of the machine.
         plant: "modal" or "feed-drive".
-        shaped: regions of it were simulated block by block at their feed, as shapegcode writes them.
+        shaped: some regions were simulated block by block at their feed, as in an emitted program.
         measured_against: the program whose path the contour error is measured against; its own name for its own path.
         cycle_time_s: whole program: regions, rapids with in-position wait, dwells, drilling cycles.
-        cutting_time_s: the regions alone, until the set-points rest.
+        cutting_time_s: regions only, until the set-points rest.
         residual_vibration_um: largest |response - command| of each axis once the set-points rest.
-        peak_vibration_um: before that.
-        settling_time_s: from that instant until it stays within the band; None: not within the limit, or no band.
-        settling_band_um: of the machine file (`tolerance.residual_floor_um`); 0: none.
-        settling_limit_s: how long it is looked at.
+        peak_vibration_um: largest before that.
+        settling_time_s: time from then until it stays within the band; None: not within the limit, or no band.
+        settling_band_um: band from the machine file (`tolerance.residual_floor_um`); 0: none.
+        settling_limit_s: observed time after a stop.
         contour_error_um: against the path of `measured_against`.
         orbit_error_percent: of the command on each arc.
         response_orbit_error_percent: of the table, likewise.
         regions: the cutting regions in order.
-        of_shaped: the shaped regions alone; None: there are none.
-        verdict: with `against`: the whole program judged beside its original in the operating conditions that count, as
-            `convert` judges what it writes.
-        motion: the whole program in time; None: not asked for.
-        warnings: of the program and of the machine.
-        simulated: the program, to simulate it again for a page.
+        of_shaped: the shaped regions only; None: no shaped regions.
+        verdict: with `against`: verdict of the whole program and its original in the relevant operating conditions, as
+            `convert` judges its output.
+        motion: motion of the whole program; None: not requested.
+        warnings: on the program and the machine.
+        simulated: the program, for a page.
     """
 
     program: str
@@ -178,7 +178,7 @@ class Simulation(Result):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Published methods of the controller and the plant."""
+        """Published methods of the models of controller and plant."""
         return () if self.simulated is None else self.simulated.methods
 
     @property
@@ -188,7 +188,7 @@ class Simulation(Result):
 
     @property
     def answer(self) -> str:
-        """How long it takes, how much it vibrates after a stop, how far it leaves the path."""
+        """Cycle time, residual vibration and contour error."""
         takes = f"{Path(self.program).name} takes {self.cycle_time_s:.2f} s on {self.machine}"
         if not self.regions:
             return f"{takes}; no cutting region ({self.plant} plant)"
@@ -221,12 +221,12 @@ class Simulation(Result):
 
     @property
     def next_step(self) -> str:
-        """The one thing to do next, in one sentence."""
+        """Next command, in one sentence."""
         if self.shaped and self._own_path:
-            return "simulate it with --against ORIGINAL: only then is the contour error that of the part"
+            return "simulate it with --against ORIGINAL: only then the contour error is that of the part"
         if self.shaped:
             return "shapegcode measure ORIGINAL SHAPED shows where on the part the errors are"
-        return "shapegcode convert shapes this program and shows what it gains"
+        return "shapegcode convert shapes this program and shows the gain"
 
     def key_figures(self) -> tuple[Figure, ...]:
         """Time, vibration after a stop and contour error of the machine table."""
@@ -245,7 +245,7 @@ class Simulation(Result):
         )
 
     def tables(self) -> list[Table]:
-        """Vibration and settling by axis; contour and orbit errors; the motion in time."""
+        """Tables of vibration and settling by axis; contour and orbit errors; the motion."""
         regions = [self._vibration_table(), self._contour_table()] if self.regions else []
         if self.verdict is not None and self.verdict.cases:
             regions.append(case_table(self.verdict.cases, self.verdict.worst_case))
@@ -295,5 +295,5 @@ class Simulation(Result):
         return Table("", columns, rows)
 
     def plots(self) -> Mapping[str, Plot]:
-        """`motion`, if it was asked for; `path`, `feed`, `vibration` of the region that vibrates most."""
+        """`motion`, if requested; `path`, `feed`, `vibration` of the region with most vibration."""
         return self._drawn_beside()

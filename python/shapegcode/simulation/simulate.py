@@ -1,4 +1,4 @@
-"""A program simulated on the machine's model, without changing it."""
+"""Simulates a program on a model of the machine, without changing it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from shapegcode.simulation.motion import MotionRecorder, csv_file, npz_file
 from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation
 from shapegcode.verdict.judge import judge_program
 
-# How long behind a stop its settling time is looked for. A drive is integrated all that time.
+# Observed time after a stop for settling. A drive is integrated all that time.
 _SHORTEST_REST_S, _LONGEST_REST_S, _DRIVE_REST_S = 0.5, 10.0, 0.5
 
 
@@ -38,32 +38,32 @@ def simulate(
     record_samples: int = 200_000,
     on_progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Simulation:
-    """Simulate the cutting regions of a program through the controller's model and the plant, each from rest to rest.
+    """Simulate each cutting region of a program from rest to rest, through models of controller and plant.
 
-    `simulate_motion` and `stream` simulate the whole program in one.
+    `simulate_motion` and `stream` simulate the whole program as one motion.
 
     Args:
-        program: what to simulate, or its file.
+        program: the program, or its file.
         machine: controller and plant.
-        plant: "modal" for the modes behind an ideal servo, "feed-drive" for `axes.*.drive`; what is said of vibration
-            then holds the lag of the servo loop.
-        shaped: whether cuts are shaped blocks: simulated at their feed, without look-ahead, behind the control's own
-            filter (`controller.shaped_time_constant_s`), in the worse of both rules of block timing. None: those
-            regions of which the program says so, as one that shapegcode wrote does.
+        plant: "modal" for an ideal servo followed by the modes, "feed-drive" for `axes.*.drive`; vibration figures
+            then include servo lag.
+        shaped: the cuts are shaped blocks: simulated at their feed, without look-ahead, through the control's own
+            filter (`controller.shaped_time_constant_s`), with the worse rule of block timing. None: the
+            regions marked as shaped in an emitted program.
         against: the original of a shaped program: the contour error is measured against its path, and the whole program
-            is judged beside it in the operating conditions that count, as `convert` judges what it writes. None: the
+            gets a verdict in the relevant operating conditions, as in `convert`. None: the
             program's own path, and no verdict.
-        record_samples: samples of command and response kept per region, at most; 0: figures only.
-        on_progress: called with regions done and regions in all.
+        record_samples: largest number of stored samples per region; 0: figures only.
+        on_progress: called with completed and total regions.
 
     Returns:
-        The figures of the regions, and their samples.
+        Figures of the regions, and their samples.
 
     Raises:
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.
-        ArgumentError: there is no such plant, a limit of the machine is not usable, or `against` has a cut that the
-            program has not.
+        ArgumentError: an unknown plant, an unusable limit of the machine, or `against` has a cut that the
+            program lacks.
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
@@ -82,7 +82,7 @@ def simulate(
     runs: list[RegionRun] = []
     simulated: list[_core.SimulationFigures] = []
     of_shaped: list[_core.SimulationFigures] = []
-    # A planner that cannot be switched off has the arcs of an emitted program as they are emitted, in every cut.
+    # A planner that cannot be switched off executes the emitted arcs in every cut of an emitted program.
     emitted = model.always_plans and (program.shaped_regions > 0 if shaped is None else shaped)
     for done, region in enumerate(program.regions, start=1):
         as_shaped = region.shaped if shaped is None else shaped
@@ -150,28 +150,28 @@ def simulate_motion(
     every: int = 1,
     on_progress: Callable[[float], None] = lambda _done: None,
 ) -> Motion:
-    """Simulate a whole program in time; keep the largest values and the curves of its motion, and write it to files.
+    """Simulate the motion of a whole program; returns largest values and curves, and writes it to files.
 
     Memory does not grow with the length of the program.
 
     Args:
-        program: what to simulate, or its file.
+        program: the program, or its file.
         machine: controller and plant.
         plant: "modal" or "feed-drive", see `simulate`.
-        shaped: cuts are shaped blocks, see `simulate`.
-        lines: look at what happens in these lines alone, see `stream`.
-        csv: file of one line per sample; "-": standard output.
+        shaped: the cuts are shaped blocks, see `simulate`.
+        lines: only the motion in these lines, see `stream`.
+        csv: file with one line per sample; "-": standard output.
         npz: NumPy archive with the same columns.
-        every: write every such sample only.
-        on_progress: called with the share that is done.
+        every: write only every *every*-th sample.
+        on_progress: called with the completed fraction.
 
     Returns:
         Largest values by axis, and envelopes of the curves.
 
     Raises:
         ProgramError: the program cannot be read.
-        OSError: a file cannot be read or written; what was there before stays.
-        ArgumentError: a plant or lines that do not exist, or lines in which nothing happens.
+        OSError: a file cannot be read or written; an existing file remains.
+        ArgumentError: an invalid plant or line range, or lines without motion.
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
@@ -192,7 +192,7 @@ def simulate_motion(
             on_progress(float(chunk.time_s[-1]) / whole_s)
         if not recorder.samples:
             first, last = lines or (1, program.core.line_count)
-            raise _core.ArgumentError(f"lines {first}-{last}: nothing happens there: name other lines")
+            raise _core.ArgumentError(f"lines {first}-{last}: no motion there: specify other lines")
     names = {name: None if file is None else str(file) for name, file in (("csv", csv), ("npz", npz))}
     return recorder.result(program.source, lines=lines, every=every, **names)
 
@@ -230,7 +230,7 @@ def _play(
 
 
 def _settling_s(simulated: Iterable[_core.SimulationFigures], band_um: float) -> Xyz[float | None]:
-    """Longest settling time of each axis; None where it does not settle, or no band is given."""
+    """Longest settling time of each axis; None: it does not settle, or no band."""
     rows = [figures.settling_s for figures in simulated]
     longest = np.max(rows, axis=0) if rows else np.zeros(3)
     return Xyz(*(float(value) if band_um > 0.0 and math.isfinite(value) else None for value in longest))

@@ -1,6 +1,6 @@
-"""A test cut: tool, cutting conditions and measuring passes, and the side file that keeps them for the fit.
+"""A test cut: tool, cutting conditions and measuring passes, and the side file with them for the fit.
 
-A pass goes along +X at a constant Y; over X the height of the material's edge above the wall that it leaves is known.
+A pass moves along +X at constant Y; the height of the stock edge above the finished wall is known over X.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ class CuttingLaw:
     """The coefficients of the force law, as in the tool file's ``[cutting]``; see docs/concepts/cutting_force.md."""
 
     specific_n_per_mm2: float  # specific cutting force k1 at a chip 1 mm thick
-    specific_exponent: float = 0.0  # of the chip thickness in k1
-    ratio: float = 0.0  # of radial to tangential force, k2, at a chip 1 mm thick
-    ratio_exponent: float = 0.0  # of the chip thickness in k2
+    specific_exponent: float = 0.0  # exponent of the chip thickness in k1
+    ratio: float = 0.0  # ratio of radial to tangential force, k2, at a chip 1 mm thick
+    ratio_exponent: float = 0.0  # exponent of the chip thickness in k2
     tangential_edge_n_per_mm: float = 0.0  # tangential force of the edge per length, K_te
     radial_edge_n_per_mm: float = 0.0  # radial force of the edge per length, K_re
-    # to which the exponents belong, "mean" of the engagement or "local"
+    # chip thickness of the exponents, "mean" of the engagement or "local"
     chip_thickness: Literal["mean", "local"] = "mean"
 
     @classmethod
@@ -46,7 +46,7 @@ class CuttingLaw:
         return cls(**values, chip_thickness="local" if law.thickness == _core.ChipThickness.local else "mean")
 
     def core(self) -> _core.CuttingCoefficients:
-        """As the core takes them."""
+        """Coefficients of the core."""
         values = {name: float(getattr(self, name)) for name in COEFFICIENTS}
         return _core.CuttingCoefficients(**values, thickness=_core.ChipThickness.__members__[self.chip_thickness])
 
@@ -55,11 +55,11 @@ class CuttingLaw:
 class CutTool:
     """The end mill of a test cut."""
 
-    diameter_mm: _Positive  # as it turns, measured
+    diameter_mm: _Positive  # measured when turning
     flutes: Annotated[int, Field(gt=0)]  # their number
     helix_deg: _Finite  # right-hand helix
-    runout_mm: tuple[_Finite, ...] = ()  # how far each flute stands out; empty: not known
-    cutting: CuttingLaw = CuttingLaw(0.0)  # the force law that is known before
+    runout_mm: tuple[_Finite, ...] = ()  # radial runout of each flute; empty: unknown
+    cutting: CuttingLaw = CuttingLaw(0.0)  # the force law known before
 
     @property
     def radius_mm(self) -> float:
@@ -69,16 +69,16 @@ class CutTool:
 
 @dataclass(frozen=True)
 class MeasuringPass:
-    """One pass whose force is recorded."""
+    """One pass with recorded force."""
 
-    name: str  # what is special about it
+    name: str  # its characteristic
     start_mm: _Finite  # X of the tool's axis at its start, in the air
     end_mm: _Finite  # X at its end, in the air
     # ascending X of the edge's corner points, from one end of the stock to the other
     edge_x_mm: Annotated[tuple[_Finite, ...], Field(min_length=2)]
-    # how high the edge stands there above the wall that the pass leaves; straight between them
+    # height of the edge there above the finished wall; linear in between
     edge_height_mm: Annotated[tuple[_Finite, ...], Field(min_length=2)]
-    # pairs (X up to which it holds, feed in mm/min), ascending
+    # pairs (upper end in X, feed in mm/min), ascending
     feeds: Annotated[tuple[tuple[_Finite, _Positive], ...], Field(min_length=1)]
 
     @property
@@ -88,12 +88,12 @@ class MeasuringPass:
 
     @property
     def constant_feed(self) -> bool:
-        """Whether one feed holds from its start to its end."""
+        """Whether the whole pass has one feed."""
         return len({feed for _, feed in self.feeds}) == 1
 
     @property
     def duration_s(self) -> float:
-        """From start to end at the commanded feeds."""
+        """Duration at the commanded feeds, s."""
         begins = (self.start_mm, *(end for end, _ in self.feeds))
         return sum((end - begin) / feed * 60.0 for begin, (end, feed) in zip(begins, self.feeds, strict=False))
 
@@ -113,15 +113,15 @@ class MeasuringPass:
 
 @dataclass(frozen=True)
 class TaperDetails:
-    """What is special about a taper."""
+    """Parameters of a taper."""
 
-    radial_depth_mm: tuple[float, float]  # at the begin and at the end of the stock
+    radial_depth_mm: tuple[float, float]  # at the start and end of the stock
     length_mm: float  # of the stock
 
 
 @dataclass(frozen=True)
 class Deepest:
-    """Where a pass meets most."""
+    """Largest radial depth of a pass."""
 
     max: float  # radial depth, mm
     at_mm: float  # X of the tool's axis
@@ -129,38 +129,38 @@ class Deepest:
 
 @dataclass(frozen=True)
 class DeeperStretch:
-    """Where passes meet more than the corner has, by more than 1 µm, as the tool that mills the edge is round."""
+    """Range where passes are over 1 µm deeper than in the corner, as the tool milling the edge is round."""
 
-    from_mm: float  # X at its begin
+    from_mm: float  # X at its start
     to_mm: float  # X at its end
-    most_mm: float  # how much more
+    most_mm: float  # largest additional depth
 
 
 @dataclass(frozen=True)
 class CornerDetails:
-    """What is special about an unrolled corner."""
+    """Parameters of an unrolled corner."""
 
     allowance_mm: float  # radial depth on the walls
     rough_radius_mm: float  # of the rough corner
     finish_radius_mm: float  # of the finished corner
     interval_mm: float  # length of a block with a feed of its own
-    corner_begins_at_mm: float  # X
-    radial_depth_mm: Deepest  # the deepest place
-    deeper_than_corner: DeeperStretch | None  # where more is met than the corner has; None: nowhere
+    corner_begins_at_mm: float  # X where the corner begins
+    radial_depth_mm: Deepest  # largest radial depth
+    deeper_than_corner: DeeperStretch | None  # where it is deeper than in the corner; None: nowhere
 
 
 @dataclass(frozen=True)
 class IntervalDetails:
     """Parameters of an interval test."""
 
-    radial_depth_mm: float  # everywhere
+    radial_depth_mm: float  # constant
     intervals_mm: tuple[_Positive, ...]  # length of the blocks of each pass
     steps_begin_at_mm: float  # X of the first change of the feed
 
 
 @dataclass(frozen=True)
 class TestCut:
-    """One test cut, as its side file holds it.
+    """One test cut, with the content of its side file.
 
     Attributes:
         kind: "taper", "corner" or "interval".
@@ -168,13 +168,13 @@ class TestCut:
         machine: name of the machine.
         tool: the end mill.
         spindle_rev_per_min: clockwise (M03).
-        axial_depth_mm: of every pass.
+        axial_depth_mm: axial depth of every pass.
         milling: "down": the material is on the right of the feed; "up": on its left.
-        passes: in the order of the program.
-        about: figures of this kind.
+        passes: in program order.
+        about: parameters of this kind.
     """
 
-    __test__ = False  # not for pytest, whatever its name
+    __test__ = False  # not a test for pytest
 
     kind: _Kind
     program: str
@@ -206,7 +206,7 @@ def read_test_cut(path: str | Path) -> TestCut:
         path: the file.
 
     Returns:
-        What was cut.
+        The test cut.
 
     Raises:
         ArgumentError: not such a file, or a value in it is missing or impossible.
@@ -216,7 +216,7 @@ def read_test_cut(path: str | Path) -> TestCut:
         with DataFile(path, ArgumentError) as file:
             data = file.json(str(path), file.read())
     except ValueError as error:
-        raise ArgumentError(f"{path}: no JSON: {error}") from error
+        raise ArgumentError(f"{path}: not valid JSON: {error}") from error
     if not isinstance(data, dict) or data.get("format") != _FORMAT:
         raise ArgumentError(f"{path}: not the side file of a test cut ('format' must be {_FORMAT!r})")
     try:
@@ -226,14 +226,14 @@ def read_test_cut(path: str | Path) -> TestCut:
         where = ".".join(map(str, first["loc"]))
         raise ArgumentError(f"{path}: {where}: {first['msg']}: write the test cut again") from error
     if type(cut.about) is not FIGURES[cut.kind]:
-        raise ArgumentError(f"{path}: the figures in 'about' are not those of a {cut.kind}: write the test cut again")
+        raise ArgumentError(f"{path}: the parameters in 'about' are not of a {cut.kind}: write the test cut again")
     wrong = next((number for number, each in enumerate(cut.passes, start=1) if not each.consistent), None)
     if wrong is not None:
-        raise ArgumentError(f"{path}: pass {wrong}: edge, feeds and ends do not fit together: write the test cut again")
+        raise ArgumentError(f"{path}: pass {wrong}: edge, feeds and ends are inconsistent: write the test cut again")
     return cut
 
 
-# --- edges: heights count from the wall of the measuring pass, outwards -----------------------------------------------
+# --- edges: heights are outwards from the wall of the measuring pass --------------------------------------------------
 
 _GRID_MM, _CHORD_MM = 0.004, 1e-4
 _MOVED = 9  # increments
@@ -241,7 +241,7 @@ _MOVED = 9  # increments
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """A line of points, ascending in X; straight between them, and beyond the ends on as at the ends."""
+    """A polyline, ascending in X; extended straight beyond both ends."""
 
     x_mm: FloatArray  # (n,) at least 2
     height_mm: FloatArray  # (n,)
@@ -258,14 +258,14 @@ class Edge:
 def unrolled_edge(
     s_mm: FloatArray, radial_depth_mm: FloatArray, radius_mm: float, stock_mm: float, at_mm: float
 ) -> Edge:
-    """The edge on which a straight pass meets the radial depth of another path at each distance."""
+    """Edge on which a straight pass has the radial depth of another path at each distance."""
     depth = radial_depth_mm
     if depth.max() >= radius_mm:
         raise ArgumentError(
-            f"the radial depth reaches {depth.max():.3f} mm, the tool's radius is {radius_mm:g} mm: such a corner "
+            f"the radial depth reaches {depth.max():.3f} mm, with a tool radius of {radius_mm:g} mm: such a corner "
             "cannot be unrolled on a straight line"
         )
-    # Where the axis stands at s, the tool's front comes out of the edge there, as high above the wall as the depth.
+    # With the axis at s, the tool's front leaves the edge as high above the wall as the depth.
     x = s_mm + at_mm + np.sqrt(radius_mm**2 - (radius_mm - depth) ** 2)
     back = np.flatnonzero(np.diff(x) <= 0.0)
     if back.size:
@@ -278,7 +278,7 @@ def unrolled_edge(
 
 
 def offset_line(line: Edge, radius: float, start: float, end: float, *, inwards: bool = False) -> Edge:
-    """Path of a tool's axis that mills an edge, within 0.1 µm; inwards: the edge that a tool on such a path leaves."""
+    """Path of a tool's axis that mills an edge, within 0.1 µm; inwards: the edge milled on such a path."""
     side = -1.0 if inwards else 1.0
     if len(line.x_mm) == 2:
         slope = float(np.diff(line.height_mm)[0] / np.diff(line.x_mm)[0])
@@ -294,10 +294,10 @@ def offset_line(line: Edge, radius: float, start: float, end: float, *, inwards:
 
 
 def on_increments(line: Edge, step_mm: float) -> Edge:
-    """The points of a line moved along it, by a few increments, to where both coordinates are increments, or nearly."""
+    """Move points along their line by a few increments, to where both coordinates are nearly whole increments."""
     tried = step_mm * (np.round(line.x_mm / step_mm)[:, None] + np.arange(-_MOVED, _MOVED + 1))
     tried[[0, -1]] = step_mm * np.round(line.x_mm[[0, -1]] / step_mm)[:, None]
-    # Neighbours stay apart.
+    # Keep neighbours apart.
     gaps = 0.4 * np.diff(line.x_mm)
     low = np.concatenate([[-np.inf], line.x_mm[1:] - gaps])
     high = np.concatenate([line.x_mm[:-1] + gaps, [np.inf]])
@@ -311,7 +311,7 @@ def on_increments(line: Edge, step_mm: float) -> Edge:
 
 
 def reduced(line: Edge, chord_mm: float = _CHORD_MM) -> Edge:
-    """As few points of a line as keep within a distance of all of them (Douglas and Peucker)."""
+    """Fewest points of a line within a distance of all its points (Douglas and Peucker)."""
     x, y = line.x_mm, line.height_mm
     keep = np.zeros(len(x), dtype=bool)
     keep[[0, -1]] = True

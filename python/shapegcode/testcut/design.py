@@ -1,4 +1,4 @@
-"""Designs test cuts: which edge, which passes, which feeds; and writes them as FANUC programs with instructions.
+"""Designs test cuts (edge, passes, feeds) and writes them as FANUC programs with instructions.
 
 Source: Y.-H. Kim, S.-L. Ko: Improvement of the Accuracy in Cornering Cut Using End Mill, 2001 (paper 001).
 """
@@ -28,23 +28,23 @@ from shapegcode.testcut.cut import CornerDetails, CutTool, Edge, IntervalDetails
 from shapegcode.testcut.forces import ForceLaw, engagement, straight_engagement
 from shapegcode.testcut.result import CutDesign
 
-_Sizes = tuple[float, float, float]  # of a corner: allowance, rough and finish radius
-_Block = tuple[float | None, float]  # X up to which a feed holds (None: the end of the pass), feed in mm/min
+_Sizes = tuple[float, float, float]  # allowance, rough and finish radius of a corner
+_Block = tuple[float | None, float]  # upper end of a feed in X (None: the end of the pass), feed in mm/min
 
 _MIN_AIR_MM, _AIR_REVS = 5.0, 20.0
-_MAX_DEPTH_RATIO = 0.95  # of the radius, up to which a radial depth is taken
+_MAX_DEPTH_RATIO = 0.95  # largest radial depth, relative to the radius
 
 
 @dataclass(frozen=True)
 class CutConditions:
-    """What every test cut needs to know; what machine and tool cannot do is refused when a cut is designed.
+    """Conditions of every test cut; impossible ones for machine or tool are refused in the design.
 
     Attributes:
-        machine: whose controller runs the program.
+        machine: machine whose controller runs the program.
         tool: the tool file.
-        feed_mm_per_min: of the measuring passes; of a corner that of its straight part.
-        axial_depth_mm: of every pass.
-        spindle_rev_per_min: of every pass; None: `feed.spindle_rev_per_min` of the tool.
+        feed_mm_per_min: feed of the measuring passes; for a corner that of its straight part.
+        axial_depth_mm: axial depth of every pass.
+        spindle_rev_per_min: spindle speed of every pass; None: `feed.spindle_rev_per_min` of the tool.
         up: up milling, the material on the left of the feed.
     """
 
@@ -69,11 +69,11 @@ class CutConditions:
 
     @property
     def diameter_mm(self) -> float:
-        """Of the tool."""
+        """Diameter of the tool, mm."""
         return 2.0 * self.tool.radius_mm
 
     def _cut_tool(self) -> CutTool:
-        """The tool as the side file holds it."""
+        """The tool, for the side file."""
         mill, law = self.tool.tool, cuts.CuttingLaw.of(self.tool.coefficients())
         runout = tuple(0.001 * value for value in mill.runout_um or ())
         return CutTool(mill.diameter_mm, mill.flutes, mill.helix_deg, runout, law)
@@ -82,7 +82,7 @@ class CutConditions:
         low, high = self.machine.controller.minimum_feed_mm_per_min, self.machine.axes.x.max_feed_mm_per_min
         for feed in feeds_mm_per_min:
             if not low <= feed <= high:
-                raise ArgumentError(f"a feed of {feed:g} mm/min: this machine takes {low:g} to {high:g} mm/min")
+                raise ArgumentError(f"a feed of {feed:g} mm/min: this machine allows {low:g} to {high:g} mm/min")
         long = self.tool.tool.flute_length_mm
         if self.axial_depth_mm > long:
             raise ArgumentError(f"an axial depth of {self.axial_depth_mm:g} mm: the flutes are {long:g} mm long")
@@ -103,8 +103,8 @@ class CornerShape:
 
     Attributes:
         allowance_mm: radial depth on the walls; None: 0.1 D of the tool.
-        rough_radius_mm: of the corner that roughing left; None: D.
-        finish_radius_mm: of the finished corner; None: D.
+        rough_radius_mm: radius of the rough corner; None: D.
+        finish_radius_mm: radius of the finished corner; None: D.
     """
 
     allowance_mm: float | None = None
@@ -112,7 +112,7 @@ class CornerShape:
     finish_radius_mm: float | None = None
 
     def _sizes_mm(self, diameter_mm: float) -> _Sizes:
-        """The three values for a tool; of what is not given, case 1 of the paper."""
+        """The three values for a tool; defaults are case 1 of the paper."""
         usual = (0.1 * diameter_mm, diameter_mm, diameter_mm)
         given = (self.allowance_mm, self.rough_radius_mm, self.finish_radius_mm)
         allowance, rough, finish = (other if own is None else own for own, other in zip(given, usual, strict=True))
@@ -130,26 +130,26 @@ def taper_cut(
     depths_mm: tuple[float, float] | None = None,
     length_mm: float = 60.0,
 ) -> CutDesign:
-    """Straight passes along a tapered work piece (paper 001, figure 4): one per feed, for k1 and k2.
+    """Straight passes along a tapered work piece (paper 001, figure 4): one per feed, to fit k1 and k2.
 
     Args:
         given: tool, spindle, axial depth, feed.
-        feeds_mm_per_min: of the passes; None: the half, once and double of the given one.
+        feeds_mm_per_min: feeds of the passes; None: 0.5, 1 and 2 times the given one.
         depths_mm: radial depth at the beginning and at the end of the stock; None: 0.05 and 0.35 of the diameter.
-        length_mm: of the stock.
+        length_mm: length of the stock.
 
     Returns:
         The design, for `write_test_cut`.
 
     Raises:
-        ArgumentError: what the tool or the machine cannot do.
+        ArgumentError: beyond the limits of tool or machine.
     """
     feeds = feeds_mm_per_min or [given.feed_mm_per_min * share for share in (0.5, 1.0, 2.0)]
     given._check_feeds(feeds)
     low, high = depths_mm or (0.05 * given.diameter_mm, 0.35 * given.diameter_mm)
     given._check_depths(low, high)
     if low == high:
-        raise ArgumentError(f"a taper with {low:g} mm at both ends: the radial depth must grow")
+        raise ArgumentError(f"a taper with {low:g} mm at both ends: the radial depth must increase")
     if high - low > 0.2 * length_mm:
         raise ArgumentError(
             f"{length_mm:g} mm are too short for a taper of {high - low:g} mm: at least 5 times as long"
@@ -165,13 +165,13 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     Args:
         given: tool, spindle, axial depth, feed on the straight walls.
         corner: to unroll; None: case 1 of the paper.
-        interval_mm: length of the blocks with a feed of their own; None: as the machine's feed control has it.
+        interval_mm: length of the blocks with their own feed; None: from the machine's feed control.
 
     Returns:
         The design, for `write_test_cut`.
 
     Raises:
-        ArgumentError: the corner cannot be unrolled, or is more than the tool or the machine can do.
+        ArgumentError: the corner cannot be unrolled, or exceeds the limits of tool or machine.
     """
     sizes = (corner or CornerShape())._sizes_mm(given.diameter_mm)
     interval = given.machine.feed_control.interval_mm if interval_mm is None else interval_mm
@@ -182,8 +182,8 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     s, depth = _corner_depth(given, sizes)
     stock = math.ceil(2.0 * straight + float(s[-1]) + radius)
     wanted_edge = cuts.unrolled_edge(s, depth, radius, stock, straight)
-    # What the round tool leaves is the edge that the passes meet: where the wanted one is hollow more sharply than
-    # the tool is round, it stays higher.
+    # The milled edge differs from the wanted one: where that is more sharply concave than the tool, material remains,
+    # and the edge is higher.
     far = 3.0 * radius
     path = cuts.offset_line(wanted_edge, radius, -far, stock + far)
     edge = cuts.reduced(cuts.offset_line(path, radius, -radius, stock + radius, inwards=True), 1e-4)
@@ -210,7 +210,7 @@ def interval_cut(
     intervals_mm: Sequence[float] = (0.2, 0.4, 0.6),
     feeds_mm_per_min: Sequence[float] | None = None,
 ) -> CutDesign:
-    """Feeds that change every so often at a constant radial depth (paper 001, figure 8): one pass per interval.
+    """Feed changes at equal distances at a constant radial depth (paper 001, figure 8): one pass per interval.
 
     Args:
         given: tool, spindle, axial depth, feed before and after.
@@ -222,7 +222,7 @@ def interval_cut(
         The design, for `write_test_cut`.
 
     Raises:
-        ArgumentError: what the tool or the machine cannot do.
+        ArgumentError: beyond the limits of tool or machine.
     """
     sizes = (corner or CornerShape())._sizes_mm(given.diameter_mm)
     depth, feed = sizes[0], given.feed_mm_per_min
@@ -253,8 +253,8 @@ def _design(
     if isinstance(about, CornerDetails) and about.deeper_than_corner is not None:
         deeper = about.deeper_than_corner
         warnings.append(
-            f"X {deeper.from_mm:.2f} to {deeper.to_mm:.2f} mm: the passes meet up to {deeper.most_mm:.3f} mm more than "
-            "the corner: there its edge is hollow more sharply than the tool is round; the side file has what is met"
+            f"X {deeper.from_mm:.2f} to {deeper.to_mm:.2f} mm: passes are up to {deeper.most_mm:.3f} mm deeper than "
+            "the corner, whose edge is more sharply concave than the tool; the side file has the real depths"
         )
     cut = cuts.TestCut(
         kind, "", given.machine.name, given._cut_tool(), given.spindle, given.axial_depth_mm,
@@ -269,7 +269,7 @@ def _measuring_pass(
 ) -> MeasuringPass:
     inside = (edge.x_mm > 0.0) & (edge.x_mm < stock_mm)
     x = np.concatenate([[0.0], edge.x_mm[inside], [stock_mm]])
-    # How far the pass goes through the air at both ends, by its largest feed.
+    # Travel in air at both ends of the pass, from its largest feed.
     air = max(_MIN_AIR_MM, math.ceil(_AIR_REVS * max(feed for _, feed in blocks) / given.spindle))
     air += given.tool.radius_mm
     end = round(stock_mm + air, 3)
@@ -289,7 +289,7 @@ def _corner_feeds(given: CutConditions, radial_depth_mm: FloatArray) -> FloatArr
 def _blocks(
     x_mm: FloatArray, feed: FloatArray, interval_mm: float, begin: float, end: float
 ) -> list[tuple[float, float]]:
-    """Blocks of one length, each with the least feed within it."""
+    """Blocks of one length, each with the lowest feed within it."""
     blocks = []
     for k in range(max(1, math.ceil((end - begin) / interval_mm - 1e-9))):
         low, high = begin + k * interval_mm, begin + (k + 1) * interval_mm
@@ -299,7 +299,7 @@ def _blocks(
 
 
 def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[FloatArray, FloatArray]:
-    """Distance along the corner's path from the beginning of S2 on, and the radial depth until it is constant again."""
+    """Distance along the corner's path from the start of S2, and the radial depth until it is constant again."""
     allowance, rough, finish = sizes
     before = 2.0 * (rough + finish)
     cut = _core.CornerCut(given.tool.radius_mm, rough, finish, allowance, before_mm=before, after_mm=before)
@@ -318,10 +318,10 @@ def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[FloatArray, Floa
 
 _SKIM_MM = 0.2
 _ROUGH_SHARE = 0.1  # of the diameter: largest radial depth of the cuts that mill the edge
-_RAW_MM = 0.5  # by which the raw edge may stand out
+_RAW_MM = 0.5  # allowed protrusion of the raw edge
 _CLEAR_Z_MM, _NEAR_Z_MM = 10.0, 2.0
-_BLOCKS_OF_EDGE = 3.0  # times the block time that a block of the edge lasts at least
-_SAMPLES_PER_TOOTH = 12.3  # no whole number: samples should not fall on the same angles over and over
+_BLOCKS_OF_EDGE = 3.0  # least duration of a block of the edge, in block times
+_SAMPLES_PER_TOOTH = 12.3  # not a whole number, so that samples do not repeat the same angles
 _TITLES = {"taper": "TAPER TEST CUT", "corner": "CORNER ON A STRAIGHT LINE", "interval": "FEED INTERVAL TEST"}
 _PURPOSES = {
     "taper": ("CUTTING COEFFICIENTS FROM A GROWING RADIAL DEPTH",),
@@ -332,12 +332,12 @@ _PER_MINUTE = 60.0
 
 
 def write_test_cut(design: CutDesign, file: str | Path, number: int = 7101) -> CutDesign:
-    """Write the program of a test cut, and beside it the side file (JSON) that `fit_test_cut` reads.
+    """Write the program of a test cut, and next to it the side file (JSON) that `fit_test_cut` reads.
 
     Args:
-        design: what to cut.
-        file: of the program; the side file has its name and the ending ``.json``.
-        number: of the program, O.
+        design: the test cut.
+        file: program file; the side file has its name with the suffix ``.json``.
+        number: program number (O word).
 
     Returns:
         The design with the names of both files.
@@ -364,7 +364,7 @@ def _program_text(design: CutDesign, number: int) -> str:
 
 
 def _text(value: float, decimals: int = 3) -> str:
-    """A number with its decimal point."""
+    """Format a number with its decimal point."""
     text = f"{value:.{decimals}f}".rstrip("0")
     return "0." if text in ("-0.", "0.") else text
 
@@ -374,12 +374,12 @@ class _Writer:
         self.design, self.cut, self.controller = design, design.cut, design.machine.controller
         self.decimals = max(1, round(-math.log10(self.controller.least_increment_mm)))
         self.radius = self.cut.tool.radius_mm
-        self.side = 1.0 if self.cut.up else -1.0  # of the material, along Y: what lies within the raw edge
-        # How far each wall lies within the raw edge.
+        self.side = 1.0 if self.cut.up else -1.0  # side of the material along Y, within the raw edge
+        # Distance of each wall within the raw edge.
         self.walls = list(accumulate(round(max(each.edge_height_mm) + _SKIM_MM, 3) for each in self.cut.passes))
 
     def head(self) -> Iterator[str]:
-        """Instructions, in lines that any control shows."""
+        """Instructions, in lines that any control can show."""
         cut = self.cut
         ends = self.side * (-_RAW_MM - 3.0 * self.radius), self.side * self.walls[-1]
         rate = math.ceil(_SAMPLES_PER_TOOTH * cut.tool.flutes * cut.spindle_rev_per_min / _PER_MINUTE / 10.0) * 10
@@ -397,7 +397,7 @@ class _Writer:
             yield "THAN THE CORNER: THE ROUND TOOL LEAVES IT"
 
     def passes(self, k: int) -> Iterator[str]:
-        """The edge of a pass, a stop, and the pass."""
+        """Lines for the edge of a pass, a stop, and the pass."""
         each, wall = self.cut.passes[k], self.walls[k]
         path = cuts.offset_line(self.design.edge, self.radius, each.start_mm, each.end_mm)
         path = cuts.on_increments(path, self.controller.least_increment_mm)
@@ -421,7 +421,7 @@ class _Writer:
         yield f"G01 Z{_text(-self.cut.axial_depth_mm, self.decimals)} F{_text(max(feed, 100.0), 1)}"
 
     def _edge(self, path: Edge, wall: float, offset: float, feed: float) -> Iterator[str]:
-        """One cut along the edge, farther out by an offset."""
+        """Lines of one cut along the edge, with an outward offset."""
         y = wall - path.height_mm - offset
         shortest = float(np.min(np.hypot(np.diff(path.x_mm), np.diff(y))))
         block_s = max(self.controller.block_time_s, self.controller.interpolation_period_s)
@@ -434,7 +434,7 @@ class _Writer:
         yield f"G00 Z{_text(_NEAR_Z_MM)}"
 
     def _offsets(self, before: float, wall: float) -> list[float]:
-        """How far outside of the edge each cut runs: none takes off much, the last one little: it bends little."""
+        """Offset of each cut outside the edge: small depths, and a very small last one with little deflection."""
         more = (
             float(np.max(wall - self.design.edge.at(np.linspace(0.0, self.design.stock_mm, 200)) - before)) - _SKIM_MM
         )

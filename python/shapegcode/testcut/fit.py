@@ -1,4 +1,4 @@
-"""Evaluate the records of a test cut: coefficients of a taper, resultant in a corner, interval that is followed."""
+"""Evaluates records of test cuts: coefficients of a taper, resultant in a corner, shortest followed interval."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ def fit_test_cut(
 
     Args:
         cut: the test cut, or its side file.
-        records: files of the passes in their order, or by the number of the pass, from 1; see docs/howto/test_cuts.md.
-        forces_on: on what the measured forces act, "workpiece" (as a dynamometer below it measures) or "tool".
-        chip_thickness: taper: to which the power laws belong, "mean" of the engagement or "local".
-        edge_forces: taper: fit the forces of the edge, K_te and K_re, too.
+        records: files of the passes in order, or by pass number, from 1; see docs/howto/test_cuts.md.
+        forces_on: the measured forces act on "workpiece" (as from a dynamometer below it) or "tool".
+        chip_thickness: taper: chip thickness of the power laws, "mean" of the engagement or "local".
+        edge_forces: taper: also fit the edge forces, K_te and K_re.
 
     Returns:
-        Of a taper the coefficients of the cutting force, of a corner measured against expected resultant, of an
+        For a taper the coefficients of the cutting force, for a corner measured and expected resultant, for an
         interval test the shortest interval that the controller follows.
 
     Raises:
-        ArgumentError: a file that cannot be used, or records that do not fit the cut or do not tell what is looked for.
+        ArgumentError: an unusable file, or records that do not match the cut or do not determine the result.
         OSError: a file cannot be read.
     """
     known = cut if isinstance(cut, TestCut) else read_test_cut(cut)
@@ -62,7 +62,7 @@ def fit_test_cut(
         if not 1 <= number <= len(known.passes):
             raise ArgumentError(f"{record}: pass {number}: the test cut has {len(known.passes)} passes")
     if known.kind != "taper" and (edge_forces or chip_thickness != "mean"):
-        raise ArgumentError(f"the test cut is a {known.kind}: edge forces and chip thickness go with a taper")
+        raise ArgumentError(f"the test cut is a {known.kind}: edge forces and chip thickness are for a taper")
     measured = {
         number: record if isinstance(record, ForceRecord) else read_forces(record, on=forces_on)
         for number, record in by_pass.items()
@@ -73,8 +73,8 @@ def fit_test_cut(
 
 
 _BINS_PER_PASS, _MIN_TURNS, _ROUNDS = 60, 4, 2
-_ONE_FILE = np.zeros(0, dtype=np.intp)  # its number is given where files are joined
-_PLACE = 0.25  # Standard error of the place of the tool, found from entry and exit, in feeds per revolution
+_ONE_FILE = np.zeros(0, dtype=np.intp)  # its number is set where files are joined
+_PLACE = 0.25  # standard error of the tool's position found from entry and exit, in feeds per revolution
 _PER_MINUTE = 60.0
 
 
@@ -82,13 +82,13 @@ def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: 
     law = cut.tool.cutting
     sampled = any(_samples(cut, number, record) >= MIN_SAMPLES for number, record in measured.items())
     for _ in range(_ROUNDS if sampled else 1):
-        # Where entry and exit lie in the record depends a little on the law.
+        # The positions of entry and exit depend slightly on the law.
         rows, passes, left_out, warnings = _reduced(cut, measured, law)
         data = _joined(rows)
         fit = forces.fit_coefficients(data, cut.tool, cut.axial_depth_mm, thickness=thickness, edge=edge)
         law = fit.law
     if fit.outlier.any():
-        warnings.append(f"{fit.outlier.sum()} of {len(fit.outlier)} mean forces do not fit the others: left out")
+        warnings.append(f"{fit.outlier.sum()} of {len(fit.outlier)} mean forces do not fit the others: ignored")
     low, high = float(fit.chip_mm.min()), float(fit.chip_mm.max())
     return TaperResult(
         cut.program, cut.machine, fit.law, fit.coefficients, fit.at_chip,
@@ -99,15 +99,15 @@ def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: 
 
 
 def _poor(fit: forces.CoefficientFit) -> Iterator[str]:
-    """Coefficients of the power laws that are not known well, in words."""
+    """Messages for poorly known coefficients of the power laws."""
     for each in fit.coefficients[:4]:
         half = 0.5 * (each.high - each.low)
         if each.name.endswith("exponent"):
             if half > result.EXPONENT_LIMIT:
-                yield f"{each.name} is known to +-{half:.3f} only (wanted: +-{result.EXPONENT_LIMIT:g})"
+                yield f"{each.name} is known only to +-{half:.3f} (needed: +-{result.EXPONENT_LIMIT:g})"
         elif half > result.FACTOR_LIMIT * each.value:
             share = 100.0 * half / each.value
-            yield f"{each.name} is known to +-{share:.0f} % only (wanted: +-{100 * result.FACTOR_LIMIT:g} %)"
+            yield f"{each.name} is known only to +-{share:.0f} % (needed: +-{100 * result.FACTOR_LIMIT:g} %)"
 
 
 def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
@@ -125,7 +125,7 @@ def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
 def _reduced(
     cut: TestCut, measured: Mapping[int, ForceRecord], law: CuttingLaw
 ) -> tuple[list[MeanForces], list[result.TaperPass], list[result.LeftOut], list[str]]:
-    """Reduce the records to mean forces, as recorded or of revolutions in full engagement without chatter."""
+    """Reduce the records to mean forces, as recorded, or over revolutions in full engagement without chatter."""
     rows: list[MeanForces] = []
     passes: list[result.TaperPass] = []
     left_out: list[result.LeftOut] = []
@@ -146,14 +146,14 @@ def _reduced(
             low, high = float(found.x_mm[first]), float(found.x_mm[behind - 1])
             left_out.append(result.LeftOut(number, low, high))
             warnings.append(
-                f"{shown.file}: X {low:.1f} to {high:.1f} mm left out: the force oscillates far more there than in the "
+                f"{shown.file}: X {low:.1f} to {high:.1f} mm ignored: the force oscillates far more there than in the "
                 "rest of the pass (chatter?)"
             )
     return rows, passes, left_out, warnings
 
 
 def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> MeanForces:
-    """Rows that are means already: at the radial depth that the file states, or at its positions."""
+    """Use rows that are means already, at the file's radial depths or positions."""
     if record.radial_depth_mm is not None:
         depth = record.radial_depth_mm
         wrong = np.flatnonzero((depth <= 0.0) | (depth >= 2.0 * cut.tool.radius_mm))
@@ -179,13 +179,13 @@ def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> Me
 
 
 def _of_revolutions(cut: TestCut, measuring: MeasuringPass, found: Revolutions) -> MeanForces:
-    """Means over some revolutions each, chatter left out."""
+    """Mean forces over groups of revolutions without chatter."""
     margin = 2.0 * found.feed_mm_per_min / found.record.spindle_rev_per_min
     kept = np.flatnonzero(fully_engaged(cut, measuring, found.x_mm, margin) & ~found.chatter)
     if kept.size < _MIN_TURNS:
         raise ArgumentError(f"{found.record.file}: {kept.size} revolutions in full engagement: too few")
     many = max(1, kept.size // _BINS_PER_PASS)
-    # A bin holds neighbours only: none goes across what was left out.
+    # A bin has only neighbours: none spans an ignored part.
     runs = np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1)
     bins = np.vstack([run[: len(run) // many * many].reshape(-1, many) for run in runs])
     x = found.x_mm[bins].mean(axis=1)
@@ -203,7 +203,7 @@ def _joined(rows: Sequence[MeanForces]) -> MeanForces:
     def column(name: str) -> FloatArray:
         return np.concatenate([getattr(each, name) for each in rows])
 
-    # A torque that only some of the files have does not help the others.
+    # A torque in only some of the files is not used.
     torques = [each.torque_nm for each in rows if each.torque_nm is not None]
     torque = np.concatenate(torques) if len(torques) == len(rows) else None
     met, displaced = ([each.met for each in rows], [each.displaced or each.met for each in rows])
@@ -252,7 +252,7 @@ def _inside(cut: TestCut, number: int, x_mm: FloatArray) -> npt.NDArray[np.bool_
     return fully_engaged(cut, measuring, x_mm, margin)
 
 
-# --- interval test: at which interval the controller follows the commanded feeds --------------------------------------
+# --- interval test: from which interval on the controller follows the commanded feeds ---------------------------------
 
 _DEVIATION_LIMIT, _NOISE_SHARE = 0.05, 2.0
 _LAGS_S = np.concatenate([[0.0], np.geomspace(2e-3, 0.5, 49)])
@@ -324,7 +324,7 @@ def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> t
 
 
 def _speeds(measuring: MeasuringPass, time_s: FloatArray, lag: float) -> FloatArray:
-    """Feed over time, from 0 at the first change, that follows each block's F with a first-order lag, mm/min."""
+    """Feed over time with a first-order lag after each block's F, mm/min; time is 0 at the first change."""
     begins, starts = [0.0], [measuring.feeds[0][1]]
     commands: list[float] = []
     length = np.diff([end for end, _ in measuring.feeds])
@@ -343,7 +343,7 @@ def _speeds(measuring: MeasuringPass, time_s: FloatArray, lag: float) -> FloatAr
 
 
 def _block_time(travel: float, speed: float, command: float, lag: float) -> float:
-    """Time of travel at a speed v that approaches the commanded c: travel = c t + (v - c) lag (1 - exp(-t / lag))."""
+    """Time of a travel at speed v approaching the commanded c: travel = c t + (v - c) lag (1 - exp(-t / lag))."""
     if lag <= 0.0:
         return travel / command
     change = (speed - command) / command
@@ -352,7 +352,7 @@ def _block_time(travel: float, speed: float, command: float, lag: float) -> floa
 
 
 def _speeds_at(measuring: MeasuringPass, x_mm: FloatArray, lag: float) -> FloatArray:
-    """The same where the record has the position: at the X of each sample."""
+    """Feed with a first-order lag at the recorded X of each sample, mm/min."""
     first, last = measuring.feeds[0][0], measuring.feeds[-1][0]
     fine = np.linspace(0.0, 1.5 * (last - first) / min(feed for _, feed in measuring.feeds) * _PER_MINUTE, 20000)
     speed = _speeds(measuring, fine, lag)
@@ -361,7 +361,7 @@ def _speeds_at(measuring: MeasuringPass, x_mm: FloatArray, lag: float) -> FloatA
 
 
 def _noise(x: FloatArray, force: FloatArray, travel: float) -> float:
-    """Standard deviation of means over a travel, as a share of the mean."""
+    """Standard deviation of means over a travel, relative to the mean."""
     interval_of = ((x - x[0]) / travel).astype(int)
     sums, counts = np.bincount(interval_of, force), np.bincount(interval_of)
     means = sums[counts > 0] / counts[counts > 0]

@@ -1,4 +1,4 @@
-"""What the tool meets along a measuring pass, the forces of a law there, the law's coefficients from mean forces."""
+"""Tool engagement along a measuring pass, forces by a law, and the law's coefficients from mean forces."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from shapegcode.testcut.cut import CuttingLaw, CutTool, MeasuringPass, TestCut
 
 @dataclass(frozen=True)
 class Engagement:
-    """What the tool meets where its axis is at each X; azimuths as in ``_core.EngagedArc``."""
+    """Engagement with the tool's axis at each X; azimuths as in ``_core.EngagedArc``."""
 
     from_rad: FloatArray  # first azimuth in material, from the direction of feed, positive to its left
-    to_rad: FloatArray  # last one; equal to `from_rad` where nothing is met
-    radial_depth_mm: FloatArray  # depth of the outermost point in material below the edge: distance from it to the wall
+    to_rad: FloatArray  # last one; equal to `from_rad` without engagement
+    radial_depth_mm: FloatArray  # distance of the outermost engaged point from the wall
 
     @classmethod
     def joined(cls, several: Sequence[Engagement]) -> Engagement:
-        """Several behind each other."""
+        """Concatenate several engagements."""
         return cls(*map(np.concatenate, zip(*(vars(each).values() for each in several), strict=True)))
 
 
 def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: FloatArray, *, up: bool) -> Engagement:
-    """Engagement of a pass where the tool's axis is at each X, exact for the straight pieces of its edge."""
+    """Engagement of a pass with the tool's axis at each X, exact for straight pieces of its edge."""
     radius = tool.radius_mm
     edge_x, edge_y = np.array(measuring.edge_x_mm), np.array(measuring.edge_height_mm)
     x = np.asarray(x_mm, dtype=np.float64)
-    # Along the tool: how far a point of its front lies before the axis.
+    # Distance of a point of the tool's front ahead of the axis.
     begin = np.clip(edge_x[0] - x, 0.0, radius)
     end = _crossing(x, begin, edge_x, edge_y, radius)
     end = np.maximum(np.minimum(end, edge_x[-1] - x), begin)
@@ -50,7 +50,7 @@ def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: FloatArray, *, up:
 
 
 def _crossing(x: FloatArray, begin: FloatArray, edge_x: FloatArray, edge_y: FloatArray, radius: float) -> FloatArray:
-    """How far before the axis the front of the tool first comes out of the edge; `begin` where it is not in it."""
+    """Distance ahead of the axis at which the tool's front first leaves the edge; `begin` if it is outside."""
     open_ = np.interp(x + begin, edge_x, edge_y) > radius - np.sqrt(np.maximum(radius**2 - begin**2, 0.0))
     found = np.where(open_, radius, begin)
     slopes = np.diff(edge_y) / np.diff(edge_x)
@@ -63,7 +63,7 @@ def _crossing(x: FloatArray, begin: FloatArray, edge_x: FloatArray, edge_y: Floa
             break
         k = piece[active]
         m = slopes[k]
-        # The edge over the distance u before the axis: height c + m u; the tool's front: u^2 + (y - R)^2 = R^2.
+        # The edge over the distance u ahead of the axis: height c + m u; the tool's front: u^2 + (y - R)^2 = R^2.
         c = edge_y[k] + m * (x[active] - edge_x[k]) - radius
         inner = (m * c) ** 2 - (1.0 + m * m) * (c * c - radius * radius)
         u = (-m * c + np.sqrt(np.maximum(inner, 0.0))) / (1.0 + m * m)
@@ -83,10 +83,10 @@ def straight_engagement(tool: CutTool, radial_depth_mm: FloatArray, *, up: bool)
 def fully_engaged(
     cut: TestCut, measuring: MeasuringPass, x_mm: FloatArray, margin_mm: float = 0.0
 ) -> npt.NDArray[np.bool_]:
-    """Where the tool is over the stock with all of its engagement, and by a margin within its ends."""
+    """Mask where the tool is fully engaged, at least a margin within the ends of the stock."""
     met = engagement(cut.tool, measuring, x_mm, up=cut.up)
     reach = cut.tool.radius_mm * np.maximum(np.cos(met.to_rad), np.cos(met.from_rad))
-    # The engagement ends at the end of the stock: there it is not whole, by whatever little.
+    # The engagement ends at the end of the stock: there it is not complete.
     low, high = measuring.edge_x_mm[0] + margin_mm, measuring.edge_x_mm[-1] - max(margin_mm, 1e-6)
     return np.asarray((x_mm >= low) & (x_mm + reach <= high) & (met.to_rad > met.from_rad))
 
@@ -127,7 +127,7 @@ class ForceLaw:
 def mean_chip_mm(
     tool: CutTool, spindle_rev_per_min: float, axial_depth_mm: float, met: Engagement, feed_mm_per_min: FloatArray
 ) -> FloatArray:
-    """Mean chip thickness as the law has it for each engagement: the force with exponent 1 over that with 0."""
+    """Mean chip thickness by the law at each engagement: the force with exponent 1 over that with 0, mm."""
     laws = (ForceLaw(tool, CuttingLaw(1.0, exponent), spindle_rev_per_min, axial_depth_mm) for exponent in (0.0, 1.0))
     once, twice = (law.forces(met, feed_mm_per_min).mean_torque_nm for law in laws)
     return np.asarray(np.divide(twice, once, out=np.zeros_like(once), where=once > 0.0))
@@ -135,7 +135,7 @@ def mean_chip_mm(
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """What the force law lets expect along a pass, at stations."""
+    """Forces expected by the force law along a pass, at stations."""
 
     x_mm: FloatArray  # (n,) ascending, of the tool's axis
     mean_n: FloatArray  # (n,) magnitude of the mean force
@@ -158,15 +158,15 @@ Thickness = Literal["mean", "local"]
 
 @dataclass(frozen=True, eq=False)
 class MeanForces:
-    """Mean forces on the tool over whole revolutions, with what it met."""
+    """Mean forces on the tool over whole revolutions, with engagements."""
 
     met: Engagement  # n engagements
     feed_mm_per_min: FloatArray  # (n,)
     spindle_rev_per_min: FloatArray  # (n,)
     force_n: FloatArray  # (n, 2) along the feed and to its left
-    revolutions: FloatArray  # (n,) how many each is the mean of
-    group: npt.NDArray[np.intp]  # (n,) number of the pass or file, in the order in which it was cut
-    # n engagements if the position of the tool were off by its standard error, alike for all rows of a group;
+    revolutions: FloatArray  # (n,) number of revolutions of each mean
+    group: npt.NDArray[np.intp]  # (n,) number of the pass or file, in cutting order
+    # n engagements with the tool position shifted by its standard error, equally for all rows of a group;
     # None: the engagements are exact
     displaced: Engagement | None = None
     torque_nm: FloatArray | None = None  # (n,) mean torque of the spindle; None: not measured
@@ -187,13 +187,13 @@ class ForceModel:
     ) -> None:
         self.tool, self.depth, self.data, self.thickness = tool, axial_depth_mm, data, thickness
         self.reference = reference_mm
-        # A torque is laid over as the force at the tool's radius that makes it.
+        # A torque is converted to a force at the tool's radius.
         self.at_radius = 1e3 / tool.radius_mm
         torque = [] if data.torque_nm is None else [self.at_radius * data.torque_nm]
         self.measured = np.column_stack([data.force_n, *torque])
 
     def law(self, parameters: FloatArray) -> CuttingLaw:
-        """The coefficients of parameters."""
+        """Coefficients from parameters."""
         k1, k1_exponent, k2, k2_exponent, *edge = parameters.tolist()
         logarithm = math.log(self.reference)
         factors = math.exp(k1 - k1_exponent * logarithm), math.exp(k2 - k2_exponent * logarithm)
@@ -201,7 +201,7 @@ class ForceModel:
         return CuttingLaw(factors[0], k1_exponent, factors[1], k2_exponent, k_te, k_re, self.thickness)
 
     def forces(self, law: CuttingLaw) -> FloatArray:
-        """(n, 2 or 3) forces along the feed, to its left, and the torque's where it was measured."""
+        """(n, 2 or 3) forces along the feed, to its left, and that of a measured torque."""
         found = np.zeros(self.measured.shape)
         for speed, at, met in _by_speed(self.data):
             forces = ForceLaw(self.tool, law, speed, self.depth).forces(met, self.data.feed_mm_per_min[at])
@@ -210,13 +210,13 @@ class ForceModel:
         return found
 
 
-# --- the coefficients: power laws about the middle of the chips, where factor and exponent do not disturb each other --
+# --- the coefficients: power laws about the mean chip, where factor and exponent are uncorrelated ---------------------
 
-MIN_CHIP_RATIO = 1.5  # The thickest mean chip over the thinnest; below it exponents are not distinguished from factors
-MIN_FEED_RATIO = 1.3  # The same of the feeds, for edge forces
+MIN_CHIP_RATIO = 1.5  # thickest over thinnest mean chip; below it exponents and factors are not distinguishable
+MIN_FEED_RATIO = 1.3  # ratio of the feeds, for edge forces
 _ROUNDS, _MAX_STEPS, _SETTLED = 6, 40, 1e-4
 _HUBER, _OUTLIER, _MIN_OUTLIER, _LARGEST_SHARE_OUT = 2.5, 4.0, 0.02, 0.25
-# Of ln k1, its exponent, ln k2, the exponent of k1 k2, and the edge forces.
+# For ln k1, its exponent, ln k2, the exponent of k1 k2, and the edge forces.
 _LOWEST, _HIGHEST = np.array([-50.0, -0.9, -50.0, -0.95, 0.0, 0.0]), np.array([50.0, 5.0, 50.0, 5.0, 1e6, 1e6])
 
 _UNITS = ("N/mm²", "", "", "", "N/mm", "N/mm")  # of COEFFICIENTS
@@ -227,38 +227,38 @@ class Coefficient:
     """One value with its 95 % interval."""
 
     name: str  # key of ``[cutting]``
-    value: float  # the best
+    value: float  # best value
     low: float  # lower end
     high: float  # upper end
-    unit: str  # of all three
+    unit: str  # unit of these values
 
 
 @dataclass(frozen=True, eq=False)
 class CoefficientFit:
-    """What a fit found."""
+    """Result of a fit."""
 
     coefficients: tuple[Coefficient, ...]  # in the order of `[cutting]`
-    thickness: Thickness  # "mean" or "local": to which chip thickness they belong
+    thickness: Thickness  # "mean" or "local": chip thickness of the power laws
     middle_chip_mm: float  # geometric mean of the mean chip thicknesses
-    # k1 in N/mm² and k2 there: much better known than the factors, which are those of a chip of 1 mm
+    # k1 in N/mm² and k2 there, known much better than the factors, which are for a chip of 1 mm
     at_chip: tuple[Coefficient, ...]
     chip_mm: FloatArray  # (n,) mean chip thickness of each row
     predicted_n: FloatArray  # (n, 2) mean force of the fit
-    outlier: npt.NDArray[np.bool_]  # (n,) rows that were left out, as their force is not that of the others
-    rms_n: FloatArray  # (2,) root mean square of what the fit leaves of the others, along the feed and to its left
-    rms_percent: float  # the same, of both, as a share of the resultant
-    correlation: float  # how far neighbours share what the fit leaves, 0 to 1; the intervals allow for it
+    outlier: npt.NDArray[np.bool_]  # (n,) ignored rows, whose force deviates from the others
+    rms_n: FloatArray  # (2,) RMS residual of the other rows, along the feed and to its left
+    rms_percent: float  # RMS residual of both, relative to the resultant
+    correlation: float  # correlation of neighbouring residuals, 0 to 1; the intervals allow for it
 
     @property
     def law(self) -> CuttingLaw:
-        """The coefficients together."""
+        """The coefficients as a force law."""
         return CuttingLaw(**{each.name: each.value for each in self.coefficients}, chip_thickness=self.thickness)
 
 
 def fit_coefficients(
     data: MeanForces, tool: CutTool, axial_depth_mm: float, *, thickness: Thickness = "mean", edge: bool = False
 ) -> CoefficientFit:
-    """Fit k1(t) and k2(t), and if asked the edge forces."""
+    """Fit k1(t) and k2(t), and if requested the edge forces."""
     count = 6 if edge else 4
     chip = np.zeros(len(data.feed_mm_per_min))
     for speed, at, met in _by_speed(data):
@@ -292,8 +292,8 @@ def fit_coefficients(
 
 
 def _outliers(measured: FloatArray, left: FloatArray, noise: FloatArray) -> npt.NDArray[np.bool_]:
-    """(n,) rows whose force is not that of the others."""
-    # Noise may be so small that the law itself is off by more than it: that alone makes no outlier.
+    """Mask of rows whose force deviates from the others, (n,)."""
+    # Noise may be below the error of the law itself, which alone makes no outlier.
     size = np.linalg.norm(measured, axis=1)[:, None]
     outlier = np.any((np.abs(left) > _OUTLIER * noise) & (np.abs(left) > _MIN_OUTLIER * size), axis=1)
     if outlier.mean() > _LARGEST_SHARE_OUT:
@@ -309,13 +309,13 @@ def _check(data: MeanForces, chip: FloatArray, count: int, edge: bool) -> None:
     if rows < 2 * count:
         raise ArgumentError(f"{rows} mean forces are too few for {count} coefficients: needed are {2 * count} or more")
     if not np.all(chip > 0.0):
-        raise ArgumentError("some forces belong to places where the tool meets nothing: leave them out")
+        raise ArgumentError("some forces are at positions without engagement: remove them")
     low, high = float(chip.min()), float(chip.max())
     feeds = np.unique(np.round(data.feed_mm_per_min, 3))
     if high / low < MIN_CHIP_RATIO:
         raise ArgumentError(
             f"the exponents cannot be determined: the mean chip is {low * 1e3:.2f} to {high * 1e3:.2f} um thick, a "
-            f"ratio of {high / low:.2f}, and must have one of {MIN_CHIP_RATIO:g} or more: let the radial depth grow "
+            f"ratio of {high / low:.2f}, and must have one of {MIN_CHIP_RATIO:g} or more: increase the radial depth "
             "from 0.05 D to 0.35 D (ratio 2.7), or add passes with other feeds"
         )
     if edge and feeds.max() / feeds.min() < MIN_FEED_RATIO:
@@ -326,7 +326,7 @@ def _check(data: MeanForces, chip: FloatArray, count: int, edge: bool) -> None:
 
 
 def _start(model: ForceModel, data: MeanForces, count: int) -> FloatArray:
-    """Constant k1 and k2 that fit best: with exponent 0 the force is linear in k1 and k1 k2."""
+    """Best constant k1 and k2: with exponent 0 the force is linear in k1 and k1 k2."""
     along = model.forces(CuttingLaw(1.0, chip_thickness=model.thickness))
     across = model.forces(CuttingLaw(1.0, ratio=1.0, chip_thickness=model.thickness)) - along
     columns = np.column_stack([along.ravel(), across.ravel()])
@@ -334,7 +334,7 @@ def _start(model: ForceModel, data: MeanForces, count: int) -> FloatArray:
     (tangential, radial), *_ = np.linalg.lstsq(columns * weight[:, None], model.measured.ravel() * weight, rcond=None)
     if tangential <= 0.0 or radial <= 0.0:
         raise ArgumentError(
-            f"no cut gives such forces: they would need {tangential:.4g} N/mm² along and {radial:.4g} N/mm² across the "
+            f"impossible forces: they would need {tangential:.4g} N/mm² along and {radial:.4g} N/mm² normal to the "
             "cutting edge, both must be above 0: check --forces-on, the signs and names of fx (along the feed) and fy "
             "(to its left), and up or down milling"
         )
@@ -344,11 +344,11 @@ def _start(model: ForceModel, data: MeanForces, count: int) -> FloatArray:
 
 
 def _solved(model: ForceModel, start: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Weighted least squares: parameters, what they leave, weighted slopes (all measured values, parameters)."""
+    """Weighted least squares: parameters, residuals, weighted Jacobian (measured values, parameters)."""
     from scipy.optimize import least_squares
 
     root = np.sqrt(weights)
-    # A law whose force does not grow with the chip is none: the exponent of k1 k2 has a limit too, and stands for k2's.
+    # Force must increase with the chip: the exponent of k1 k2 is limited too, and replaces that of k2.
     to_law = np.eye(len(start))
     to_law[3, 1] = -1.0
     to_limited = np.linalg.inv(to_law)
@@ -374,7 +374,7 @@ def _covariance(weighted: FloatArray, left: FloatArray, weights: FloatArray, cor
 
 
 def _of_position(model: ForceModel, parameters: FloatArray, weighted: FloatArray, weights: FloatArray) -> FloatArray:
-    """Covariance that comes from not knowing exactly where the tool was in each group."""
+    """Covariance due to the uncertain tool position in each group."""
     data, count = model.data, len(parameters)
     found = np.zeros((count, count))
     if data.displaced is None:
@@ -393,7 +393,7 @@ def _of_position(model: ForceModel, parameters: FloatArray, weighted: FloatArray
 def _with_intervals(
     model: ForceModel, parameters: FloatArray, covariance: FloatArray, free: int, chip_mm: float
 ) -> tuple[Coefficient, ...]:
-    """Values with their intervals; the factors k1 and k2 at a chip thickness."""
+    """Values with intervals; the factors k1 and k2 at a chip thickness."""
     from scipy.stats import t as student
 
     quantile = float(student.ppf(0.975, max(free, 1)))
@@ -415,7 +415,7 @@ _MEDIAN, _LARGEST_CORRELATION = 0.4549, 0.95
 
 
 def noise_of(left: FloatArray, predicted: FloatArray, revolutions: FloatArray, robust: FloatArray) -> FloatArray:
-    """Standard deviation of each value: a constant and a share of the value, as the residuals show them."""
+    """Standard deviation of each value: a constant and a relative part, from the residuals."""
     found = np.empty_like(left)
     many = revolutions / float(np.mean(revolutions))
     for k in range(left.shape[1]):
@@ -429,20 +429,20 @@ def noise_of(left: FloatArray, predicted: FloatArray, revolutions: FloatArray, r
             constant, share = nnls(columns * weight[:, None], observed * weight)[0]
             level = constant + share * square
             level = np.maximum(level, 1e-4 * float(level.max()) + 1e-300)
-        # The median is not moved by outliers; of squares of a normal variable it is _MEDIAN of the mean.
+        # The median is robust against outliers; for squares of a normal variable it is _MEDIAN times the mean.
         level *= float(np.median(left[:, k] ** 2 * many / level)) / _MEDIAN
         found[:, k] = np.sqrt(level / many)
     return found
 
 
 def neighbour_correlation(scaled: FloatArray, group: npt.NDArray[np.intp], outlier: npt.NDArray[np.bool_]) -> float:
-    """Correlation of neighbours within each group, of what the fit leaves; not below 0."""
+    """Correlation of neighbouring residuals within each group, at least 0."""
     pairs = (group[1:] == group[:-1]) & ~outlier[1:] & ~outlier[:-1]
     if pairs.sum() < 8:
         return 0.0
     product = float(np.mean(scaled[1:][pairs] * scaled[:-1][pairs]))
     square = float(np.mean(scaled[~outlier] ** 2))
-    # By chance alone it is up to twice this.
+    # By chance it reaches twice this.
     chance = 2.0 / math.sqrt(2.0 * pairs.sum())
     found = product / max(square, 1e-300)
     return min(found, _LARGEST_CORRELATION) if found > chance else 0.0

@@ -19,7 +19,7 @@ _MEASURED, _EXPECTED, _LAGGING = plot.GREY, plot.COLOURS[0], plot.COLOURS[1]
 
 
 def plots_of(result: TaperResult | CornerResult | IntervalResult) -> Mapping[str, Plot]:
-    """Its pictures by name."""
+    """Pictures of a result, by name."""
     if isinstance(result, TaperResult):
         return {
             "testcut-forces": partial(plot_taper, result),
@@ -41,14 +41,14 @@ def plot_taper(result: TaperResult, ax: Axes | None = None) -> Axes:
     """Mean forces over the radial depth, measured and fitted, one colour per pass.
 
     Args:
-        result: of a taper.
+        result: result of a taper.
         ax: where to draw; None: a new figure.
 
     Returns:
         The upper panel: forces along the feed.
     """
     data, fit = result.data, result.fit
-    title = f"Mean force on the tool, measured (points) and fitted, {fit.rms_percent:.1f} % left"
+    title = f"Mean force on the tool, measured (points) and fitted, residual {fit.rms_percent:.1f} %"
     panels = _column(ax, 2, 5.6, title)
     for axis, panel in enumerate(panels):
         for group in np.unique(data.group):
@@ -61,7 +61,7 @@ def plot_taper(result: TaperResult, ax: Axes | None = None) -> Axes:
             panel.plot(depth[order], fit.predicted_n[at, axis][order], "-", color=colour, linewidth=1.0, label=label)
         out = fit.outlier
         if out.any():
-            panel.plot(data.met.radial_depth_mm[out], data.force_n[out, axis], "x", color="black", label="left out")
+            panel.plot(data.met.radial_depth_mm[out], data.force_n[out, axis], "x", color="black", label="ignored")
         panel.set_ylabel(("along the feed in N", "to its left in N")[axis])
     panels[-1].set_xlabel("radial depth in mm")
     plot.legend_above(panels[0])
@@ -69,10 +69,10 @@ def plot_taper(result: TaperResult, ax: Axes | None = None) -> Axes:
 
 
 def plot_coefficients(result: TaperResult, ax: Axes | None = None) -> Axes:
-    """k1 and k2 over the chip thickness, with what was known before.
+    """k1 and k2 over the chip thickness, with the law known before.
 
     Args:
-        result: of a taper.
+        result: result of a taper.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -98,7 +98,7 @@ def plot_corner(result: CornerResult, ax: Axes | None = None) -> Axes:
     """Mean and largest resultant along each pass, measured and expected.
 
     Args:
-        result: of a corner.
+        result: result of a corner.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -118,16 +118,16 @@ def plot_corner(result: CornerResult, ax: Axes | None = None) -> Axes:
 
 
 def plot_interval(result: IntervalResult, ax: Axes | None = None) -> Axes:
-    """Resultant over time of each pass: measured, at the commanded feeds, and with the lag that fits best.
+    """Resultant over time of each pass: measured, at the commanded feeds, and with the best lag.
 
     Args:
-        result: of an interval test.
+        result: result of an interval test.
         ax: where to draw; None: a new figure.
 
     Returns:
         The panel of the shortest interval.
     """
-    title = "Mean resultant at feeds that change every so often"
+    title = "Mean resultant with changing feed"
     panels = _column(ax, len(result.passes), 1.4 + 2.2 * len(result.passes), title)
     for panel, each in zip(panels, result.passes, strict=True):
         panel.plot(each.time_s, each.force_n, color=_MEASURED, linewidth=2.0, label="measured")

@@ -1,4 +1,4 @@
-"""Measured forces: the file, the position of each sample, without offset and drift, and means over revolutions."""
+"""Measured forces: file, position of each sample, removal of offset and drift, means over revolutions."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from shapegcode.testcut.cut import MeasuringPass, TestCut
 from shapegcode.testcut.forces import Expected, fully_engaged
 
 _EXAMPLE = "time_s,fx_n,fy_n"
-#: Unit of `ForceRecord`, and of a column that states none.
+#: Unit of `ForceRecord`, and of a column without unit.
 _UNITS = {"time": "s", "displacement": "mm", "velocity": "mm/min", "force": "N", "torque": "N·m"}
-#: Quantity, its kind, and the names under which its column goes (without the unit).
+#: Quantity, its kind, and the names of its column (without unit).
 _NAMES: tuple[tuple[str, Measured, str], ...] = (
     ("time", "time", r"time|t|zeit|timestamp"),
     ("position", "displacement", r"position|pos|x|s|distance|way"),
@@ -35,22 +35,22 @@ _MIN_ROWS = 4
 
 @dataclass(frozen=True, eq=False)
 class ForceRecord:
-    """Measured forces, turned so that they act on the tool."""
+    """Measured forces, as acting on the tool."""
 
-    file: str  # where they were read
+    file: str  # path
     force_n: FloatArray  # (n, 2) along the feed and to its left, in N
-    torque_nm: FloatArray | None = None  # (n,) magnitude as measured; None: not recorded
+    torque_nm: FloatArray | None = None  # (n,) measured magnitude; None: not recorded
     time_s: FloatArray | None = None  # (n,), evenly spaced; None: not recorded
     position_mm: FloatArray | None = None  # (n,) X of the tool's axis in the program's coordinates; None: not recorded
-    radial_depth_mm: FloatArray | None = None  # (n,) of means at known depths; None: the test cut states it
-    feed_mm_per_min: FloatArray | None = None  # (n,) where the file states it
+    radial_depth_mm: FloatArray | None = None  # (n,) for means at known depths; None: from the test cut
+    feed_mm_per_min: FloatArray | None = None  # (n,) if the file states it
 
     def __len__(self) -> int:
         return len(self.force_n)
 
 
 def _names(name: str) -> Meaning | None:
-    """The meaning of a column name; None: another column."""
+    """The meaning of a column name; None: not used."""
     plain = name.strip(" _").lower()
     return next((Meaning(what, kind) for what, kind, pattern in _NAMES if re.fullmatch(pattern, plain)), None)
 
@@ -64,10 +64,10 @@ def _columns(table: TextTable) -> dict[str, tuple[int, float]]:
         what = label.meaning.what
         kind = next(kind for name, kind, _ in _NAMES if name == what)
         if kind != "force" and (label.unknown_unit or (label.unit is not None and label.unit.measures != kind)):
-            continue  # a signal of something else under a short name: "x [V]"
+            continue  # another signal with a short name: "x [V]"
         unit = unit_of(table.where, label, (kind,))
         if what in found:
-            raise ArgumentError(f"{table.where}: two columns of {what}: {label.text!r} is one too many")
+            raise ArgumentError(f"{table.where}: two columns of {what}: remove {label.text!r} or the other")
         found[what] = (index, 1.0 if unit is None else factor_between(unit, _UNITS[kind]))
     missing = [name for name in ("fx", "fy") if name not in found]
     if not missing and not {"time", "position", "radial_depth"} & set(found):
@@ -75,7 +75,7 @@ def _columns(table: TextTable) -> dict[str, tuple[int, float]]:
     if missing:
         raise ArgumentError(
             f"{table.where}: no column of {' and '.join(missing)}; the header is "
-            f"{', '.join(table.layout.header)[:80] or 'missing'!r}; wanted for example {_EXAMPLE}, "
+            f"{', '.join(table.layout.header)[:80] or 'missing'!r}; needed is for example {_EXAMPLE}, "
             "position_mm,fx_n,fy_n or radial_depth_mm,fx_n,fy_n"
         )
     return found
@@ -99,7 +99,7 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
     torque, position, depth, feed = map(values.get, ("torque", "position", "radial_depth", "feed"))
     if position is not None and depth is None and np.any(np.diff(position) < 0.0):
         row = int(np.argmax(np.diff(position) < 0.0)) + 1
-        raise ArgumentError(f"{path}:{table.line_of(row)}: the position goes back: one pass per file, along +X")
+        raise ArgumentError(f"{path}:{table.line_of(row)}: the position decreases: one pass per file, along +X")
     force = sign * np.column_stack([values["fx"], values["fy"]])
     return ForceRecord(str(path), force, torque, time, position, depth, feed)
 
@@ -107,21 +107,21 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
 # --- the position of each sample --------------------------------------------------------------------------------------
 
 _PER_MINUTE = 60.0
-MIN_SAMPLES = 6.0  # Samples per revolution from which on a file is a record and not a table of means
+MIN_SAMPLES = 6.0  # least samples per revolution of a record; fewer: a table of means
 _MIN_AIR_REVS, _GUARD_REVS = 5, 2
 _FEW_PER_TOOTH, _IN_STEP = 16.0, 0.01
 _TELL_SPEED, _TELL_FEED = 0.002, 0.005
-_ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04  # Of the noise in the air, and of the largest force: what is more is a cut
+_ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04  # least force in a cut, relative to the noise in air, and to the largest force
 _SPEED_RANGE, _MIN_FOR_SPEED = 0.05, 20.0
-_CLEAR_LINE = 8.0  # times the median of the spectrum around it
+_CLEAR_LINE = 8.0  # height of a clear line, relative to the median of the spectrum around it
 _MAX_SHIFT_MM, _SHIFT_STEPS = 1.0, 81
-#: The cut may last so much longer or shorter: at another feed override; where the place or the feeds are stated.
+#: Allowed relative difference of the cut's length: at another override; with stated position or feeds.
 _OTHER_FEED, _OTHER_LENGTH = 0.6, 0.03
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedRecord:
-    """A sampled record of one pass, offset and drift of the dynamometer taken off, with the place of each sample."""
+    """A sampled record of one pass, without offset and drift of the dynamometer, with the position of each sample."""
 
     file: str
     cut: TestCut
@@ -131,34 +131,34 @@ class PlacedRecord:
     force_n: FloatArray  # (n, 2) on the tool, along the feed and to its left
     torque_nm: FloatArray | None  # (n, 1); None: not recorded
     samples: float  # per revolution
-    spindle_rev_per_min: float  # as the record shows it, or as commanded
-    offset_n: FloatArray  # (2,) force that was shown in the air before the cut
-    drift_n: FloatArray  # (2,) change of it until after the cut
-    by_time: bool  # the place comes from the time and the feed; else it was recorded
-    notes: tuple[str, ...]  # what else the user should know, with the name of the file
+    spindle_rev_per_min: float  # from the record, or as commanded
+    offset_n: FloatArray  # (2,) force shown in air before the cut
+    drift_n: FloatArray  # (2,) its change until after the cut
+    by_time: bool  # positions are from time and feed; else recorded
+    notes: tuple[str, ...]  # remarks, with the name of the file
 
 
 def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, forecast: Expected) -> PlacedRecord:
-    """Take offset and drift off a sampled record of one pass, and find the place of each sample."""
+    """Remove offset and drift of a sampled record of one pass, and find the position of each sample."""
     time, moved = _times_and_travel(record, measuring, cut.kind)
     period = float(time[-1] - time[0]) / (len(time) - 1)
     turn = _PER_MINUTE / cut.spindle_rev_per_min
     if turn / period < MIN_SAMPLES:
         raise ArgumentError(
             f"{record.file}: {turn / period:.1f} samples per revolution: must be {MIN_SAMPLES:g} or more, better "
-            f"{12 * cut.tool.flutes}; or give means over whole revolutions, at most one row per revolution"
+            f"{12 * cut.tool.flutes}; or use means over whole revolutions, at most one row per revolution"
         )
     begin, end = _contact(record, turn / period)
     speed, sure = _spindle_speed(record.force_n[begin:end], period, cut.spindle_rev_per_min, cut.tool.flutes)
     notes = []
     if sure and abs(speed / cut.spindle_rev_per_min - 1.0) > _TELL_SPEED:
-        notes.append(f"the spindle turned at {speed:.1f} rev/min, {cut.spindle_rev_per_min:g} were commanded")
+        notes.append(f"the spindle turned at {speed:.1f} rev/min instead of the commanded {cut.spindle_rev_per_min:g}")
     samples = _PER_MINUTE / speed / period
     per_tooth = samples / cut.tool.flutes
     if per_tooth < _FEW_PER_TOOTH and abs(per_tooth - round(per_tooth)) < _IN_STEP:
         notes.append(
-            f"{per_tooth:.1f} samples per tooth fall on the same angles over and over: means may be off by some "
-            "percent; record with more samples, or with a rate that is no multiple of the tooth passing frequency"
+            f"{per_tooth:.1f} samples per tooth repeat the same angles: means may be wrong by some "
+            "percent; record with more samples, or with a rate that is not a multiple of the tooth passing frequency"
         )
     force, offset, drift = _without_offset(record.force_n, begin, end, round(_GUARD_REVS * samples))
     torque = None
@@ -188,7 +188,7 @@ def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) 
 
 
 def _spindle_speed(force_n: FloatArray, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
-    """Spindle speed from the lines of a record at the revolution, the teeth, and their multiples."""
+    """Spindle speed from the spectral lines at spindle and tooth frequency and their harmonics."""
     count = len(force_n)
     turns = count * period_s * commanded / _PER_MINUTE
     if turns < _MIN_FOR_SPEED:
@@ -213,21 +213,21 @@ def _spindle_speed(force_n: FloatArray, period_s: float, commanded: float, flute
 
 
 def turned(force: FloatArray, samples: float) -> FloatArray:
-    """Centred moving mean of each column over a number of samples that need not be whole."""
+    """Centred moving mean of each column over a (fractional) number of samples."""
     middle = np.arange(len(force)) + 0.5
     low, high = np.clip(middle - 0.5 * samples, 0, len(force)), np.clip(middle + 0.5 * samples, 0, len(force))
     return np.asarray(_sums(force, low, high) / (high - low)[:, None])
 
 
 def _sums(table: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Of each column between two places among the samples, which need not be whole."""
+    """Sum of each column between two (fractional) sample positions."""
     sums = np.vstack([np.zeros((1, table.shape[1])), np.cumsum(table, axis=0)])
     at = np.arange(len(sums), dtype=np.float64)
     return np.column_stack([np.interp(high, at, column) - np.interp(low, at, column) for column in sums.T])
 
 
 def _contact(record: ForceRecord, samples: float) -> tuple[int, int]:
-    """First and last sample of the cut, roughly."""
+    """Approximate first and last sample of the cut."""
     air = round(_MIN_AIR_REVS * samples)
     if len(record) < 4 * air:
         raise ArgumentError(f"{record.file}: {len(record) / samples:.1f} revolutions: a pass has many more")
@@ -241,7 +241,7 @@ def _contact(record: ForceRecord, samples: float) -> tuple[int, int]:
     cutting = np.flatnonzero(size > level)
     if cutting.size < 10 * samples:
         raise ArgumentError(
-            f"{record.file}: no cut is seen: force {np.max(size):.3g} N, noise in the air {noise:.3g} N; the record "
+            f"{record.file}: no cut found: force {np.max(size):.3g} N, noise in the air {noise:.3g} N; the record "
             "must begin and end in the air"
         )
     begin, end = int(cutting[0]), int(cutting[-1])
@@ -252,7 +252,7 @@ def _contact(record: ForceRecord, samples: float) -> tuple[int, int]:
 
 
 def _without_offset(force: FloatArray, begin: int, end: int, guard: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Force without what the air before and after shows, in between on a straight line; offset and drift."""
+    """Force minus a straight line through the air before and after; also offset and drift."""
     air = (0, max(begin - guard, 1)), (min(end + guard, len(force) - 1), len(force))
     first, second = (0.5 * (low + high) for low, high in air)
     before, after = (force[low:high].mean(axis=0) for low, high in air)
@@ -264,11 +264,11 @@ def _positions(
     record: ForceRecord, measuring: MeasuringPass, forecast: Expected, size: FloatArray, time: FloatArray,
     moved: FloatArray, contact: tuple[int, int], notes: list[str],
 ) -> FloatArray:  # fmt: skip
-    """X of the axis at each sample: entry and exit of the record laid over those that are expected."""
+    """X of the axis at each sample: entry and exit of the record aligned with the expected ones."""
     seen = np.flatnonzero(forecast.mean_n > _ABOVE_SHARE * forecast.mean_n.max())
     wanted, first = (forecast.x_mm[seen[0]], forecast.x_mm[seen[-1]]), contact[0]
     if record.position_mm is None and not measuring.constant_feed:
-        # The travel over time is that of the blocks; only where it begins is looked for.
+        # The travel over time is that of the blocks; only its start is searched.
         ends_mm = np.array([measuring.start_mm, *(end for end, _ in measuring.feeds)])
         pace = _PER_MINUTE / np.array([feed for _, feed in measuring.feeds])
         at = np.concatenate([[0.0], np.cumsum(np.diff(ends_mm) * pace)])
@@ -277,7 +277,7 @@ def _positions(
     free = record.position_mm is None and measuring.constant_feed
     if abs(wanted_length / length - 1.0) > (_OTHER_FEED if free else _OTHER_LENGTH):
         raise ArgumentError(
-            f"{record.file}: the cut is {length:.2f} mm long, it should be {wanted_length:.2f} mm: is it the right "
+            f"{record.file}: the cut is {length:.2f} mm long instead of {wanted_length:.2f} mm: is it the right "
             "pass, and was the feed override 100 %?"
         )
     x = wanted[0] + (moved - moved[first]) * (wanted_length / length if free else 1.0)
@@ -289,12 +289,12 @@ def _positions(
     x = x + ends[0] * (1.0 - share) + ends[1] * share
     rate = float(np.polyfit(time, x, 1)[0]) * _PER_MINUTE
     if abs(rate / measuring.feed_mm_per_min - 1.0) > _TELL_FEED:
-        notes.append(f"the feed was {rate:.1f} mm/min, {measuring.feed_mm_per_min:g} were commanded")
+        notes.append(f"the feed was {rate:.1f} mm/min instead of the commanded {measuring.feed_mm_per_min:g}")
     return np.asarray(x)
 
 
 def _shift(forecast: Expected, x: FloatArray, size: FloatArray, side: float) -> float:
-    """By how much X must be moved so that the course at one end of the cut is the expected one, whatever its scale."""
+    """Shift of X that aligns the force at one end of the cut with the expected one, for any scale."""
     near = np.flatnonzero(np.abs(x - side) < 3.0 * _MAX_SHIFT_MM)
     near = near[:: max(1, len(near) // 400)]
     measured, place = size[near], x[near]
@@ -311,7 +311,7 @@ def _shift(forecast: Expected, x: FloatArray, size: FloatArray, side: float) -> 
 
 
 def _vertex(three: FloatArray) -> float:
-    """Where the parabola through three values is lowest, in steps from the middle one."""
+    """Minimum of the parabola through three values, in steps from the middle one."""
     left, middle, right = three.tolist()
     bend = left - 2.0 * middle + right
     return 0.5 * (left - right) / bend if bend > 0.0 else 0.0
@@ -320,7 +320,7 @@ def _vertex(three: FloatArray) -> float:
 # --- means over whole revolutions -------------------------------------------------------------------------------------
 
 _MIN_REVOLUTIONS = 20
-_CHATTER, _MIN_CHATTER = 8.0, 0.02  # times the median deviation; the least that counts as one, of the median
+_CHATTER, _MIN_CHATTER = 8.0, 0.02  # limit of chatter in median deviations; least deviation, relative to the median
 _CHATTER_ROUNDS = 12
 
 
@@ -334,9 +334,9 @@ class Revolutions:
     torque_nm: FloatArray | None  # (n,) mean torque; None: not recorded
     resultant_n: FloatArray  # (n,) mean magnitude
     peak_n: FloatArray  # (n,) largest magnitude
-    # (n,) whether the force oscillates more than its mean lets expect from the rest of the pass
+    # (n,) the force oscillates more, relative to its mean, than in the rest of the pass
     chatter: npt.NDArray[np.bool_]
-    # the feed between entry and exit, as the record shows it; of a pass with changing feeds the first one
+    # the feed between entry and exit, from the record; the first one for a pass with changing feeds
     feed_mm_per_min: float
 
 
@@ -372,7 +372,7 @@ def _swings(x: FloatArray, uneven: FloatArray, resultant: FloatArray) -> npt.NDA
     floor = _MIN_CHATTER * float(np.median(share))
     weight = np.ones(len(share))
     for _ in range(_CHATTER_ROUNDS):
-        # Least absolute deviations: what stands out does not bend the curve of the rest.
+        # Least absolute deviations, so that outliers do not bend the curve.
         off = share - np.polyval(np.polyfit(place, share, 2, w=np.sqrt(weight)), place)
         weight = 1.0 / np.maximum(np.abs(off), floor)
     spread = 1.4826 * float(np.median(np.abs(off))) + floor

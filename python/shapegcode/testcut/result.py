@@ -1,4 +1,4 @@
-"""Designs of test cuts, and what their records show: coefficients, forces, the feed that is followed."""
+"""Designs of test cuts, and results of their records: coefficients, forces, the followed feed."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class CutDesign(Result):
     """A designed test cut, before it is run.
 
     Attributes:
-        cut: what the side file holds.
-        files: program and side file, where they are written.
-        warnings: what is not as the user might think.
-        edge: to be milled before each pass.
+        cut: content of the side file.
+        files: paths of program and side file, once written.
+        warnings: unexpected properties of the design.
+        edge: edge to mill before each pass.
         stock_mm: length of the stock along X.
-        machine: whose controller runs the program.
+        machine: machine whose controller runs the program.
     """
 
     published: ClassVar[tuple[str, ...]] = ("cutting force",)
@@ -40,25 +40,25 @@ class CutDesign(Result):
 
     @property
     def ok(self) -> bool:
-        """It can be cut."""
+        """Always true: the design can be cut."""
         return True
 
     @property
     def answer(self) -> str:
-        """What is cut."""
+        """Kind, passes and duration."""
         cut = self.cut
         seconds = sum(each.duration_s for each in cut.passes)
         return f"{cut.kind} for {cut.machine}: {len(cut.passes)} measuring passes, {seconds:.0f} s of cutting in them"
 
     @property
     def next_step(self) -> str:
-        """To cut, and to fit the records."""
+        """Run the program, and fit the records."""
         files = " ".join(f"pass{number}.csv" for number in range(1, len(self.cut.passes) + 1))
         side = self.files[1] if self.files else "its side file"
         return f"run it, then shapegcode testcut fit {files} --cut {side}"
 
     def tables(self) -> list[Table]:
-        """One row for each pass."""
+        """Table with one row for each pass."""
         columns = (
             Column("pass", value=lambda row: row[0]),
             Column("what", value=lambda row: row[1].name.lower(), text=True),
@@ -75,8 +75,8 @@ def _range(values: Sequence[float], digits: int | None = None, same: float = 0.0
     return low if max(values) - min(values) <= same else f"{low} ... {high}"
 
 
-EXPONENT_LIMIT, FACTOR_LIMIT = 0.05, 0.10  # Wider intervals (half of them) are no result to build on
-RATIO_LIMIT = 0.10  # By how much the measured effect of the feed may differ from the expected one
+EXPONENT_LIMIT, FACTOR_LIMIT = 0.05, 0.10  # widest accepted half intervals
+RATIO_LIMIT = 0.10  # largest difference of measured and expected effect of the feed
 
 
 @dataclass(frozen=True)
@@ -90,13 +90,13 @@ class ChipRange:
 
 @dataclass(frozen=True)
 class TaperPass:
-    """What the record of one pass showed."""
+    """Results from the record of one pass."""
 
-    file: str  # where it was read
+    file: str  # path
     feed_mm_per_min: float  # between entry and exit
-    spindle_rev_per_min: float  # as the record shows it, or as commanded
-    offset_n: tuple[float, float]  # force along the feed and to its left that was shown in the air before the cut
-    drift_n: tuple[float, float]  # change of it until after the cut
+    spindle_rev_per_min: float  # from the record, or as commanded
+    offset_n: tuple[float, float]  # force along the feed and to its left shown in air before the cut
+    drift_n: tuple[float, float]  # its change until after the cut
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class LeftOut:
     """A part of a pass with chatter."""
 
     number: int  # of the pass, from 1
-    from_mm: float  # X at its begin
+    from_mm: float  # X at its start
     to_mm: float  # X at its end
 
 
@@ -113,25 +113,25 @@ class TaperResult(Result):
     """Coefficients of the cutting force from the records of a taper.
 
     Attributes:
-        program: of the test cut.
+        program: program of the test cut.
         machine: name of the machine.
         cutting: the table ``[cutting]`` for the tool file.
-        coefficients: each with its interval; the factors are those of a chip 1 mm thick.
-        at_chip: k1 and k2 in the middle of the measured chips, which are known much better.
+        coefficients: each with its interval; the factors are for a chip 1 mm thick.
+        at_chip: k1 and k2 at the mean measured chip, known much better.
         chip_mm: range of the mean chip thickness.
-        mean_forces: how many were fitted to.
-        outliers: how many of them were left out, as their force is not that of the others.
-        rms_n: what the fit leaves of the others, along the feed and to its left.
-        rms_percent: the same, of both, as a share of the resultant.
-        neighbour_correlation: how far neighbours share what the fit leaves, 0 to 1; the intervals allow for it.
-        passes: what the sampled records showed; empty for files with means.
+        mean_forces: number of mean forces in the fit.
+        outliers: number of ignored ones, whose force deviates from the others.
+        rms_n: RMS residual of the others, along the feed and to its left.
+        rms_percent: RMS residual of both, relative to the resultant.
+        neighbour_correlation: correlation of neighbouring residuals, 0 to 1; the intervals allow for it.
+        passes: results from the sampled records; empty for files with means.
         left_out: parts with chatter.
-        poor: coefficients of the power laws that are not known well, in words.
-        warnings: what else the user should know.
+        poor: messages for poorly known coefficients of the power laws.
+        warnings: further remarks.
         cut: the test cut.
-        fit: what was fitted, row by row.
+        fit: the fit, row by row.
         data: the mean forces.
-        kind: of the test cut.
+        kind: kind of the test cut.
     """
 
     published: ClassVar[tuple[str, ...]] = ("cutting force",)
@@ -162,28 +162,28 @@ class TaperResult(Result):
 
     @property
     def answer(self) -> str:
-        """k1 and k2 in the middle of the chips, and what the law leaves."""
+        """k1 and k2 at the mean chip, and the residual."""
         k1, k2 = (each.value for each in self.at_chip)
         chip = self.chip_mm
         sentence = (
             f"k1 {k1:.4g} N/mm² and k2 {k2:.3g} at a chip of {1e3 * chip.middle:.2f} um; {self.mean_forces} mean "
-            f"forces, chips {1e3 * chip.min:.2f} to {1e3 * chip.max:.2f} um thick on average; the law leaves "
+            f"forces, chips {1e3 * chip.min:.2f} to {1e3 * chip.max:.2f} um thick on average; residual "
             f"{self.rms_percent:.1f} % of the force"
         )
         return "; poor: ".join([sentence, *self.poor])
 
     @property
     def next_step(self) -> str:
-        """To use the coefficients, or to measure more."""
+        """Use the coefficients, or measure more."""
         if self.poor:
             return "more passes, with other feeds or a longer stock"
         return "put [cutting] into the tool file (-o FILE writes it)"
 
     def next_step_after(self, file: str) -> str:
-        """The same where [cutting] was written.
+        """Next step after [cutting] was written.
 
         Args:
-            file: name of it.
+            file: name of the file.
 
         Returns:
             One sentence.
@@ -191,7 +191,7 @@ class TaperResult(Result):
         return self.next_step if self.poor else f"put [cutting] of {file} into the tool file"
 
     def tables(self) -> list[Table]:
-        """One row for each coefficient."""
+        """Table with one row for each coefficient."""
         chip = f" at a chip of {1e3 * self.chip_mm.middle:.2f} um"
         rows = [(each.name, each) for each in self.coefficients]
         rows += [(name + chip, each) for name, each in zip(("k1", "k2"), self.at_chip, strict=True)]
@@ -214,7 +214,7 @@ class TaperResult(Result):
             "[cutting]",
             f"# measured: taper {self.program} on {self.machine}, D{tool.diameter_mm:g} with {tool.flutes} flutes, "
             f"{self.cut.spindle_rev_per_min:g} rev/min",
-            f"# holds for chips {self.chip_mm.min:.4f} to {self.chip_mm.max:.4f} mm thick on average",
+            f"# valid for chips {self.chip_mm.min:.4f} to {self.chip_mm.max:.4f} mm thick on average",
         ]
         for each in self.coefficients:
             interval = f"95 %: {each.low:.5g} to {each.high:.5g} {each.unit}".rstrip()
@@ -224,15 +224,15 @@ class TaperResult(Result):
 
 @dataclass(frozen=True, eq=False)
 class CornerPass:
-    """Largest resultant of a pass within the stock, mean over a revolution and momentary."""
+    """Largest resultant of a pass within the stock, mean over a revolution and peak."""
 
     number: int  # of the pass, from 1
     measured_mean_n: float  # largest mean, as recorded
     measured_peak_n: float  # largest magnitude, as recorded
     expected_mean_n: float  # largest mean of the force law
     expected_peak_n: float  # largest magnitude of the force law
-    record: Revolutions = field(metadata=hidden())  # what was recorded, by revolution
-    forecast: Expected = field(metadata=hidden())  # what the force law lets expect
+    record: Revolutions = field(metadata=hidden())  # recorded means by revolution
+    forecast: Expected = field(metadata=hidden())  # expected by the force law
 
 
 @dataclass(frozen=True)
@@ -248,13 +248,13 @@ class CornerResult(Result):
     """Measured against expected resultant of the passes of an unrolled corner.
 
     Attributes:
-        program: of the test cut.
+        program: program of the test cut.
         machine: name of the machine.
-        peaks: of the passes, in the order of their files.
-        ratio: what the modified feed does; None: only one of the two passes was recorded.
-        scale: measured over expected mean resultant of the first pass: how far the coefficients are off.
-        warnings: what else the user should know.
-        kind: of the test cut.
+        peaks: largest resultants of the passes, in file order.
+        ratio: effect of the modified feed; None: only one of the two passes was recorded.
+        scale: measured over expected mean resultant of the first pass: error of the coefficients.
+        warnings: further remarks.
+        kind: kind of the test cut.
     """
 
     published: ClassVar[tuple[str, ...]] = ("cutting force",)
@@ -274,7 +274,7 @@ class CornerResult(Result):
     @property
     def answer(self) -> str:
         """Scale and ratio."""
-        sentence = f"the measured resultant is {self.scale:.2f} times the expected one where the feed is constant"
+        sentence = f"the measured resultant is {self.scale:.2f} times the expected one at constant feed"
         if self.ratio is None:
             return sentence
         ratios = f"measured {self.ratio.measured:.2f}, expected {self.ratio.expected:.2f}"
@@ -282,13 +282,13 @@ class CornerResult(Result):
 
     @property
     def next_step(self) -> str:
-        """The next test cut to run."""
+        """Next test cut to run."""
         if abs(self.scale - 1.0) > RATIO_LIMIT:
             return "shapegcode testcut taper measures the coefficients"
         return "shapegcode testcut interval shows how often the feed may change"
 
     def tables(self) -> list[Table]:
-        """One row for each pass."""
+        """Table with one row for each pass."""
         columns = (
             Column("pass", value="number"),
             Column("measured mean", value="measured_mean_n", digits=1),
@@ -309,13 +309,13 @@ class FollowedPass:
 
     number: int  # of the pass, from 1
     interval_mm: float  # length of its blocks
-    deviation: float  # largest |measured - commanded| force at the end of a block, as a share of commanded
+    deviation: float  # largest |measured - commanded| force at the end of a block, relative to commanded
     at_mm: float  # X of the end of that block
-    noise: float  # standard deviation of such a mean where the feed does not change, as a share of it
-    lag_s: float  # time constant with which the feed follows best
-    ok: bool  # whether it is followed: the deviation is within 5 % and twice the noise
+    noise: float  # relative standard deviation of such a mean at constant feed
+    lag_s: float  # best-fitting time constant
+    ok: bool  # followed: the deviation is within 5 % and twice the noise
     time_s: FloatArray = field(metadata=hidden())  # (m,) of the record
-    # (m,) mean over a revolution, scaled to what is expected on the straight part
+    # (m,) mean over a revolution, scaled to the expected one on the straight part
     force_n: FloatArray = field(metadata=hidden())
     immediate_n: FloatArray = field(metadata=hidden())  # (m,) expected if the feed follows at once
     lagging_n: FloatArray = field(metadata=hidden())  # (m,) expected with the lag
@@ -323,16 +323,16 @@ class FollowedPass:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class IntervalResult(Result):
-    """From which interval on the controller follows the commanded feeds.
+    """Shortest interval at which the controller follows the commanded feeds.
 
     Attributes:
-        program: of the test cut.
+        program: program of the test cut.
         machine: name of the machine.
-        interval_mm: shortest interval from which on all measured ones are followed; None: none is.
-        lag_interval_mm: travel in which 90 % of a step are done with the median lag, at the largest feed.
-        passes: of the measured ones, by interval.
-        warnings: what else the user should know.
-        kind: of the test cut.
+        interval_mm: shortest interval from which all measured ones are followed; None: none.
+        lag_interval_mm: travel for 90 % of a step with the median lag, at the largest feed.
+        passes: measured passes, by interval.
+        warnings: further remarks.
+        kind: kind of the test cut.
     """
 
     published: ClassVar[tuple[str, ...]] = ("cutting force",)
@@ -346,12 +346,12 @@ class IntervalResult(Result):
 
     @property
     def ok(self) -> bool:
-        """An interval is followed."""
+        """True if an interval is followed."""
         return self.interval_mm is not None
 
     @property
     def answer(self) -> str:
-        """The interval, or how long a step needs."""
+        """The interval, or the travel that a step needs."""
         if self.interval_mm is None:
             needed = f"90 % of a step need about {self.lag_interval_mm:.2f} mm at the largest feed"
             return f"no measured interval is followed; {needed}"
@@ -365,7 +365,7 @@ class IntervalResult(Result):
         return f"set feed_control.interval_mm = {self.interval_mm} in the machine file"
 
     def tables(self) -> list[Table]:
-        """One row for each pass."""
+        """Table with one row for each pass."""
         columns = (
             Column("interval", "mm", value=lambda each: f"{each.interval_mm:g}"),
             Column("largest deviation", value=lambda each: f"{100 * each.deviation:.0f} %"),

@@ -1,1 +1,1 @@
-"""How long a program takes."""
+"""Cycle time of programs, and calibration of its model."""

@@ -1,7 +1,7 @@
-"""How long a program takes on a machine, and where the time goes: in closed form, and by giving every set-point.
+"""Cycle time of a program on a machine and its parts: in closed form, and by full interpolation.
 
 The closed form is of Lee, Ro, Song and Oh, 2022 (paper 004) for acceleration after interpolation, of the planner in
-look-ahead; the full interpolation is the check of it.
+look-ahead; full interpolation checks it.
 """
 
 from __future__ import annotations
@@ -36,31 +36,31 @@ def cycle_time(
     rapid_override: float | None = None,
     log_next: Sequence[Program | str | Path] = (),
 ) -> CycleTime:
-    """Time of a program on a machine as it is: nothing is shaped.
+    """Compute the cycle time of a program as it is, without shaping.
 
-    Of a program that shapegcode wrote, as its header says, the shaped regions are timed block by block at their feed,
-    in the slower rule of block timing: as `convert` reports it.
+    Shaped regions of an emitted program (by its header) are timed block by block at their feed,
+    with the slower rule of block timing, as in `convert`.
 
-    Moves of an axis whose position the program does not tell (before its first absolute word, after M06, G28, G53)
-    count what is known of them.
+    For moves of an axis with unknown position (before its first absolute word, after M06, G28, G53)
+    only the known part counts.
 
     Args:
-        program: what to time, or its file.
+        program: the program, or its file.
         machine: whose controller simulates it.
-        per_block: give `CycleTime.blocks` too.
+        per_block: fill `CycleTime.blocks` too.
         full: check the closed form by full interpolation.
-        feed_override: scales every programmed feed; None: at which the shop usually runs
+        feed_override: scales every programmed feed; None: the shop's usual one
             (`times.feed_override_percent`).
         rapid_override: scales the rapid rates; None: likewise.
-        log_next: programs, or their files, that could be logged next: what of the interval each would leave.
+        log_next: programs, or their files, that could be logged next; gives the interval that would remain after each.
 
     Returns:
-        The whole time in s and where it goes: by part, tool, region and, if asked for, block; with its 95 % interval
-        where the machine was calibrated with run logs.
+        The total time in s, by part, tool, region and, if requested, block; with its 95 % interval
+        if the machine was calibrated with run logs.
 
     Raises:
-        ArgumentError: a value that no controller can have, an override at which full interpolation would take the
-            program beyond `controller.max_program_s`, or `log_next` with a machine that was not calibrated.
+        ArgumentError: an invalid controller value, an override at which full interpolation would take the
+            program beyond `controller.max_program_s`, or `log_next` with an uncalibrated machine.
     """
     machine = Machine.of(machine)
     program = given_program(program, machine)
@@ -75,12 +75,12 @@ def cycle_time(
         raise _core.ArgumentError(
             f"{program.source}: takes {timed.total_s:.0f} s with feeds at {feed_override:.4g} and rapids at "
             f"{rapid_override:.4g} of the programmed ones, and at most {limit_s:.10g} s are interpolated "
-            "(controller.max_program_s); the closed form alone has no limit (--no-full)"
+            "(controller.max_program_s); only the closed form has no limit (--no-full)"
         )
     interval = time_interval(program, machine, feed_override, rapid_override)
     if log_next and interval is None:
         raise _core.ArgumentError(
-            f"{machine.name} states no times.scatter: what a log would narrow is known of a machine that was "
+            f"{machine.name} has no times.scatter: the effect of a log is known only for a machine "
             "calibrated with run logs (shapegcode characterize --runs)"
         )
     others = [given_program(each, machine) for each in log_next]
@@ -114,19 +114,19 @@ def cycle_time(
 def _log_next(
     interval: TimeInterval | None, programs: Sequence[Program], machine: Machine, overrides: tuple[float, float]
 ) -> tuple[LogNext, ...]:
-    """What of an interval is left where one of the programs is logged next, the least first."""
+    """Interval that remains after logging each of the programs, the smallest first."""
     found = [(program.source, time_interval(program, machine, *overrides)) for program in programs]
     left = [LogNext(name, interval.after_logging(other)) for name, other in found if interval and other]
     return tuple(sorted(left, key=lambda each: each.half_width_s))
 
 
 def _locked(program: Program, feed_override: float) -> Iterator[str]:
-    """An override that shaped moves do not obey, but these times do."""
+    """Warn of an override that the control ignores in shaped moves, but these times do not."""
     locked = program.shaped_regions and f"({OVERRIDE_LOCKED.comment})".encode() in program.own_text
     if locked and feed_override != 1.0:
         yield (
             f"the program switches the feed override off in its shaped regions ({program.shaped_regions}), which the "
-            f"control runs at 100 %; here they are timed at {feed_override * 100:g} %, as all others: their times with "
+            f"control runs at 100 %; here timed at {feed_override * 100:g} % like all others: their times with "
             "--override 100% are the true ones"
         )
 
@@ -162,7 +162,7 @@ def _blocks(rows: npt.NDArray[Any], program: Program) -> Iterator[BlockTime]:
 
 
 def _moves(program: Program) -> dict[tuple[int, bool], deque[tuple[float, float]]]:
-    """Length and programmed feed of the moves of each line, rapids apart: in the order in which the line makes them."""
+    """Length and programmed feed of the moves of each line, separately for rapids, in order."""
     found: dict[tuple[int, bool], deque[tuple[float, float]]] = defaultdict(deque)
 
     def note(segments: Iterable[_core.Segment]) -> None:

@@ -1,4 +1,4 @@
-"""The 95 % interval of a predicted time: what the calibrated parameters leave open, and what no parameter explains."""
+"""The 95 % interval of a predicted time: uncertainty of calibrated parameters, and unexplained scatter."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import fanuc_model
 from shapegcode.program import Program
 
-_DEVIATIONS = 1.96  # of a normal distribution: 95 %
+_DEVIATIONS = 1.96  # standard deviations of a 95 % interval
 _KINDS = "kind of look-ahead"
 CUTS, BETWEEN, RUNS = "cuts of a tool, by themselves", "between cuts, by themselves", "repeated runs"
 
 
 @dataclass(frozen=True)
 class OpenPart:
-    """What one source contributes to the interval of a time."""
+    """Contribution of one source to the interval of a time."""
 
     name: str  # a parameter, the kind of look-ahead, or a scatter
-    half_width_s: float  # half of the 95 % interval that it alone would give, s
-    share: float  # of the variance, 0 to 1
+    half_width_s: float  # half of the 95 % interval from this source alone, s
+    share: float  # ratio of the variance, 0 to 1
 
 
 @dataclass(frozen=True)
 class LogNext:
-    """A program that one could run with a log, and calibrate with next."""
+    """A program that could be logged next for calibration."""
 
-    program: str  # name of it
-    half_width_s: float  # half of the 95 % interval that would be left of the program that is timed, s
+    program: str  # its name
+    half_width_s: float  # half of the 95 % interval that would remain for the timed program, s
 
 
-# What a program must hold that tells a parameter, by a word of its name; the first that fits.
+# Contents of a program that determines a parameter, by a word of its name; the first match.
 _TELLS = {
     _KINDS: "a program unlike those logged, with corners of many angles and moves of many lengths",
     "block is read": "a program with many moves below {move:.2g} mm",
@@ -59,13 +59,13 @@ class TimeInterval:
     """The 95 % interval of a program's time."""
 
     total_s: float
-    mean_move_mm: float  # of its cuts
-    steps: Mapping[str, float]  # change of the time by each direction that logs leave open, s
-    scatters: Mapping[str, float]  # standard deviation of what no parameter explains, s
+    mean_move_mm: float  # mean length of its moves in cuts
+    steps: Mapping[str, float]  # change of the time by each undetermined direction, s
+    scatters: Mapping[str, float]  # standard deviation of scatter that no parameter explains, s
 
     @property
     def half_width_s(self) -> float:
-        """Half of the interval."""
+        """Half of the interval, s."""
         return _half(self.steps.values(), self.scatters.values())
 
     def parts(self) -> tuple[OpenPart, ...]:
@@ -78,13 +78,13 @@ class TimeInterval:
         return tuple(sorted(parts, key=lambda part: -part.share))
 
     def narrowed_by(self) -> str:
-        """Text: what a logged program must contain to narrow it; scatter between runs cannot be narrowed."""
+        """Required contents of a logged program that would narrow it; scatter between runs cannot be narrowed."""
         name = next((part.name for part in self.parts() if part.name not in (BETWEEN, RUNS)), CUTS)
         text = next((text for word, text in _TELLS.items() if word in name), f"a program in which {name} occurs alone")
         return text.format(move=self.mean_move_mm)
 
     def after_logging(self, other: TimeInterval) -> float:
-        """Half of the interval once the time of another program is known to what scatters of it, s (least squares)."""
+        """Half-width, s, once another program's time is known up to its scatter (least squares)."""
         common = sum(value * other.steps.get(name, 0.0) for name, value in self.steps.items())
         known = sum(value**2 for value in (*other.steps.values(), *other.scatters.values()))
         left = sum(value**2 for value in self.steps.values()) - (common**2 / known if known > 0.0 else 0.0)
@@ -98,7 +98,7 @@ def _half(*values: Iterable[float]) -> float:
 def time_interval(
     program: Program, machine: Machine, feed_override: float, rapid_override: float
 ) -> TimeInterval | None:
-    """The interval of a program's time; None: the machine file does not say what logs leave open."""
+    """Interval of a program's time; None: the machine file has no undetermined directions."""
     times = machine.times
     if times.scatter is None:
         return None

@@ -1,4 +1,4 @@
-"""The picture of ``shapegcode time``: where the time goes, by tool and by region."""
+"""The picture of ``shapegcode time``: time by tool and by region."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _TOOLS = 16
 
 
 def plots_of(time: CycleTime) -> dict[str, Plot]:
-    """Its pictures by name."""
+    """Pictures of a cycle time, by name."""
     return {"time": partial(plot_time, time)}
 
 
 def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
-    """Where does the time go? One bar per tool, and one for each of the regions that take longest, both by parts.
+    """Plot the time by parts: one bar per tool, and one for each of the longest regions.
 
-    Of many tools the ones that take longest are drawn.
+    Of many tools the longest ones are drawn.
 
     Args:
-        time: what was timed.
+        time: the cycle time.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -44,7 +44,7 @@ def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
     panels = plot.column(
         ax, len(heights), sharex=False, height_ratios=heights,
         size_inch=(9.0, 1.8 + 0.32 * sum(heights) + 0.5 * len(heights)),
-        title=f"Where the time goes: {time.cycle_time_s:.1f} s on {time.machine}", part=Path(time.program).name,
+        title=f"Parts of the time: {time.cycle_time_s:.1f} s on {time.machine}", part=Path(time.program).name,
     )  # fmt: skip
     used = [part for part in PARTS if getattr(time, part) > 0.0]
     _bars(panels[0], [tool_name(tool.tool) for tool in tools], [vars(tool) for tool in tools], used)
@@ -54,13 +54,13 @@ def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
     if regions:
         names = ["lines {} to {}, {}".format(*region.lines, tool_name(region.tool)) for region in regions]
         _bars(panels[1], names, [vars(region) for region in regions], used)
-        panels[1].set_title(f"the {len(regions)} regions that take longest", loc="left", fontsize=10)
+        panels[1].set_title(f"the {len(regions)} longest regions", loc="left", fontsize=10)
     panels[-1].set_xlabel("time in s")
     return panels[0]
 
 
 def _bars(panel: Axes, names: Sequence[str], rows: Sequence[Mapping[str, float]], parts: Sequence[str]) -> None:
-    """One horizontal bar per row, divided into parts, the longest row first, with its length next to it."""
+    """Draw one horizontal bar per row, divided into parts, longest row first, labelled with its duration."""
     positions = range(len(names))
     ends = [0.0] * len(names)
     for part in parts:

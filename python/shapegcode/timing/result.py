@@ -16,7 +16,7 @@ from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table, share_percent
 from shapegcode.timing.interval import LogNext, OpenPart
 
-AGREEMENT_PERCENT = 0.5  # Closed form and full interpolation agree if they differ by no more than this
+AGREEMENT_PERCENT = 0.5  # Largest difference at which closed form and full interpolation agree
 
 
 @dataclass(frozen=True, repr=False)
@@ -26,10 +26,10 @@ class TimeParts:
     Attributes:
         cutting_s: cutting blocks at their feed.
         rapid_s: rapids at their rate.
-        in_position_s: waits for the axes to arrive, behind rapids and exact stops.
+        in_position_s: in-position waits after rapids and exact stops.
         dwell_s: G04, and the dwells of drilling cycles.
-        acceleration_s: what acceleration adds to cutting blocks and rapids; in look-ahead also what the limits at
-            corners and on arcs add.
+        acceleration_s: time added by acceleration to cutting blocks and rapids; with look-ahead also by the limits at
+            corners and on arcs.
         tool_change_s: M06.
         function_s: every other M code.
     """
@@ -43,30 +43,30 @@ class TimeParts:
     function_s: float
 
 
-PARTS = tuple(field.name for field in fields(TimeParts))  # Names of the parts, in the order in which they are shown
+PARTS = tuple(field.name for field in fields(TimeParts))  # names of the parts, in display order
 
 
 @dataclass(frozen=True)
 class ToolTime(TimeParts):
-    """All uses of one tool together."""
+    """Time of all uses of one tool."""
 
-    duration_s: float  # the whole
+    duration_s: float  # total
     tool: int | None  # T number; None before the first tool is known
-    first_line: int  # of its first use, from 1
+    first_line: int  # line of its first use, from 1
 
 
 @dataclass(frozen=True)
 class RegionTime:
-    """A run of cutting moves between two stops."""
+    """A sequence of cutting moves between two stops."""
 
     lines: tuple[int, int]  # first and last line, from 1
-    tool: int | None  # T number in use; None where it is not known
+    tool: int | None  # T number in use; None if unknown
     start_s: float  # since the start of the program
-    duration_s: float  # from rest to rest, the wait of an exact stop at its end included
-    programmed_s: float  # its length at the programmed feeds and the override, nothing rounded or limited
-    cutting_s: float  # its blocks at their feed, in whole interpolation periods
-    acceleration_s: float  # what acceleration adds
-    in_position_s: float  # wait of an exact stop at its end
+    duration_s: float  # from rest to rest, including the wait of an exact stop at its end
+    programmed_s: float  # length over programmed feeds and override, without rounding or limits
+    cutting_s: float  # blocks at their feed, in whole interpolation periods
+    acceleration_s: float  # time added by acceleration
+    in_position_s: float  # in-position wait of an exact stop at its end
     length_mm: float  # length of its path
 
 
@@ -77,11 +77,11 @@ class BlockTime:
     line: int  # from 1
     kind: str  # "cutting", "rapid", "dwell", "tool_change" or "function"
     start_s: float  # since the start of the program
-    duration_s: float  # until the next one starts; the last block of a run has the run's acceleration and wait
-    length_mm: float  # 0 for what does not move
-    programmed_feed_mm_per_min: float | None  # F as programmed; None for what is no cutting block
+    duration_s: float  # until the next one starts; a region's acceleration and wait count for its last block
+    length_mm: float  # 0 without motion
+    programmed_feed_mm_per_min: float | None  # programmed F; None except for cutting blocks
     mean_feed_mm_per_min: float  # length over duration
-    reached_feed_mm_per_min: float  # highest speed along the path; 0 for what does not move
+    reached_feed_mm_per_min: float  # highest speed along the path; 0 without motion
 
 
 LABELS = {
@@ -91,37 +91,37 @@ LABELS = {
 """Name of each part in tables and pictures."""
 
 _SLOWEST = 5
-_NOTABLE = 0.1  # A part of the time that deserves the next look
+_NOTABLE = 0.1  # fraction of the time worth a remark
 _REMEDIES = {
-    "acceleration_s": "join short blocks, or look at the time constants and corner limits of the machine file",
-    "rapid_s": "shorten the rapids, or take tools in an order that needs fewer of them",
-    "in_position_s": "spare rapids and exact stops, each of which waits for its axes",
-    "dwell_s": "look whether the dwells may be shorter",
-    "tool_change_s": "take the tools in an order that needs fewer changes",
-    "function_s": "put M codes into blocks that move, where the control allows it",
+    "acceleration_s": "join short blocks, or check the time constants and corner limits of the machine file",
+    "rapid_s": "shorten the rapids, or order the tools so that fewer are needed",
+    "in_position_s": "avoid rapids and exact stops, each of which waits for its axes",
+    "dwell_s": "check whether the dwells can be shorter",
+    "tool_change_s": "order the tools so that fewer changes are needed",
+    "function_s": "put M codes into blocks with motion, if the control allows it",
 }
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class CycleTime(TimeParts, Result):
-    """How long a program takes.
+    """Cycle time of a program.
 
     Attributes:
-        cycle_time_s: the whole, in closed form.
+        cycle_time_s: total, in closed form.
         program: name of the program.
         machine: name of the machine.
-        total_low_s: lower end of the 95 % interval of the whole; None: the machine was not calibrated with run logs.
+        total_low_s: lower end of the 95 % interval of the total; None: the machine was not calibrated with run logs.
         total_high_s: upper end; None: likewise.
         interval_parts: components of the interval, the largest first; empty: likewise.
-        narrowed_by: what a program must hold whose log would narrow the interval most, in words; None: likewise.
-        log_next: programs that could be logged next, the most useful first; empty unless asked for.
-        full_interpolation_s: the whole time by giving every set-point; None: not asked for.
-        tools: per tool, in the order of first use.
-        regions: per region, in order.
-        blocks: per block, in order; empty unless asked for.
-        shaped_regions: how many of the regions are shaped blocks, as the program's header says; 0: it has none.
-        warnings: what the reader noticed; why the verdict in a header of shapegcode does not hold here.
-        simulated: the program, to show it on a page.
+        narrowed_by: required contents of a program whose log would narrow the interval most; None: likewise.
+        log_next: programs that could be logged next, the most useful first; empty unless requested.
+        full_interpolation_s: total by full interpolation; None: not requested.
+        tools: times per tool, in order of first use.
+        regions: times per region, in order.
+        blocks: times per block, in order; empty unless requested.
+        shaped_regions: number of regions with shaped blocks, by the program's header; 0: none.
+        warnings: findings of the reader; why the verdict in an emitted program's header is not valid here.
+        simulated: the program, for a page.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "difference_percent": float | None}
@@ -147,12 +147,12 @@ class CycleTime(TimeParts, Result):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Published methods of the controller and the plant."""
+        """Published methods of the models of controller and plant."""
         return () if self.simulated is None else self.simulated.methods
 
     @property
     def difference_percent(self) -> float | None:
-        """Closed form over full interpolation, in % of the latter; None without one."""
+        """Difference of closed form from full interpolation, %; None without the latter."""
         full = self.full_interpolation_s
         if full is None:
             return None
@@ -160,13 +160,13 @@ class CycleTime(TimeParts, Result):
 
     @property
     def ok(self) -> bool:
-        """Closed form and full interpolation differ by no more than `AGREEMENT_PERCENT`, or only one was asked for."""
+        """Closed form and full interpolation differ by no more than `AGREEMENT_PERCENT`, or only one was requested."""
         difference = self.difference_percent
         return difference is None or abs(difference) <= AGREEMENT_PERCENT
 
     @property
     def answer(self) -> str:
-        """The whole time, and whether the check agrees."""
+        """The total time, and whether full interpolation agrees."""
         takes = f"{self.program} takes {self.cycle_time_s:.3f} s"
         if self.total_high_s is not None:
             takes += f" ± {self.total_high_s - self.cycle_time_s:.1f} s"
@@ -178,7 +178,7 @@ class CycleTime(TimeParts, Result):
 
     @property
     def next_step(self) -> str:
-        """The one thing to do next, in one sentence."""
+        """What to improve next, in one sentence."""
         if not self.ok:
             return (
                 f"trust the full interpolation: the closed form differs by {self.difference_percent:+.2f} % "
@@ -189,7 +189,7 @@ class CycleTime(TimeParts, Result):
         cutting, programmed = sum(r.cutting_s for r in self.regions), sum(r.programmed_s for r in self.regions)
         if cutting - programmed > _NOTABLE * self.cycle_time_s:
             return (
-                f"cutting takes {cutting / programmed:.2f} times what its feeds say: look for feeds above the limits "
+                f"cutting takes {cutting / programmed:.2f} times its time by feed: check for feeds above the limits "
                 "of the axes, and for blocks of a few interpolation periods, which are rounded up to whole ones."
             )
         worst = max(_REMEDIES, key=lambda part: float(getattr(self, part)))
@@ -200,14 +200,14 @@ class CycleTime(TimeParts, Result):
             region = self.slowest_regions(1)[0]
             first, last = region.lines
             share = share_percent(region.duration_s, self.cycle_time_s)
-            return f"most of it is cutting: begin with lines {first} to {last} ({tool_name(region.tool)}, {share})."
-        return "look at the blocks: --csv FILE."
+            return f"most of it is cutting: start with lines {first} to {last} ({tool_name(region.tool)}, {share})."
+        return "see the blocks: --csv FILE."
 
     def slowest_regions(self, count: int = _SLOWEST) -> list[RegionTime]:
-        """The regions that take longest, longest first.
+        """The regions with the longest times, longest first.
 
         Args:
-            count: how many at most.
+            count: largest number.
 
         Returns:
             The regions, longest first.
@@ -215,27 +215,27 @@ class CycleTime(TimeParts, Result):
         return heapq.nlargest(count, self.regions, key=attrgetter("duration_s"))
 
     def slowest_blocks(self, count: int = _SLOWEST) -> list[BlockTime]:
-        """The blocks that take longest, longest first.
+        """The blocks with the longest times, longest first.
 
         Args:
-            count: how many at most.
+            count: largest number.
 
         Returns:
-            The blocks, longest first; none where the blocks were not asked for.
+            The blocks, longest first; none if blocks were not requested.
         """
         return heapq.nlargest(count, self.blocks, key=attrgetter("duration_s"))
 
     def without_blocks(self) -> CycleTime:
-        """The same without the single blocks, of which there may be millions."""
+        """Copy without the blocks, of which there may be millions."""
         return replace(self, blocks=())
 
     def key_figures(self) -> tuple[Figure, ...]:
-        """The whole, and its parts that take time."""
+        """Total, and its nonzero parts."""
         shown = {"cycle_time_s": "cycle time"} | {part: LABELS[part] for part in PARTS if getattr(self, part) > 0.0}
         return tuple(Figure(name, "s", None, getattr(self, key), 2, key_after=key) for key, name in shown.items())
 
     def tables(self) -> list[Table]:
-        """Parts; tools; the slowest regions and blocks."""
+        """Tables of parts, tools, the slowest regions and blocks."""
         found = [self._parts_table()]
         if self.tools:
             found.append(self._tools_table())
@@ -290,11 +290,11 @@ class CycleTime(TimeParts, Result):
         return Table("slowest", columns, rows, sections=(len(regions),))
 
     def plots(self) -> Mapping[str, Plot]:
-        """`time`: where the time goes, by tool and by region; none for a program that takes no time."""
+        """`time`: time by tool and by region; none for a program without time."""
         return self._drawn_beside() if self.cycle_time_s > 0.0 else {}
 
     def csv_lines(self) -> Iterator[str]:
-        """One line per block below a line of headings: the attributes of `BlockTime`, seconds to a microsecond."""
+        """CSV lines with a heading, one per block: the attributes of `BlockTime`, seconds to a microsecond."""
         yield ",".join(field.name for field in fields(BlockTime)) + "\n"
         for block in self.blocks:
             cells = astuple(block)
@@ -310,7 +310,7 @@ _LOG_NEXT = (Column("program", value="program", text=True), Column("± s", value
 
 
 def tool_name(tool: int | None) -> str:
-    """A tool in words."""
+    """Name of a tool."""
     return "no tool yet" if tool is None else f"T{tool}"
 
 
@@ -319,7 +319,7 @@ def _mean_feed(row: RegionTime | BlockTime) -> float | None:
 
 
 def _clock(seconds: float) -> str:
-    """Hours, minutes and seconds."""
+    """Format as hours, minutes and seconds."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}"

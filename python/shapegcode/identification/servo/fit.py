@@ -1,4 +1,4 @@
-"""Fits models of the position loop to one half of a log and judges them on the other."""
+"""Fits models of the position loop to one half of a log and validates them on the other."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 
 _STILL_TRAVEL = 1e-3  # mm or degrees
-_STEADY_CHANGE = 0.02  # of the top speed: less is no change of speed
+_STEADY_CHANGE = 0.02  # least change of speed, relative to the top speed
 _LAG_SPREAD = 0.03
 _SLOPE = (0.5, 2.0)
 _MAX_SAMPLES = 40_000
-_MIN_SPEED = 0.02  # of the top speed, where a lag at constant speed is looked for
+_MIN_SPEED = 0.02  # least speed, relative to the top speed, to find a lag at constant speed
 _KEYS = {"controller.position_gain_per_s": "position gain", "controller.feed_forward_ratio": "feed-forward"}
 
 
@@ -34,26 +34,26 @@ def fit_servo(
     drive: bool = False,
     on_progress: Callable[[float], None] | None = None,
 ) -> ServoFit:
-    """What a log of commands and actual positions says about the position loop of each axis.
+    """Identify the position loop of each axis from a log of commands and actual positions.
 
-    Three models are fitted to one half of the changes of speed and judged on the other half, and the reverse: the servo
-    lag of the machine file (gain, feed-forward), the same behind a dead time, and a drive with friction behind a dead
-    time. They see the command alone, never the actual positions of the half on which they are judged.
+    Three models are fitted to each half of the changes of speed and validated on the other half: the servo
+    lag of the machine file (gain, feed-forward), the same with a dead time, and a drive with friction and a dead
+    time. Their input is the command alone, never the actual positions of the validation half.
 
     Args:
-        log: capture of a Sinumerik control, CSV with command and actual columns, or what `read_servo_record` gave.
-        machine: whose file gets gain and feed-forward of X, Y and Z; None: none.
-        axes: which axis of the log is X, Y, Z of the machine, such as "X=1,Y=6,Z=2"; None: by their names.
+        log: capture of a Sinumerik control, CSV with command and actual columns, or the result of `read_servo_record`.
+        machine: machine that gets gain and feed-forward of X, Y and Z; None: none.
+        axes: axes of the log that are X, Y, Z of the machine, such as "X=1,Y=6,Z=2"; None: by their names.
         units: of time and length in a CSV, for example "ms,um"; None: from its header.
-        drive: whether the drive is fitted too, which takes some ten seconds for each axis and half.
-        on_progress: told the share of the work done, 0 to 1.
+        drive: fit the drive too (about ten seconds for each axis and half).
+        on_progress: called with the completed fraction, 0 to 1.
 
     Returns:
-        What each model leaves, and the parameters that follow, with intervals.
+        Residual of each model, and the parameters with intervals.
 
     Raises:
-        ArgumentError, RecordError: the file cannot be used; an axis that it does not have.
-        MachineError: the values do not go with others of the machine file.
+        ArgumentError, RecordError: an unusable file; an axis that is not in it.
+        MachineError: the values contradict others of the machine file.
         OSError: the file cannot be read.
     """
     record = log if isinstance(log, ServoRecord) else read_servo_record(log, units)
@@ -69,7 +69,7 @@ def fit_servo(
     warnings = list(record.notes)
     samples = record.axes[0].samples
     if samples > _MAX_SAMPLES:
-        warnings.append(f"of {samples} samples those {_MAX_SAMPLES} were taken where an axis changes its speed most")
+        warnings.append(f"of {samples} samples the {_MAX_SAMPLES} with most changes of an axis' speed were used")
     fitted, written, unknown = (None, {}, []) if machine is None else _machine_with(machine, found, places)
     warnings += unknown
     duration = float(sum(each[-1] - each[0] for each in record.axes[0].time_s))
@@ -94,15 +94,15 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
     change = sum(float(np.abs(np.diff(each)).sum()) for each in speeds)
     if change < _STEADY_CHANGE * top:
         mean = float(np.mean(lag)) / float(np.mean(np.concatenate(speeds)))
-        steady = ServoEstimate("lag at constant speed", mean, None, None, "s", "one speed: nothing else follows")
+        steady = ServoEstimate("lag at constant speed", mean, None, None, "s", "one speed: nothing else can be found")
         return replace(base, parameters=(steady,), note="never changes its speed")
     if two := _two_lags(trace, speeds, top):
         return replace(base, note=two)
-    # Which samples lie in the half of all changes of speed that comes first; and which count.
+    # Samples in the first half of all changes of speed; and used samples.
     changes = [np.abs(np.diff(each, prepend=each[:1])) for each in speeds]
     done = np.cumsum(np.concatenate(changes))
     early = tuple(np.split(done < done[-1] / 2.0, np.cumsum([len(each) for each in speeds])[:-1]))
-    settle = round(models.SETTLE_S / period_s)  # what the axis did before a stretch is not known
+    settle = round(models.SETTLE_S / period_s)  # the motion before a section is unknown
     use = tuple(np.arange(len(each)) >= settle for each in speeds)
     uses = (use, *(tuple(c & (e == which) for e, c in zip(early, use, strict=True)) for which in (True, False)))
     compared = _compare_models(trace, early, uses, period_s, with_drive, tell)
@@ -122,7 +122,7 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
 
 
 def _unlike(trace: ServoTrace) -> str:
-    """Why the actual position is not that of the command; empty where it follows it."""
+    """Why the actual position does not follow the command; empty if it does."""
     way = [r - r.mean() for r in trace.command]
     power = sum(float(r @ r) for r in way)
     slope = sum(float(r @ (x - x.mean())) for r, x in zip(way, trace.actual, strict=True)) / power
@@ -132,7 +132,7 @@ def _unlike(trace: ServoTrace) -> str:
 
 
 def _two_lags(trace: ServoTrace, speeds: Sequence[FloatArray], top: float) -> str:
-    """Says where the lag at constant speed is not one number."""
+    """Report a lag at constant speed that changes; empty if it does not."""
     found: list[tuple[float, float, float]] = []  # lag over speed, speed, time
     count = 25
     for lag, speed, time in zip(trace.lag, speeds, trace.time_s, strict=True):
@@ -148,15 +148,15 @@ def _two_lags(trace: ServoTrace, speeds: Sequence[FloatArray], top: float) -> st
         f"{1e3 * lag:.3f} ms at {speed:.5g} {trace.unit}/s ({time_s:.2f} s)"
         for lag, speed, time_s in (min(found), max(found))
     )
-    changed = "the control changed its loop there, and no one model follows"
+    changed = "the control changed its loop there, and no single model fits"
     return f"the lag at constant speed is {least} and {most}: {changed}"
 
 
 @dataclass(frozen=True, eq=False)
 class _ComparedModel:
     name: str
-    fits: tuple[LoopFit, ...]  # to all samples, to the first half, to the second
-    rest: tuple[FloatArray, ...]  # each sample by the fit to the other half
+    fits: tuple[LoopFit, ...]  # fits to all samples, to the first half, to the second
+    rest: tuple[FloatArray, ...]  # residual of each sample after the fit to the other half
     rest_fitted: tuple[FloatArray, ...]
 
 
@@ -164,7 +164,7 @@ def _compare_models(
     trace: ServoTrace, early: Masks, uses: Sequence[Masks], period_s: float, with_drive: bool,
     tell: Callable[[float], None],
 ) -> list[_ComparedModel]:  # fmt: skip
-    """The models, fitted to all, the first half and the second."""
+    """Fit the models to all samples and to each half."""
 
     def judge(name: str, fits: Sequence[LoopFit]) -> _ComparedModel:
         whole, first, second = fits
@@ -231,19 +231,19 @@ def _machine_axes(record: ServoRecord, axes: str | Mapping[str, str] | None) -> 
 def _machine_with(
     machine: Machine, axes: Sequence[ServoAxis], places: Mapping[str, int]
 ) -> tuple[Machine, dict[str, float], list[str]]:
-    """The machine with gain and feed-forward of the axes whose log determines them."""
+    """The machine with the gain and feed-forward that the log determines."""
     written: dict[str, float] = {}
     remarks: dict[str, list[str]] = {}
     warnings: list[str] = []
     for letter, place in places.items():
         axis = axes[place]
         if axis.unit != "mm":
-            warnings.append(f"axis {axis.name} turns: it is no {letter.upper()} of a machine file")
+            warnings.append(f"axis {axis.name} is rotary: it cannot be {letter.upper()} of a machine file")
             continue
         estimates = {key: each for key, name in _KEYS.items() if (each := axis.parameter(name)) is not None}
         known = {key: each.value for key, each in estimates.items() if each.value is not None}
         if len(known) < len(_KEYS):
-            warnings.append(f"axis {axis.name}: gain and feed-forward do not follow: {letter.upper()} keeps its values")
+            warnings.append(f"axis {axis.name}: gain and feed-forward not found: {letter.upper()} keeps its values")
             continue
         for key, value in known.items():
             written[f"{key}.{letter}"] = round(float(value), 6)
@@ -251,5 +251,5 @@ def _machine_with(
             remarks.setdefault(key, []).append(interval)
     if not written:
         return machine, written, warnings
-    said = {key: f"measured (log, behind a dead time): {', '.join(each)}" for key, each in remarks.items()}
+    said = {key: f"measured (log, with a dead time): {', '.join(each)}" for key, each in remarks.items()}
     return machine.with_values(written).with_remarks(said), written, warnings

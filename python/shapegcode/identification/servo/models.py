@@ -1,8 +1,8 @@
-"""Models of a position loop, fitted to commands and actual positions: servo lag behind a dead time, feed drive, torque.
+"""Models of a position loop, fitted to commands and actual positions: servo lag with dead time, feed drive, torque.
 
-Servo lag: the command r reaches the loop τ later; the loop is the core's `ServoLag`, x' = K (r − x) + f r'. So the lag
-at constant speed is τ + (1 − f)/K. A Sinumerik with speed feed-forward balances it by a dead time (MD32620 = 3, 4).
-Feed drive: a rigid axis of 1 kg, since positions tell forces over mass alone.
+Servo lag: the command r is delayed by τ; the loop is the core's `ServoLag`, x' = K (r − x) + f r'. So the lag
+at constant speed is τ + (1 − f)/K. A Sinumerik with speed feed-forward compensates it by a dead time (MD32620 = 3, 4).
+Feed drive: a rigid axis of 1 kg, since positions determine only force/mass.
 """
 
 from __future__ import annotations
@@ -19,32 +19,32 @@ from shapegcode.identification.servo.record import ServoTrace
 from shapegcode.identification.servo.result import ServoEstimate
 from shapegcode.io.units import FloatArray
 
-Masks = Sequence[npt.NDArray[np.bool_]]  # of each stretch: which samples count
+Masks = Sequence[npt.NDArray[np.bool_]]  # of each section: used samples
 SETTLE_S = 0.1
 GAINS = (2.0, 1000.0)  # 1/s
 _LONGEST_DEAD_S = 0.05
-_SIGN_RATIO = 5e-4  # of the top speed, within which friction changes its sign
+_SIGN_RATIO = 5e-4  # of the top speed: width of the sign change of friction
 
 
 @dataclass(frozen=True, eq=False)
 class LoopFit:
-    """A model that was fitted."""
+    """A fitted model."""
 
     dead_s: float
     gain_per_s: float
-    rest: float  # 1 − f, what the feed-forward leaves, 0 to 1
-    offset: float  # of the encoder against the command at rest
-    error: tuple[FloatArray, ...]  # of each stretch: command less actual position, as the model has it
+    rest: float  # remaining lag ratio 1 − f with feed-forward, 0 to 1
+    offset: float  # encoder offset from the command at rest
+    error: tuple[FloatArray, ...]  # of each section: modelled command minus actual position
 
     @property
     def lag_s(self) -> float:
-        """Lag at constant speed over speed."""
+        """Lag at constant speed divided by the speed, s."""
         return self.dead_s + self.rest / self.gain_per_s
 
 
 @dataclass(frozen=True, eq=False)
 class DriveFit(LoopFit):
-    """A rigid feed drive with Coulomb friction behind a dead time."""
+    """A rigid feed drive with Coulomb friction and a dead time."""
 
     bandwidth_hz: float  # of the speed loop
     integral_time_s: float  # of the speed loop
@@ -52,12 +52,12 @@ class DriveFit(LoopFit):
 
 
 def rms(values: FloatArray) -> float:
-    """Root of the mean square; NaN of nothing."""
+    """Root of the mean square; NaN if empty."""
     return float(np.sqrt(np.mean(values**2))) if values.size else math.nan
 
 
 def counted(values: Sequence[FloatArray], use: Masks) -> FloatArray:
-    """The samples that count, of all sections."""
+    """The used samples of all sections."""
     return np.concatenate([each[keep] for each, keep in zip(values, use, strict=True)])
 
 
@@ -76,7 +76,7 @@ def lag_way(way: FloatArray, gain_per_s: float, period_s: float, late: float = 0
     from scipy.signal import lfilter
 
     kept = math.exp(-gain_per_s * period_s)
-    share = (1.0 - kept) / (gain_per_s * period_s)  # of a ramp over one period
+    share = (1.0 - kept) / (gain_per_s * period_s)  # for a ramp over one period
     first = way[1] - way[0]
     steady = share * first / (1.0 - kept)
     steps = np.diff(way, prepend=way[0] - first)
@@ -85,7 +85,7 @@ def lag_way(way: FloatArray, gain_per_s: float, period_s: float, late: float = 0
     part = whole - late
     if whole == 0:
         return error
-    # Between two samples: the error at the one before decays, that of the line up to there comes in.
+    # Between samples the previous error decays and that of the line segment is added.
     inside = math.exp(-gain_per_s * period_s * part)
     before = np.concatenate([np.full(whole, steady), error[: max(len(way) - whole, 0)]])[: len(way)]
     step = np.concatenate([np.full(whole, first), np.diff(way)])[: len(way)]
@@ -93,7 +93,7 @@ def lag_way(way: FloatArray, gain_per_s: float, period_s: float, late: float = 0
 
 
 def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) -> LoopFit:
-    """Fit dead time, gain, feed-forward and offset; the last two by linear least squares within."""
+    """Fit dead time, gain, feed-forward and offset; the last two by inner linear least squares."""
     from scipy.optimize import minimize, minimize_scalar
 
     low, high = (math.log(each) for each in GAINS)
@@ -128,7 +128,7 @@ def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) 
     power = float(speed @ speed)
     lag = min(max(float(speed @ counted(trace.lag, use)) / power, 0.0), _LONGEST_DEAD_S) if power > 0.0 else 0.0
     starts = [(1e3 * share * lag, math.log(gain)) for share in (0.6, 0.9, 0.99) for gain in (20.0, 60.0)]
-    # Two valleys are followed to their ends: from the other starts others only come later to the same one.
+    # Refine the two best valleys to their ends; other starts only reach the same ones later.
     tried = [
         minimize(square, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-9, "maxiter": 300})
         for start in sorted(starts, key=lambda each: square(np.array(each)))[:2]
@@ -141,7 +141,7 @@ def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) 
 def lag_estimates(
     fit: LoopFit, halves: Sequence[LoopFit], trace: ServoTrace, use: Masks, period_s: float
 ) -> tuple[ServoEstimate, ...]:
-    """Parameters of a servo lag behind a dead time, with 95 % intervals no narrower than what the halves differ by."""
+    """Servo lag with dead time; 95 % intervals at least as wide as the halves of the record differ."""
 
     def model(values: FloatArray) -> FloatArray:
         late = values[0] / period_s
@@ -158,7 +158,7 @@ def lag_estimates(
     jacobian = np.column_stack(slopes)
     left = counted([lag - e for lag, e in zip(trace.lag, fit.error, strict=True)], use)
     scale = np.linalg.norm(jacobian, axis=0)
-    scale[scale == 0.0] = 1.0  # of a gain that nothing depends on
+    scale[scale == 0.0] = 1.0  # for a gain without effect
     inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), rcond=1e-12) / np.outer(scale, scale)
     covariance = inverse * float(np.mean(left**2)) * _correlated_samples(left)
 
@@ -172,13 +172,13 @@ def lag_estimates(
     names = "dead_s", "gain_per_s", "rest"
     dead, gains, forward = (half(name, *row) for name, row in zip(names, np.eye(4), strict=False))
     ends = max(0.0, 1.0 - rest - forward), min(1.0, 1.0 - rest + forward)
-    why = "the feed-forward leaves no lag that determines it"
+    why = "with this feed-forward no lag remains to determine it"
     loop = (
         ServoEstimate("position gain", None, None, None, "1/s", why),
         ServoEstimate("feed-forward", None, *ends, "1", why),
     )
     if gains < 0.5 * gain and forward < rest:
-        why = "of a first-order loop that lags alike; the control's setting may be another"
+        why = "of an equivalent first-order loop; the control's setting may differ"
         gain_estimate = ServoEstimate("position gain", gain, gain - gains, gain + gains, "1/s", why)
         loop = gain_estimate, ServoEstimate("feed-forward", 1.0 - rest, *ends, "1")
     return (
@@ -189,7 +189,7 @@ def lag_estimates(
 
 
 def _correlated_samples(left: FloatArray) -> float:
-    """Over how many samples what is left hangs together: 1 + 2 Σ ρ, up to where ρ first falls below zero."""
+    """Correlation length of the residual, samples: 1 + 2 Σ ρ up to the first negative ρ."""
     left = left - left.mean()
     size = 1 << (2 * len(left) - 1).bit_length()
     correlation = np.fft.irfft(np.abs(np.fft.rfft(left, size)) ** 2, size)[: len(left) // 2]
@@ -203,7 +203,7 @@ def _correlated_samples(left: FloatArray) -> float:
 # --- feed drive -------------------------------------------------------------------------------------------------------
 
 _RUN_UP_S, _MM = 0.4, 1e-3
-_STIFFNESS_N_PER_M, _DAMPING_N_S_PER_M = 4e6, 400.0  # of 1 kg: 640 Hz, far above the speed loop
+_STIFFNESS_N_PER_M, _DAMPING_N_S_PER_M = 4e6, 400.0  # for 1 kg: 640 Hz, far above the speed loop
 # Dead time in ms; position gain, bandwidth in Hz, integral time, Coulomb friction as logarithms.
 _LOW = (0.0, math.log(2.0), 0.0, math.log(5.0), math.log(1e-3), math.log(1e-7))
 _HIGH = (30.0, math.log(500.0), 1.0, math.log(400.0), math.log(1.0), math.log(1e3))
@@ -212,7 +212,7 @@ _STARTS = ((150.0, 0.02), (40.0, 0.005))  # bandwidth, integral time
 
 
 def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, tell: Callable[[], None]) -> DriveFit:
-    """Fit the drive, from the servo lag that fits best."""
+    """Fit the drive, started at the best servo lag."""
     from scipy.optimize import least_squares
 
     top_speed = max(float(np.abs(np.diff(way)).max()) for way in trace.command) / period_s
@@ -247,7 +247,7 @@ def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, te
 
 
 def _drive_ways(trace: ServoTrace, values: FloatArray, period_s: float, top_speed: float) -> list[FloatArray]:
-    """Position of the drive in each section; before it the axis is assumed to have its first speed."""
+    """Position of the drive in each section; before the section its first speed is assumed."""
     dead_ms, gain, rest, bandwidth, integral, coulomb = values
     friction, smoothing = math.exp(coulomb), _SIGN_RATIO * top_speed * _MM
     parameters = _core.FeedDriveParameters(
@@ -274,17 +274,17 @@ def _drive_ways(trace: ServoTrace, values: FloatArray, period_s: float, top_spee
 
 
 def range_of_three(name: str, values: Sequence[float], unit: str) -> ServoEstimate:
-    """A parameter of the fits to all samples and to the halves: not known where the halves do not agree on it."""
+    """A parameter of the fits to all samples and to the halves: unknown if the halves disagree."""
     low, high = min(values), max(values)
     if high > 1.5 * low:
-        return ServoEstimate(name, None, low, high, unit, "the halves do not agree on it")
+        return ServoEstimate(name, None, low, high, unit, "the halves disagree")
     return ServoEstimate(name, values[0], low, high, unit, "range of three fits")
 
 
 def torque_friction(
     trace: ServoTrace, lag_s: float, uses: Sequence[Masks], period_s: float
 ) -> tuple[ServoEstimate, ...]:
-    """Friction over mass, T_c/J, from the torque: T_c sign(v) + J a + T_v v + T_0 of the command, late by the lag."""
+    """Friction over mass, T_c/J, from the torque T_c sign(v) + J a + T_v v + T_0 at the command delayed by the lag."""
     if trace.torque is None:
         return ()
     torque = trace.torque
@@ -293,7 +293,7 @@ def torque_friction(
     columns = [np.column_stack([np.tanh(v / sign), np.gradient(v, period_s), v, np.ones_like(v)]) for v in late]
 
     def fit(use: Masks) -> tuple[float, float]:
-        """T_c/J, and the share of the torque that T_c explains beyond the rest."""
+        """T_c/J, and the torque ratio that T_c explains in addition to the other terms."""
         basis, values = counted(columns, use), counted(torque, use)
         scale = np.linalg.norm(basis, axis=0)
         scale[scale == 0.0] = 1.0
@@ -309,6 +309,6 @@ def torque_friction(
     share = fits[0][1]
     name, unit = "friction over mass by torque", f"{trace.unit}/s²"
     if share < 0.5 or min(value for value, _ in fits) <= 0.0:
-        why = f"friction explains {100.0 * max(share, 0.0):.0f} % of the torque that acceleration and speed leave"
+        why = f"friction explains {100.0 * max(share, 0.0):.0f} % of the torque not due to acceleration and speed"
         return (ServoEstimate(name, None, None, None, unit, why),)
     return (range_of_three(name, [value for value, _ in fits], unit),)

@@ -1,4 +1,4 @@
-"""The pictures of a servo log: the control's contour deviation, and what the model leaves."""
+"""The pictures of a servo log: the control's contour deviation, and the model's residual."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from shapegcode.results.outcome import Plot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_OWN, _OURS = "control: contour deviation", "left by our model, not fitted there"
+_OWN, _OURS = "control: contour deviation", "residual of our model, not fitted there"
 
 
 def plots_of(found: ServoFit) -> dict[str, Plot]:
-    """Its pictures by name."""
+    """Pictures of a servo log, by name."""
     return {"servo": partial(plot_servo, found)} if any(axis.models for axis in found.axes) else {}
 
 
 def plot_servo(found: ServoFit, ax: Axes | None = None) -> Axes:
-    """One panel for each axis: deviation from the control's own model, and what ours leaves where it was not fitted.
+    """One panel for each axis: the control's contour deviation, and our model's residual where it was not fitted.
 
     Args:
-        found: what the log says.
+        found: fit of the log.
         ax: where to draw; None: a new figure.
 
     Returns:
         The first of the axes drawn into.
     """
     shown = [axis for axis in found.axes if axis.models and axis.curves is not None]
-    title, size_inch = f"How far each axis is off: {Path(found.source).name}", (9.0, 0.8 + 1.3 * len(shown))
+    title, size_inch = f"Deviation of each axis: {Path(found.source).name}", (9.0, 0.8 + 1.3 * len(shown))
     panels = [row[0] for row in plot.grid(ax, len(shown), 1, size_inch=size_inch, title=title, sharex=True)]
     for panel, axis in zip(panels, shown, strict=True):
         curves = axis.curves

@@ -1,4 +1,4 @@
-"""Commands and actual positions of axes, whatever file they are in."""
+"""Commands and actual positions of axes, from captures and logs."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from shapegcode.io.edge_json import is_edge_json, read_edge_json
 from shapegcode.io.servo_log import parse_units, read_log
 from shapegcode.io.units import FloatArray
 
-_GAP = 1.5  # of the usual step
+_GAP = 1.5  # longest step, relative to the usual one
 _FEWEST, _WINDOW = 100, 2500
-_LARGEST_ACCELERATION = 5e5  # mm/s² or degrees/s²; a command beyond it is no motion
+_LARGEST_ACCELERATION = 5e5  # mm/s² or degrees/s²; beyond it a command is a step, not motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +28,11 @@ class ServoTrace:
     """One axis; a section is a range of samples without a gap.
 
     Attributes:
-        name: of the axis, as the file has it.
-        unit: "deg" where whole turns were seen or the label begins with A, B or C; else "mm".
-        time_s: of each stretch, (n,).
-        command: of each stretch, (n,) in mm or degrees.
-        actual: the same of the encoder.
+        name: of the axis, as in the file.
+        unit: "deg" if whole turns were found or the label begins with A, B or C; else "mm".
+        time_s: instants of each section, (n,).
+        command: of each section, (n,) in mm or degrees.
+        actual: encoder position of each section, as `command`.
         deviation: the control's own contour deviation; None where it was not recorded.
         torque: of the motor; None where it was not recorded.
     """
@@ -47,30 +47,30 @@ class ServoTrace:
 
     @property
     def samples(self) -> int:
-        """Of all sections."""
+        """Number of samples of all sections."""
         return sum(map(len, self.command))
 
     @cached_property
     def lag(self) -> tuple[FloatArray, ...]:
-        """Command less actual position."""
+        """Command minus actual position."""
         return tuple(r - x for r, x in zip(self.command, self.actual, strict=True))
 
     def liveliest(self, most: int) -> ServoTrace:
-        """The windows with most changes of speed, where there are more samples than can be fitted in a short time.
+        """Select the windows with most changes of speed, to limit the time of a fit.
 
         Args:
-            most: samples to keep.
+            most: largest number of samples.
 
         Returns:
-            The trace itself where it has no more; else some of its windows, those that touch each other joined.
+            The trace itself if it is short enough; else some of its windows, adjacent ones joined.
         """
         if self.samples <= most:
             return self
-        windows: list[tuple[float, int, int]] = []  # change of speed, stretch, start
+        windows: list[tuple[float, int, int]] = []  # change of speed, section, start
         for rank, way in enumerate(self.command):
             changes = np.abs(np.diff(way, 2, prepend=way[:1], append=way[-1:]))
             windows += [(float(changes[at : at + _WINDOW].sum()), rank, at) for at in range(0, len(way), _WINDOW)]
-        kept: list[tuple[int, slice]] = []  # stretch, and samples of it
+        kept: list[tuple[int, slice]] = []  # section, and its samples
         for _, rank, at in sorted(sorted(windows, reverse=True)[: max(1, most // _WINDOW)], key=lambda each: each[1:]):
             end = min(at + _WINDOW, len(self.command[rank]))
             if kept and kept[-1][0] == rank and kept[-1][1].stop == at:
@@ -89,13 +89,13 @@ class ServoTrace:
 
 @dataclass(frozen=True, eq=False)
 class ServoRecord:
-    """What was recorded.
+    """Recorded commands and positions.
 
     Attributes:
         source: file.
         period_s: between samples.
         axes: those with command and actual position.
-        notes: what reading had to leave out or to assume.
+        notes: parts ignored and assumptions made on reading.
     """
 
     source: str
@@ -112,10 +112,10 @@ def read_servo_record(path: str | Path, units: str | None = None) -> ServoRecord
         units: of time and length in a CSV, for example "ms,um"; None: from its header.
 
     Returns:
-        The axes of which both positions were recorded.
+        The axes with both positions.
 
     Raises:
-        ArgumentError, RecordError: the file cannot be used, or has no axis with both positions.
+        ArgumentError, RecordError: an unusable file, or no axis with both positions.
         OSError: it cannot be read.
     """
     path = Path(path)
@@ -123,7 +123,7 @@ def read_servo_record(path: str | Path, units: str | None = None) -> ServoRecord
         head = file.read(200)
     if is_edge_json(head) or path.suffix.lower() == ".json":
         if units is not None:
-            raise ArgumentError(f"--units {units}: goes with a CSV; a capture has s and mm or degrees")
+            raise ArgumentError(f"--units {units}: is for a CSV; a capture has s and mm or degrees")
         return _of_capture(read_edge_json(path))
     return _of_log(path, parse_units(units) if units is not None else None)
 
@@ -140,15 +140,15 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
         command, actual = capture.position(axis.number), capture.position(axis.number, actual=True)
         bad = np.flatnonzero(~np.isfinite(command + actual))
         if bad.size:
-            notes.append(f"{label}: left out: values are missing from {bad[0]} on")
+            notes.append(f"{label}: ignored: values are missing from {bad[0]} on")
             continue
         ranges = _ranges(command, capture.stretches, capture.cycle_s)
         if len(ranges) > len(capture.stretches):
             where = f"{capture.time_s[ranges[1].start]:.3f} s"
-            notes.append(f"{label}: its command has a step, first at {where}: divided there")
+            notes.append(f"{label}: its command has a step, first at {where}: split there")
         ranges = tuple(each for each in ranges if each.stop - each.start >= _FEWEST)
         if not ranges:
-            notes.append(f"{label}: left out: no {_FEWEST} samples without gap or jump")
+            notes.append(f"{label}: ignored: no {_FEWEST} samples without gap or jump")
             continue
 
         others = [capture.columns.get(f"{signal}|{axis.number}") for signal in ("CONT_DEV", "TORQUE")]
@@ -161,7 +161,7 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
 
 
 def _ranges(command: FloatArray, stretches: tuple[slice, ...], period_s: float) -> tuple[slice, ...]:
-    """The sections, divided where the command has a step within one sample: other coordinates, no motion."""
+    """Sections, split where the command jumps in one sample (a coordinate change, not motion)."""
     out = []
     for each in stretches:
         steps = np.diff(command[each])
@@ -175,7 +175,7 @@ def _ranges(command: FloatArray, stretches: tuple[slice, ...], period_s: float) 
 def _of_log(path: Path, units: tuple[float, float] | None) -> ServoRecord:
     log = read_log(path, units)
     if log.actual_mm is None:
-        raise RecordError(f"{path}: no actual positions: columns such as X_act are needed beside the commanded X")
+        raise RecordError(f"{path}: no actual positions: columns such as X_act are needed next to the commanded X")
     steps = np.diff(log.times_s)
     ends = [0, *(np.flatnonzero(steps > _GAP * log.sampling_s) + 1).tolist(), len(log.times_s)]
     ranges = [slice(a, b) for a, b in itertools.pairwise(ends) if b - a >= _FEWEST]

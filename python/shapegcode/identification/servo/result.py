@@ -1,4 +1,4 @@
-"""What a log of commands and actual positions says about the position loops: figures, tables, pictures."""
+"""Position loops identified from a log: figures, tables, pictures."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from shapegcode.results.table import Column, Table
 class ServoEstimate:
     """A parameter."""
 
-    name: str  # of it
-    value: float | None  # null where the record does not tell it
+    name: str  # of the parameter
+    value: float | None  # null if the record does not determine it
     low: float | None  # lower end of the interval (95 %; of the drive: the range of the fits to the halves and to all)
     high: float | None  # upper end
-    unit: str  # of the three
-    note: str = ""  # why it is not known, or what it rests on
+    unit: str  # unit of value and interval
+    note: str = ""  # why it is unknown, or its basis
 
 
 @dataclass(frozen=True)
@@ -32,23 +32,23 @@ class ServoModel:
     """A model of the loop, compared with the record."""
 
     name: str  # "servo lag", "dead time and servo lag", "drive"
-    # root mean square of what it leaves of the following error in samples that it was not fitted to, in mm or degrees
+    # RMS of the residual following error in samples to which it was not fitted, mm or degrees
     rest: float
-    rest_fitted: float  # the same where it was fitted to all samples
-    # share of the mean square of the control's contour deviation that it explains in samples that it was not fitted to;
-    # null where there is none. Negative: the control's own model is better
+    rest_fitted: float  # RMS residual of the fit to all samples
+    # ratio of the mean square of the control's contour deviation that it explains in samples to which it was not
+    # fitted; null without deviation. Negative: the control's own model is better
     explained_percent: float | None
 
 
 @dataclass(frozen=True, eq=False)
 class ServoCurves:
-    """Data of the picture of an axis, one array for each section without a gap."""
+    """Data to plot an axis, one array for each section without a gap."""
 
     time_s: tuple[FloatArray, ...]  # (n,)
     speed: tuple[FloatArray, ...]  # of the command, (n,)
-    lag: tuple[FloatArray, ...]  # command less actual position, (n,)
+    lag: tuple[FloatArray, ...]  # command minus actual position, (n,)
     deviation: tuple[FloatArray, ...] | None  # the control's contour deviation, (n,); None: not recorded
-    # what the best model leaves of the lag, each sample judged by the fit to the other half, (n,)
+    # residual of the lag after the best model's fit to the other half, (n,)
     rest: tuple[FloatArray, ...]
 
 
@@ -57,16 +57,16 @@ class ServoAxis:
     """One axis.
 
     Attributes:
-        name: as the file has it.
+        name: as in the file.
         unit: "mm" or "deg".
-        travel: of the command, mm or degrees.
-        top_speed: of the command, per second.
-        lag_rms: root mean square of command less actual position.
-        deviation_rms: of the control's contour deviation; null where it was not recorded.
-        models: held against it; none where the axis did not change its speed.
+        travel: total commanded travel, mm or degrees.
+        top_speed: highest commanded speed, per second.
+        lag_rms: root mean square of command minus actual position.
+        deviation_rms: RMS of the control's contour deviation; null if not recorded.
+        models: models compared with the record; none if the axis kept its speed.
         parameters: of the dead time and servo lag, then of the drive and of the torque.
-        note: what the record cannot tell, or what no model explains.
-        curves: for the picture.
+        note: undetermined or unexplained behaviour.
+        curves: data to plot.
     """
 
     name: str
@@ -82,7 +82,7 @@ class ServoAxis:
 
     @property
     def best(self) -> ServoModel | None:
-        """The model that leaves least in samples that it was not fitted to."""
+        """The model with the least residual in samples to which it was not fitted."""
         return min(self.models, key=lambda each: each.rest, default=None)
 
     @property
@@ -91,40 +91,40 @@ class ServoAxis:
         return "µm" if self.unit == "mm" else "mdeg"
 
     def model(self, name: str) -> ServoModel | None:
-        """A model.
+        """Find a model by name.
 
         Args:
             name: "servo lag", "dead time and servo lag" or "drive".
 
         Returns:
-            The model; None: it was not fitted.
+            The model; None: not fitted.
         """
         return next((each for each in self.models if each.name == name), None)
 
     def parameter(self, name: str) -> ServoEstimate | None:
-        """A parameter.
+        """Find a parameter by name.
 
         Args:
             name: such as "dead time", "position gain", "drive: speed loop".
 
         Returns:
-            The parameter, whose value may be unknown; None: it was not fitted.
+            The parameter, whose value may be unknown; None: not fitted.
         """
         return next((each for each in self.parameters if each.name == name), None)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ServoFit(Result):
-    """Position loops as a log of commands and actual positions shows them.
+    """Position loops identified from a log of commands and actual positions.
 
     Attributes:
         source: file.
         duration_s: of the samples, without gaps.
         axes: one for each axis with command and actual position.
-        machine: name of the machine whose file gets the values; empty: none.
+        machine: name of the machine that gets the values; empty: none.
         written: keys of the machine file that were set, with their values.
-        warnings: what no model explains, and what reading had to leave out.
-        fitted: the machine with what is known; None without a machine.
+        warnings: unexplained behaviour, and parts ignored on reading.
+        fitted: the machine with the parameters found; None without a machine.
     """
 
     source: str
@@ -145,7 +145,7 @@ class ServoFit(Result):
         """Ratio of the following error that the model explains, for the axis with the largest one."""
         fitted = [axis for axis in self.axes if axis.models]
         if not fitted:
-            return f"{self.source}: no axis changes its speed: nothing follows but the lag at constant speed"
+            return f"{self.source}: no axis changes its speed: only the lag at constant speed can be found"
         said = (
             f"{axis.name} {1e3 * axis.lag_rms:.4g} to {1e3 * min(each.rest for each in axis.models):.3g} "
             f"{axis.small_unit}"
@@ -154,33 +154,33 @@ class ServoFit(Result):
         return f"following error, rms, and the model's residual in data to which it was not fitted: {', '.join(said)}"
 
     def to_toml(self) -> str:
-        """The machine file with the gain and feed-forward that are known, each with a remark.
+        """The machine file with the gain and feed-forward found, each with a remark.
 
         Returns:
             The text of the file.
 
         Raises:
-            ArgumentError: nothing is known that a machine file has a key for.
+            ArgumentError: nothing was found that has a key in a machine file.
         """
         if self.fitted is None or not self.written:
             raise ArgumentError(
-                f"{self.source}: no gain or feed-forward of X, Y or Z follows, so there is no machine file to write; "
+                f"{self.source}: no gain or feed-forward of X, Y or Z was found, so there is no machine file to write; "
                 "name the axes where the labels of the log do not (axes, for example X=1,Y=6,Z=2)"
             )
         return self.fitted.to_toml()
 
     @property
     def next_step(self) -> str:
-        """To write the machine file, or to look at the pictures."""
+        """Write the machine file, or plot the residual."""
         if self.written:
             return "-o FILE writes the machine file with " + ", ".join(self.written)
         return "--plots DIR plots the residual; -m and -o write gain and feed-forward into a machine file"
 
     def next_step_after(self, file: str) -> str:
-        """To look at the machine file that was written.
+        """Show the machine file that was written.
 
         Args:
-            file: name of it.
+            file: name of the machine file.
 
         Returns:
             One sentence.
@@ -188,7 +188,7 @@ class ServoFit(Result):
         return f"shapegcode machine show {file} explains it; measured here: {', '.join(self.written)}"
 
     def tables(self) -> list[Table]:
-        """What the models explain, and their parameters."""
+        """Residuals of the models, and their parameters."""
         explained = (
             Column("axis", value="name", left=True),
             Column("unit", value="small_unit", left=True),
@@ -198,7 +198,7 @@ class ServoFit(Result):
             Column("and dead time", value=partial(_rest, "dead time and servo lag")),
             Column("drive", value=partial(_rest, "drive")),
             Column("control's model", value=lambda axis: _milli(axis.deviation_rms)),
-            Column("of that explained", "%", lambda axis: axis.best and axis.best.explained_percent, digits=1),
+            Column("of which explained", "%", lambda axis: axis.best and axis.best.explained_percent, digits=1),
         )
         fitted = [axis for axis in self.axes if axis.parameters]
         drives = [axis for axis in fitted if axis.model("drive")]
@@ -206,14 +206,14 @@ class ServoFit(Result):
         name = Column("axis", value="name", left=True)
         said = (name, Column("", value="note", text=True))
         return [
-            Table("Left of the following error, rms, where the model was not fitted", explained, self.axes),
-            Table("What follows: servo lag behind a dead time, 95 % intervals", (name, *_columns(_LAG)), fitted),
+            Table("Residual following error, rms, in data to which the model was not fitted", explained, self.axes),
+            Table("Servo lag with dead time, 95 % intervals", (name, *_columns(_LAG)), fitted),
             *([Table("The drive: range of three fits", (name, *_columns(_DRIVE)), drives)] if drives else []),
-            *([Table("What does not follow", said, notes)] if notes else []),
+            *([Table("Undetermined", said, notes)] if notes else []),
         ]
 
     def plots(self) -> Mapping[str, Plot]:
-        """A picture of the axes."""
+        """Picture of the axes."""
         return self._drawn_beside()
 
 

@@ -1,1 +1,1 @@
-"""Calibrates the cycle-time model of a machine from logs of its runs."""
+"""Calibrates the cycle-time model of a machine from run logs."""

@@ -1,4 +1,4 @@
-"""Calibrates the cycle-time model of a machine from programs and the logs of their runs."""
+"""Calibrates the cycle-time model of a machine from programs and their run logs."""
 
 from __future__ import annotations
 
@@ -52,17 +52,17 @@ from shapegcode.timing.calibration.result import (
 from shapegcode.timing.calibration.runs_file import RunsFile, load_runs
 from shapegcode.timing.interval import time_interval
 
-_Hold = tuple[float, float, str]  # begin and length in s, and why
+_Hold = tuple[float, float, str]  # begin and length in s, and reason
 
 _MAX_FOLDS = 4
-_BETTER = 0.97  # a family further down the list must be better by so much to be taken
-_MAX_HOLDS = 6  # of one run that may be true
-_CALLS = 2500  # of the misfit that one fit takes, about; for the bar
+_BETTER = 0.97  # a later family must have at most this ratio of the error to be chosen
+_MAX_HOLDS = 6  # plausible number of holds in one run
+_CALLS = 2500  # approximate misfit evaluations per fit, for the progress bar
 
 
 @dataclass(frozen=True, eq=False)
 class _Calibration:
-    """Motion and function times, calibrated from some of the runs."""
+    """Motion and function times calibrated from a subset of the runs."""
 
     motion: MotionFit
     functions: FunctionFit
@@ -85,32 +85,32 @@ def calibrate_cycle_time(
     families: Sequence[str] | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> CycleTimeCalibration:
-    """Calibrate the cycle-time model of a machine from what it did.
+    """Calibrate the cycle-time model of a machine from run logs.
 
-    Logs are laid beside their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted
-    to what the parts between functions took, and the one is taken that predicts best what programs (or runs, where
-    there is one program) took that it was not fitted to. Tool changes, M codes, spindle and unknown travels follow by
+    Logs are aligned with their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted
+    to the durations between functions, and the one that best predicts programs (or runs, if there is only one program)
+    to which it was not fitted is chosen. Times of tool changes, M codes, spindle and unknown travels follow by
     least squares.
 
     Args:
         runs: pairs of program and log, or the file that lists them (RUNS.toml).
-        machine: whose file gets the numbers, and that says how programs are read.
-        families: names of the kinds of look-ahead that are tried; None: all.
-        on_progress: called with the share of the work done, 0 to 1.
+        machine: machine that gets the parameters and determines how programs are read.
+        families: names of the kinds of look-ahead to try; None: all.
+        on_progress: called with the completed fraction, 0 to 1.
 
     Returns:
-        The numbers with 95 % intervals, the machine with them, and each run beside what was predicted.
+        Parameters with 95 % intervals, the calibrated machine, and each run with its prediction.
 
     Raises:
-        ArgumentError: no run is to be fitted, or a family that does not exist.
-        RecordError: a log and its program do not belong together, or a log cannot be used; with the line.
+        ArgumentError: no run to fit, or an unknown family.
+        RecordError: a log does not match its program, or cannot be used; with the line.
         ProgramError, RunsFileError: bad input.
         OSError: a file cannot be read.
     """
     file = runs if isinstance(runs, RunsFile) else load_runs(runs)
     tried = _families(families)
     observed = _observed(file, machine)
-    # The rate of the machine is what the fitted runs show; of the others it gives the override.
+    # The rapid rate is from the fitted runs; for the others it gives the override.
     fitted, others_seen = ([run for run in observed if run.entry.use == use] for use in ("fit", "test"))
     rate, fitted = rapid_rate(fitted)
     observed = [*fitted, *(with_override(run, rate) for run in others_seen)]
@@ -148,7 +148,7 @@ def calibrate_cycle_time(
 
 
 class _Meter:
-    """How far the work is: by fits that have started, and by steps within one."""
+    """Progress by fits started, and by steps within one."""
 
     def __init__(self, on_progress: Callable[[float], None] | None, fits: int) -> None:
         self._on_progress, self._fits, self._done, self._steps = on_progress, fits, 0, 0
@@ -185,9 +185,9 @@ def _observed(file: RunsFile, machine: Machine) -> list[ObservedRun]:
 
 
 def _folds(runs: Sequence[ObservedRun]) -> list[list[ObservedRun]]:
-    """Runs that are left out together: those of a program; with one program, which shows less, every other run.
+    """Cross-validation groups: the runs of a program; with a single program (weaker) every other run.
 
-    None where there is but one such group.
+    None if there is only one group.
     """
     by_program: dict[int, list[ObservedRun]] = defaultdict(list)
     for run in runs:
@@ -230,7 +230,7 @@ def _left_out(
     machine: Machine,
     rate: float,
 ) -> dict[int, _Calibration]:
-    """For each run what the others teach."""
+    """For each run, a calibration with the others."""
     found: dict[int, _Calibration] = {}
     for fold in folds:
         rest = [run for run in runs if run not in fold]
@@ -242,14 +242,14 @@ def _left_out(
 def _warnings(row: CalibrationRun) -> Iterator[str]:
     judged = row.judged_percent
     if judged is not None and abs(judged) > TOLERANCE_PERCENT:
-        yield f"{row.name}: {judged:+.1f} % from what it took, more than {TOLERANCE_PERCENT:g} %"
+        yield f"{row.name}: {judged:+.1f} % from the measured time, more than {TOLERANCE_PERCENT:g} %"
     if len(row.holds) > _MAX_HOLDS:
         yield (
-            f"{row.name}: stood {len(row.holds)} times where the program does not ask for it, first at "
+            f"{row.name}: stopped {len(row.holds)} times without a programmed stop, first at "
             f"{row.holds[0]}: the program may have been changed after the run"
         )
     else:
-        yield from (f"{row.name}: held at {hold}" for hold in row.holds)
+        yield from (f"{row.name}: hold at {hold}" for hold in row.holds)
 
 
 def _row(run: ObservedRun, learned: _Calibration, other: _Calibration | None) -> CalibrationRun:
@@ -278,7 +278,7 @@ def _row(run: ObservedRun, learned: _Calibration, other: _Calibration | None) ->
 def _scatters(
     rows: Sequence[CalibrationRun], observed: Sequence[ObservedRun], learned: _Calibration
 ) -> tuple[float, float]:
-    """What the time between two cuts scatters by, s, and relatively what repeated runs of a program do."""
+    """Scatter of the time between two cuts, s, and relative scatter of repeated runs of a program."""
     ratios: dict[str, list[float]] = defaultdict(list)
     late: dict[str, list[float]] = defaultdict(list)
     for row, run in zip(rows, observed, strict=True):
@@ -286,22 +286,22 @@ def _scatters(
             ratios[row.program].append(1.0 / (1.0 + row.error_percent / 100.0))
             share = next(each for each in row.kinds if each.name == "between cuts")
             late[row.program].append((share.measured_s - share.predicted_s) / math.sqrt(max(1, len(run.cut_sections))))
-    # The same codes come again and again: where they err together, whole programs show it.
+    # Errors of repeated codes are correlated and show in whole programs.
     together = float(np.sqrt(np.mean([np.mean(each) ** 2 for each in late.values()]))) if late else 0.0
     return max(learned.functions.scatter_s, together), open_times.run_scatter(ratios)
 
 
 def _with_interval(row: CalibrationRun, run: ObservedRun, machine: Machine) -> CalibrationRun:
-    """A run with the interval that `time` gives its program on the calibrated machine at the overrides of the run."""
+    """Add the interval that `time` gives for the program on the calibrated machine at the run's overrides."""
     interval = time_interval(run.timed.program, machine, row.feed_override, row.rapid_override)
     half = interval.half_width_s * row.predicted_s / interval.total_s if interval and interval.total_s > 0.0 else 0.0
     return replace(row, low_s=row.predicted_s - half, high_s=row.predicted_s + half)
 
 
-# --- what a model says of a run: when each line begins, where it was held ---------------------------------------------
+# --- start of each line in a model, and holds ---------------------------------------------
 
 _MIN_HOLD_S = 2.0
-_READING_S = 0.35  # what two readings may hide
+_READING_S = 0.35  # time that two readings may hide
 
 
 def _predicted_starts(run: ObservedRun, model: _core.FanucModel) -> FloatArray:
@@ -319,7 +319,7 @@ def _predicted_starts(run: ObservedRun, model: _core.FanucModel) -> FloatArray:
 
 
 def _holds_of(run: ObservedRun, starts: FloatArray) -> list[_Hold]:
-    """Times at which a run stood still without a programmed stop."""
+    """Find stops in a run that are not programmed."""
     found = [(begin, length, "hold") for begin, length in run.log.holds]
     found = [_not_covered(run, starts, hold) for hold in (*found, *_held_rapids(run))]
     found = [hold for hold in found if hold[1] > _READING_S]
@@ -328,10 +328,10 @@ def _holds_of(run: ObservedRun, starts: FloatArray) -> list[_Hold]:
     late = np.diff(time_s) - expected - _READING_S
     for index in np.flatnonzero(late > np.maximum(_MIN_HOLD_S, 0.5 * expected)):
         if run.timed.function[line[index] : line[index + 1]].any():
-            continue  # what lies between cuts scatters
+            continue  # times between cuts scatter
         begin, end = float(time_s[index]), float(time_s[index + 1])
         if not any(begin < other + length and other < end for other, length, _ in found):
-            found.append((begin, float(late[index]), f"stood at line {line[index]}"))
+            found.append((begin, float(late[index]), f"stopped at line {line[index]}"))
     return sorted(found)
 
 
@@ -353,12 +353,12 @@ def _held_rapids(run: ObservedRun) -> list[_Hold]:
         if found and begin - (found[-1][0] + found[-1][1]) < 0.5:
             found[-1] = (found[-1][0], float(end) - found[-1][0], found[-1][2])
         else:
-            found.append((float(begin), float(end - begin), "rapids held by their override"))
+            found.append((float(begin), float(end - begin), "rapids stopped by their override"))
     return [hold for hold in found if hold[1] > 1.0]
 
 
 def _not_covered(run: ObservedRun, starts: FloatArray, hold: _Hold) -> _Hold:
-    """What a hold added to the run: a spindle that starts, or coolant, may pass within it."""
+    """Part of a hold that lengthened the run: a spindle start or coolant may elapse within it."""
     begin, length, why = hold
     plain = np.flatnonzero(~run.timed.function[run.line] & np.isfinite(run.timed.feed_mm_per_s[run.line]))
     before = plain[run.time_s[plain] <= begin]
@@ -373,7 +373,7 @@ def _not_covered(run: ObservedRun, starts: FloatArray, hold: _Hold) -> _Hold:
 def _shares(
     run: ObservedRun, starts: FloatArray, holds: list[_Hold]
 ) -> tuple[tuple[CycleTimePart, ...], tuple[CycleTimePart, ...]]:
-    """A run by tool, and by kind of motion."""
+    """Split a run by tool, and by kind of motion."""
     end_s = run.duration_s
     if end_s is None:
         return (), ()
@@ -408,13 +408,13 @@ def _held(holds: list[_Hold], begin_s: float, end_s: float) -> float:
 
 # --- the numbers of the machine file ----------------------------------------------------------------------------------
 
-_USUAL = 0.75  # of the time
-_MAX_WAY_S = 10.0  # of times.unknown_move_s
-_KNOWN = 4.0  # an interval that reaches so far from its value to both sides determines nothing
+_USUAL = 0.75  # fraction of the time
+_MAX_WAY_S = 10.0  # limit of times.unknown_move_s
+_KNOWN = 4.0  # an interval this wide on both sides determines nothing
 
 
 def _feed_override(run: ObservedRun) -> float:
-    """At which most of a run was cut."""
+    """Feed override of most of a run's cutting."""
     return longest((each.feed_override, each.lines[1] - each.lines[0]) for each in run.cut_sections)[0]
 
 
@@ -424,7 +424,7 @@ def learned_machine(
     rivals: Sequence[tuple[_Calibration, float]],
     scatters: tuple[float, float],
 ) -> tuple[Machine, dict[str, str], list[CalibratedParameter], list[str]]:
-    """The machine with the calibrated parameters, and what the logs leave open of them."""
+    """The machine with the calibrated parameters, and the parameters that the logs do not determine."""
     motion, functions, machine = learned.motion, learned.functions, learned.machine
     source = f"logs of {len(runs)} runs"
     values = motion.file_values() | _function_values(functions, runs)
@@ -458,7 +458,7 @@ def learned_machine(
         rows += open_times.open_row(f"kind of look-ahead ({other.motion.family.name})", values, its_values, weight)
     values["times.open"] = rows
     for key in values:
-        if key != "times.open":  # beside each value of its rows, once is enough: times.scatter says it
+        if key != "times.open":  # not at each value of its rows, as times.scatter states it
             remarks.setdefault(key, f"measured ({source})")
     fitted = machine.with_values(values, source=f"{machine.name} with calibrated parameters")
     return fitted.with_remarks(machine.all_remarks() | remarks), remarks, numbers, undetermined
@@ -487,12 +487,12 @@ def _motion_numbers(
 def _number(
     key: str, meaning: str, values: tuple[float, float, float], unit: str, told: bool, had: float | None = None
 ) -> CalibratedParameter:
-    """A number and its interval, to what a person reads."""
+    """A parameter and its interval, rounded for display."""
     value, low, high = (float(f"{each:.4g}") for each in values)
     return CalibratedParameter(key, meaning, value, low, high, unit, told, had)
 
 
-# Key, meaning and unit of what takes time beside the motion, by its name in the fit; else it is an M code.
+# Key, meaning and unit of times in addition to motion, by name in the fit; other names are M codes.
 _FUNCTIONS = {
     "start": ("times.program_start_s", "from the start key to the first block", "s"),
     "tool change": ("times.tool_change_s", "tool change", "s"),
@@ -511,7 +511,7 @@ def _meaning(name: str) -> tuple[str, str, str]:
 
 
 def _usual(overrides: Iterable[float], runs: Sequence[ObservedRun]) -> float:
-    """The override at which most of the time was run; 1 where the operator had it now so, now otherwise."""
+    """Override of most of the run time; 1 if the operator changed it often."""
     value, ratio = longest(zip(overrides, (run.duration_s or 0.0 for run in runs), strict=True))
     return value if ratio >= _USUAL else 1.0
 

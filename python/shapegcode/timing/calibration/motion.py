@@ -1,4 +1,4 @@
-"""Fits what cuts and rapids take (kinds of look-ahead, misfit to logs, search, intervals) and what lies between."""
+"""Fits times of cuts and rapids (kinds of look-ahead, misfit to logs, search, intervals) and times in between."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from shapegcode.timing.calibration.observed import IntArray, ObservedRun, seen_a
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a family."""
+    """One parameter of a family."""
 
     name: str  # short, within the family
-    key: str  # of the machine file; "{axis}" stands for the axes of `axes`
-    unit: str  # of the value in the machine file
-    start: float  # where a fit begins, in mm, s and rad
+    key: str  # key of the machine file; "{axis}": each axis of `axes`
+    unit: str  # unit of the value in the machine file
+    start: float  # start of a fit, in mm, s and rad
     low: float
     high: float
     meaning: str
-    scale: float = 1.0  # value in the machine file over that of the fit
-    axes: str = ""  # that it holds for
+    scale: float = 1.0  # ratio of the machine file's value to the fit's
+    axes: str = ""  # axes of the parameter
 
 
 @dataclass(frozen=True)
 class LookAhead:
     """A rule for corners with its limits."""
 
-    name: str  # as it is shown
+    name: str  # displayed name
     meaning: str
-    parameters: tuple[Parameter, ...]  # what is fitted
+    parameters: tuple[Parameter, ...]  # fitted parameters
     rule: str = "speed_difference"  # `controller.corner_rule`
     law: str = "jerk_limited"  # `controller.law`
     motion: str = "look_ahead"  # `controller.motion`
@@ -61,7 +61,7 @@ _JERK_TIME = Parameter(
     "jerk_time", "controller.bell_time_s", "s", 0.05, 0.001, 0.5, "time in which the acceleration is built up")
 _RAPID_TIME = Parameter(
     "rapid_time", "controller.rapid_time_constant_s", "s", 0.15, 0.01, 1.0, "time in which a rapid reaches its rate")
-_ARRIVAL = Parameter("arrival", "controller.in_position_s", "s", 0.04, 1e-4, 1.0, "wait behind a rapid")
+_ARRIVAL = Parameter("arrival", "controller.in_position_s", "s", 0.04, 1e-4, 1.0, "wait after a rapid")
 _DEVIATION = Parameter(
     "deviation", "controller.junction_deviation_mm", "mm", 0.005, 1e-5, 0.5, "deviation allowed at a corner")
 _STOP_ANGLE = Parameter(
@@ -81,11 +81,11 @@ FAMILIES = (
         (*_SPEED, *_BOTH),
     ),
     LookAhead(
-        "speed difference, block time", "the same, and blocks are read no faster than so",
+        "speed difference, block time", "the same, with a shortest time to read a block",
         (*_SPEED, _BLOCK_TIME, *_BOTH),
     ),
     LookAhead(
-        "speed difference, constant time", "the same, with ramps of a constant time",
+        "speed difference, constant time", "the same, with ramps of constant duration",
         (_ACROSS, _ALONG_Z, _TIME_CONSTANT, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS, *_BOTH), law="constant_time",
     ),
     LookAhead(
@@ -101,7 +101,7 @@ FAMILIES = (
         (_TIME_CONSTANT, *_BOTH), law="constant_time", motion="after_interpolation",
     ),
 )  # fmt: skip
-"""What is tried."""
+"""Families to try."""
 
 _OFF = 1e9
 _NO_LIMIT = 1e6  # mm/s²
@@ -109,14 +109,14 @@ _NO_LIMIT = 1e6  # mm/s²
 
 @dataclass(frozen=True)
 class MotionFit:
-    """A family with its numbers."""
+    """A family with fitted parameters."""
 
     family: LookAhead
-    values: dict[str, float]  # of its parameters by name, in mm, s and rad
+    values: dict[str, float]  # parameters by name, in mm, s and rad
     rapid_mm_per_s: float  # rapid rate of every axis; NaN: the machine's
 
     def model(self, machine: Machine) -> _core.FanucModel:
-        """The controller that the family and its numbers describe."""
+        """Controller model of the family with these parameters."""
         family, values = self.family, self.values
         model = fanuc_model(machine)
         limits = _core.MotionLimits()
@@ -148,7 +148,7 @@ class MotionFit:
         return model
 
     def file_values(self) -> dict[str, object]:
-        """The same as values of the machine file, by dotted key."""
+        """Parameters as values of the machine file, by dotted key."""
         family = self.family
         corner = dict.fromkeys("xyz", 0.0)
         found: dict[str, object] = {
@@ -184,30 +184,30 @@ class MotionFit:
         return found
 
 
-# --- how far a model is off -------------------------------------------------------------------------------------------
+# --- misfit of a model -------------------------------------------------------------------------------------------
 #
-# A control reports its line a few times a second: the time at which one is first seen is late by up to one reading.
-# What a part of the log takes is therefore known to a reading or two, whatever its length; the error of the model
-# grows with it.
+# A control reports its line a few times per second, so a line is first seen up to one reading late.
+# The duration of a part is therefore known to one or two readings, whatever its length; the model's error
+# grows with the length.
 
-#: (length of the windows in s, error beyond which it counts no more in s, weight).
+#: (length of the windows in s, error in s beyond which its weight is constant, weight).
 _SCALES = ((1.0, 0.25, 1.0), (6.0, 0.5, 0.7), (30.0, 1.0, 0.5))
-_SECTION = (2.0, 0.5)  # of whole sections: error per half minute in s beyond which it counts no more, weight
+_SECTION = (2.0, 0.5)  # whole sections: limit of the error in s per half minute, weight
 _MIN_READINGS = 10
 
 
 @dataclass(frozen=True, eq=False)
 class SeenSection:
-    """One section of a run: what was seen of it."""
+    """Readings of one section of a run."""
 
     run: ObservedRun
     feed_override: float
-    time_s: FloatArray  # (n,) when its lines were seen
-    line: IntArray  # (n,) which
+    time_s: FloatArray  # (n,) times of the readings
+    line: IntArray  # (n,) reported lines
 
     @cached_property
     def windows(self) -> tuple[tuple[IntArray, IntArray], ...]:
-        """For each length of a window: readings at which one begins, and those at which it ends."""
+        """For each length of a window: readings at its starts and at its ends."""
         found = []
         for length_s, _, _ in _SCALES:
             upto = np.searchsorted(self.time_s, self.time_s + length_s)
@@ -217,7 +217,7 @@ class SeenSection:
 
 
 def sections_of(runs: Sequence[ObservedRun]) -> list[SeenSection]:
-    """The sections of runs of which enough was seen."""
+    """Sections of runs with enough readings."""
     found = []
     for run in runs:
         for cut_section in run.cut_sections:
@@ -228,7 +228,7 @@ def sections_of(runs: Sequence[ObservedRun]) -> list[SeenSection]:
 
 
 def starts_of(model: _core.FanucModel) -> Callable[[ObservedRun, float], FloatArray]:
-    """When each line begins on a model, by run and feed override: (line_count + 2,), the last is the program's end."""
+    """Start of each line in a model, by run and feed override: (line_count + 2,), the last is the program's end."""
     found: dict[tuple[int, float, float], FloatArray] = {}
 
     def starts(run: ObservedRun, feed_override: float) -> FloatArray:
@@ -236,7 +236,7 @@ def starts_of(model: _core.FanucModel) -> Callable[[ObservedRun, float], FloatAr
         if key not in found:
             model.feed_override, model.rapid_override = feed_override, run.rapid_override
             own = run.timed.starts(model)
-            # A line without any move begins with the next one.
+            # A line without a move starts with the next one.
             known = np.where(np.isnan(own), len(own), np.arange(len(own)))
             found[key] = own[np.minimum.accumulate(known[::-1])[::-1]]
         return found[key]
@@ -245,7 +245,7 @@ def starts_of(model: _core.FanucModel) -> Callable[[ObservedRun, float], FloatAr
 
 
 def section_residuals(sections: Sequence[SeenSection], model: _core.FanucModel) -> list[FloatArray]:
-    """What was seen minus what the model says, in s, for each reading of each section."""
+    """Measured minus modelled time, s, for each reading of each section."""
     starts = starts_of(model)
     return [section.time_s - starts(section.run, section.feed_override)[section.line] for section in sections]
 
@@ -253,7 +253,7 @@ def section_residuals(sections: Sequence[SeenSection], model: _core.FanucModel) 
 def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
     """Error of a model in the times of sections: every program has the same weight, outliers (holds) a limited
     influence."""
-    # Squares and how many, by program
+    # Sum of squares and count, by program
     found: dict[int, FloatArray] = defaultdict(lambda: np.zeros((2, len(_SCALES) + 1)))
     for section, residual in zip(sections, section_residuals(sections, model), strict=True):
         sums, counts = found[id(section.run.timed)]
@@ -273,15 +273,15 @@ def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
 
 # --- the search, and the intervals ------------------------------------------------------------------------------------
 
-_STEP = 0.3  # of the first simplex, in the logarithm
+_STEP = 0.3  # step of the first simplex, in the logarithm
 _WINDOW_S = 6.0
 _PLACES, _SEARCHED, _VALLEYS, _STEPS = 400, 1.0, 5, 500
-# Where the runs do not tell a number, it is that of a usual machine: so far from it costs as much as so much misfit.
+# Prior of parameters that runs do not determine, around a usual machine: cost of a deviation in misfit.
 _TYPICAL_SPREAD = 1.0  # in the logarithm
-_SEEN_SPREAD = 0.15  # of a number that the logs show
+_SEEN_SPREAD = 0.15  # of a parameter that logs show
 _PRIOR = 0.01
 _MIN_STEP = 0.02  # of the numeric derivatives, in the logarithm
-_MIN_NOISE_S = 0.05  # of a window: what two readings scatter by at least
+_MIN_NOISE_S = 0.05  # least scatter of two readings in a window
 
 
 def fit_motion(
@@ -293,7 +293,7 @@ def fit_motion(
     thorough: bool = True,
     on_step: Callable[[], None] | None = None,
 ) -> MotionFit:
-    """Least misfit over the numbers of a family: Nelder-Mead, restarted from where it ended."""
+    """Minimise the misfit over the parameters of a family: Nelder-Mead, restarted at its end."""
     from scipy.optimize import minimize
 
     sections = sections_of(runs)
@@ -328,7 +328,7 @@ def fit_motion(
         )  # fmt: skip
         return float(found.fun), found.x
 
-    # The misfit has several valleys: the search begins in the lowest of many places, and again from where it ended.
+    # The misfit has several valleys: start at the best of many points, and restart at the end.
     generator = np.random.default_rng(1)
     points, valleys, restarts = (_PLACES, _VALLEYS, 2) if thorough else (_PLACES // 2, _VALLEYS // 2, 1)
     spread = generator.normal(0.0, _SEARCHED, (points, len(parameters))) * (reach / _TYPICAL_SPREAD)
@@ -345,10 +345,10 @@ def fit_motion(
 def parameter_covariance(
     fit: MotionFit, runs: Sequence[ObservedRun], machine: Machine
 ) -> tuple[FloatArray, FloatArray]:
-    """(n, n) Covariance of the logarithms of a fit's parameters, and (n,) variances by the runs alone.
+    """Covariance (n, n) of the logarithms of a fit's parameters, and variances (n,) by the runs alone.
 
-    From the derivatives of what windows of some seconds take; the scatter is that of the sections, each of which
-    counts as one (a sandwich of clusters). In the covariance what no run shows keeps the spread of a usual machine.
+    From derivatives of the durations of windows of some seconds; the scatter is that of the sections, each of which
+    counts as one (cluster sandwich estimator). In the covariance undetermined parameters keep their prior spread.
     """
     from scipy.stats import t as student
 
@@ -377,8 +377,8 @@ def parameter_covariance(
     white = np.concatenate(centre) if centre else np.zeros(1)
     noise = max(float(np.mean(np.minimum(white**2, 1.0))), _MIN_NOISE_S**2)
     reach = _typical_spread(parameters, _seen(runs))
-    # Few clusters understate the scatter: the usual correction, and Student's t of their number. They see no more
-    # directions than there are: the noise of the windows says what is at least open.
+    # Few clusters understate the scatter: apply the usual correction, and Student's t. They determine no more
+    # directions than their number: the noise of the windows is a lower bound of the variance.
     clusters = max(1, len(centre) - 1)
     scatter *= len(centre) / clusters * (float(student.ppf(0.975, clusters)) / 1.96) ** 2
 
@@ -391,18 +391,18 @@ def parameter_covariance(
 
 
 def _seen(runs: Sequence[ObservedRun]) -> dict[str, float]:
-    """Parameters that the logs show, by name."""
+    """Parameters that the logs show directly, by name."""
     across = seen_arc_acceleration(runs)
     return {"arc_acceleration": across} if math.isfinite(across) else {}
 
 
 def _typical_spread(parameters: Sequence[Parameter], seen: Container[str]) -> FloatArray:
-    """(n,) Standard deviation of the logarithm of each parameter over usual machines, or by what the logs show."""
+    """Standard deviation (n,) of each parameter's logarithm: of usual machines, or of values shown in logs."""
     return np.array([_SEEN_SPREAD if parameter.name in seen else _TYPICAL_SPREAD for parameter in parameters])
 
 
 def _windows(section: SeenSection) -> IntArray:
-    """Readings that are some seconds apart."""
+    """Readings some seconds apart."""
     points = [0]
     for index, time_s in enumerate(section.time_s):
         if time_s - section.time_s[points[-1]] >= _WINDOW_S:
@@ -410,20 +410,20 @@ def _windows(section: SeenSection) -> IntArray:
     return np.array(points if len(points) > 1 or len(section.time_s) < 2 else [0, len(section.time_s) - 1])
 
 
-# --- what takes time beside the motion --------------------------------------------------------------------------------
+# --- times in addition to the motion ----------------------------------------------------------------------------------
 #
-# What lies between two cuts is a sum of such times and of motion. The logs tell the sums; how they divide among codes
-# that always come together is a choice: the one with the smallest numbers is taken.
+# The time between two cuts is a sum of such times and motion. Logs determine the sums; their division among codes
+# that always occur together is a choice: the one with the smallest values is used.
 
 _READING_S = 0.1  # scatter of the time between two readings
-_OUTLIER = 3.0  # of it: what is further off counts less
-_RIDGE = 0.02  # pull of every number to 0, against its scatter of a reading
-_USUAL_S, _USUAL_KRPM = 2.0, 5.0  # standard deviation of a time, and of where a spindle's begins, over usual machines
+_OUTLIER = 3.0  # limit in units of it: larger deviations have less weight
+_RIDGE = 0.02  # weight of the ridge towards 0, relative to a reading's scatter
+_USUAL_S, _USUAL_KRPM = 2.0, 5.0  # standard deviation over usual machines: of a time, and of a spindle's first speed
 _MAX_S = 60.0
-_UNSEEN = 1e-3  # sum of derivatives, in scatters of a reading
+_UNSEEN = 1e-3  # least sum of derivatives, relative to a reading's scatter
 _TOOL_CHANGE = 6
 _SPEEDS_KRPM = (0.0, 60.0)
-_TABLE_KRPM = 30.0  # a spindle's table is written up to so far above where its time begins
+_TABLE_KRPM = 30.0  # range of a spindle's table above its first speed
 
 
 @dataclass(frozen=True)
@@ -433,11 +433,11 @@ class FunctionFit:
     # by name: "start", "tool change", "M8", "move xy", "move z" in s; "spindle start from" and "spindle stop from" in
     # 1000/min, "spindle start" and "spindle stop" in s per 1000/min above
     values: dict[str, float]
-    low: dict[str, float]  # of the 95 % intervals by name
+    low: dict[str, float]  # lower ends of the 95 % intervals by name
     high: dict[str, float]
     covariance: FloatArray  # (n, n) in the order of the values
-    last_tool_in_spindle: bool  # whether the tool that a program ends with is in the spindle when it starts anew
-    scatter_s: float  # root mean square of what the time between two cuts was otherwise
+    last_tool_in_spindle: bool  # at a restart the last tool of the program is in the spindle
+    scatter_s: float  # RMS deviation of the time between two cuts
 
 
 @dataclass(frozen=True, eq=False)
@@ -453,7 +453,7 @@ class _Span:
 def whole_model(
     machine: Machine, motion: MotionFit, values: dict[str, float], last_tool_in_spindle: bool
 ) -> _core.FanucModel:
-    """The controller with motion and functions."""
+    """Controller model with motion and functions."""
     model = motion.model(machine)
     model.program_start_s = values.get("start", 0.0)
     model.tool_change_s = values.get("tool change", 0.0)
@@ -468,12 +468,12 @@ def whole_model(
 
 
 def m_codes(values: dict[str, float]) -> dict[int, float]:
-    """Times of M codes."""
+    """Times of M codes by number."""
     return {int(name[1:]): value for name, value in values.items() if name[0] == "M" and name[1:].isdigit()}
 
 
 def spindle_rows(values: dict[str, float], name: str) -> list[tuple[float, float]]:
-    """Table of a spindle's time: zero up to a speed, in proportion above."""
+    """Table of a spindle's time: zero up to a speed, proportional above."""
     slope, begin = values.get(name, 0.0), values.get(f"{name} from", 0.0)
     if slope <= 1e-6:
         return []
@@ -482,7 +482,7 @@ def spindle_rows(values: dict[str, float], name: str) -> list[tuple[float, float
 
 
 def fit_functions(runs: Sequence[ObservedRun], motion: MotionFit, machine: Machine) -> FunctionFit:
-    """Least squares over the times between cuts, robust against what an operator does there."""
+    """Fit the times between cuts by least squares, robust against operator actions."""
     spans = [span for run in runs for span in _spans(run)]
     names = _names(runs)
     kept = (False, True) if any(map(_returns, runs)) else (False,)
@@ -491,7 +491,7 @@ def fit_functions(runs: Sequence[ObservedRun], motion: MotionFit, machine: Machi
 
 
 def _returns(run: ObservedRun) -> bool:
-    """Whether a program ends with the tool that it begins with: only then it matters what is in the spindle."""
+    """Whether a program ends with its first tool: only then the tool in the spindle matters."""
     used = [tool for tool in run.timed.tools.tolist() if tool >= 0]
     return bool(used) and used[0] == used[-1]
 
@@ -508,7 +508,7 @@ def _names(runs: Sequence[ObservedRun]) -> list[str]:
 
 
 def _spans(run: ObservedRun) -> list[_Span]:
-    """Readings next to each other with a function between, and all between two cuts; start and end of the run."""
+    """Spans: adjacent readings with a function between, all between two cuts, and start and end of the run."""
     line, time_s, function = run.line, run.time_s, run.timed.function
     spans = []
 
@@ -521,7 +521,7 @@ def _spans(run: ObservedRun) -> list[_Span]:
             spans.append(_Span(run, begin, end, until - since))
 
     cuts = np.flatnonzero(np.isfinite(run.timed.feed_mm_per_s[line]))
-    # How the time to the first cut divides differs from run to run: a control reports its first lines late.
+    # Only the total time to the first cut is used, as a control reports its first lines late.
     for index in range(int(cuts[0]) if len(cuts) else -1, len(line)):
         add(index, index + 1)
     if len(cuts):
@@ -558,15 +558,15 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     values = dict(zip(names, found.x.tolist(), strict=True))
     error = errors(found.x)[: len(spans)] * _READING_S
     middle = float(np.sqrt(np.mean(np.minimum(error**2, 1.0)))) if len(error) else 0.0
-    # Each span is counted about twice: as a whole, and in its readings.
+    # Each span counts about twice: as a whole, and in its readings.
     slope = np.asarray(found.jac)
     spread = np.linalg.pinv(slope.T @ slope) * 2.0 * max(1.0, (middle / _READING_S) ** 2)
-    # The same with what is usual in place of the ridge, which is a choice and no knowledge.
+    # The same with the prior of usual machines in place of the ridge, which is arbitrary.
     usual = np.array([_USUAL_KRPM if name.endswith("from") else _USUAL_S for name in names])
     seen = slope[: len(spans)]
     told = seen.T @ seen / (2.0 * max(1.0, (middle / _READING_S) ** 2))
     covariance = np.linalg.inv(told + np.diag(usual**-2.0))
-    # A parameter that changes nothing is not determined.
+    # A parameter without effect is not determined.
     unseen = np.abs(seen).sum(axis=0) < _UNSEEN
     reach = np.where(unseen, _MAX_S, 2.0 * np.sqrt(np.maximum(np.diag(spread), 0.0)))
     low = dict(zip(names, np.maximum(found.x - reach, 0.0).tolist(), strict=True))

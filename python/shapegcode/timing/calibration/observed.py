@@ -1,4 +1,4 @@
-"""A program with the data for its cycle time, aligned with a log: start of each line, overrides."""
+"""A program with its cycle-time data, aligned with a log: start of each line, overrides."""
 
 from __future__ import annotations
 
@@ -27,37 +27,37 @@ IntArray = npt.NDArray[np.int64]
 
 _SEQUENCE = re.compile(r"[ /]*[Nn](\d{1,7})")
 _MIN_ARC_MM = 0.5
-_GENTLE_MM_PER_S2 = 100.0  # across the path: no machining centre slows down for it
+_GENTLE_MM_PER_S2 = 100.0  # centripetal acceleration for which no machining centre slows down
 
 
 @dataclass(frozen=True, eq=False)
 class TimedProgram:
-    """A program as its cycle time needs it."""
+    """Program data for the cycle time."""
 
     program: Program
-    line_count: int  # of the text that the control runs
-    # (line_count + 2,) programmed feed of a line's last cut, by its number; NaN where it does not cut
+    line_count: int  # of the expanded program
+    # (line_count + 2,) programmed feed of a line's last cut, by line number; NaN without a cut
     feed_mm_per_s: FloatArray
-    # (line_count + 2,) radius of a line's arc, where it turns by more than a sixth of a circle and is long enough to
-    # be run steadily; infinity elsewhere
+    # (line_count + 2,) radius of a line's arc, if it turns by more than a sixth of a circle and is long enough to
+    # reach a steady speed; else infinity
     arc_radius_mm: FloatArray
-    free: npt.NDArray[np.bool_]  # (line_count + 2,) whether no machine has to go slower there for the sake of an arc
-    rapid: npt.NDArray[np.bool_]  # (line_count + 2,) whether it moves in rapid
-    function: npt.NDArray[np.bool_]  # (line_count + 2,) whether it holds M, S or T words, or an unknown travel
+    free: npt.NDArray[np.bool_]  # (line_count + 2,) no arc slows down any machine there
+    rapid: npt.NDArray[np.bool_]  # (line_count + 2,) the line moves in rapid
+    function: npt.NDArray[np.bool_]  # (line_count + 2,) the line has M, S or T words, or an unknown travel
     sections: tuple[tuple[int, int], ...]  # (first line, last line) of the parts without functions
 
     def starts(self, model: _core.FanucModel) -> FloatArray:
-        """When the lines begin on a model."""
+        """Start times of the lines in a model."""
         timed = _core.time_program(self.program.core, model, True)
         found = np.full(self.line_count + 2, np.nan)
-        # A line may hold several moves: its first one counts.
+        # A line may have several moves: the first one counts.
         found[timed.blocks["line"][::-1]] = timed.blocks["start_s"][::-1]
         found[-1] = timed.total_s
         return found
 
     @cached_property
     def text_lines(self) -> list[str]:
-        """The lines of the text that the control runs."""
+        """Lines of the expanded program."""
         return self.program.core.text.decode("latin-1").splitlines()
 
     @cached_property
@@ -71,7 +71,7 @@ class TimedProgram:
 
     @cached_property
     def tools(self) -> IntArray:
-        """(line_count + 2,) Tool in use at a line, -1: not known."""
+        """Tool in use at each line, (line_count + 2,), -1: unknown."""
         tool = np.full(self.line_count + 2, -1, dtype=np.int64)
         selected, functions = -1, self.program.core.functions
         for kind, index, line in self.program.core.steps:
@@ -84,7 +84,7 @@ class TimedProgram:
 
 
 def timed_program(program: Program) -> TimedProgram:
-    """Which lines of a program cut, move in rapid, or hold machine functions."""
+    """Find the lines of a program with cuts, rapids or machine functions."""
     core = program.core
     count = core.line_count
     feed, radius = np.full(count + 2, np.nan), np.full(count + 2, np.inf)
@@ -116,15 +116,15 @@ def _radius_mm(segment: _core.Segment) -> float:
     return float(np.linalg.norm(np.asarray(segment.start_mm) - np.asarray(segment.centre_mm)))
 
 
-# --- what the feeds of a log tell: their unit, the overrides ----------------------------------------------------------
+# --- unit and overrides from the feeds of a log ----------------------------------------------------------
 
-# mm/s of the units that a feed is tried in where none is stated
+# units to try for a feed without unit, in mm/s
 _FEED_UNITS = {"mm/s": 1.0, "mm/min": 1.0 / 60.0, "in/min": MM_PER_INCH / 60.0}
-_MIN_READINGS = 4  # so many readings of one value are no chance
-_FEED_BIN = 0.0025  # of the programmed feed: readings of a steady feed agree better
+_MIN_READINGS = 4  # least readings of one value that are no coincidence
+_FEED_BIN = 0.0025  # relative tolerance of readings of a steady feed
 _MIN_SHARE = 0.06
 _MIN_OVERRIDE, _MAX_OVERRIDE = 0.2, 2.0
-_STEPS = (1.0, 0.5, 0.1, 1.0 / 60.0, 0.01, 0.001)  # in which controls show feeds
+_STEPS = (1.0, 0.5, 0.1, 1.0 / 60.0, 0.01, 0.001)  # resolutions of displayed feeds
 
 
 @dataclass(frozen=True)
@@ -132,12 +132,12 @@ class CutSection:
     """A section of a run without functions."""
 
     lines: tuple[int, int]  # first and last
-    feed_override: float  # ratio at which it was cut
-    measured: bool  # whether that was seen in the log, else it is taken from the run or as 1
+    feed_override: float  # override ratio
+    measured: bool  # the override is from the log; else from the run, or 1
 
 
 def line_numbers(log: RunLog, timed: TimedProgram) -> IntArray:
-    """Lines of the text from what the log counts."""
+    """Convert the log's block numbers to line numbers."""
     value = np.asarray(log.block.value, dtype=np.int64)
     if log.block_counts == "line":
         return value
@@ -150,14 +150,14 @@ def line_numbers(log: RunLog, timed: TimedProgram) -> IntArray:
 
 
 def lines_at(signal: Signal, log: RunLog, timed: TimedProgram) -> IntArray:
-    """Line that was reported when a value came."""
+    """Reported line at each value of a signal."""
     line = line_numbers(log, timed)
     at = np.searchsorted(log.block.time_s, signal.time_s, side="right") - 1
     return np.clip(np.where(at >= 0, line[np.maximum(at, 0)], 0), 0, timed.line_count + 1)
 
 
 def longest(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
-    """Of pairs of value and duration the value that held for the longest time, and its ratio of the whole time."""
+    """Of pairs of value and duration: the value with the longest total time, and its ratio to the whole time."""
     held: dict[float, float] = defaultdict(float)
     for value, duration in pairs:
         held[value] += duration
@@ -166,7 +166,7 @@ def longest(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
 
 
 def held_longest(signal: Signal, end_s: float | None) -> float:
-    """The value that a signal had for the longest time."""
+    """Value of a signal for the longest time."""
     until = np.append(signal.time_s[1:], end_s if end_s is not None else signal.time_s[-1])
     values = (round(value, 3) for value in signal.value.tolist())
     return longest(zip(values, np.maximum(until - signal.time_s, 0.0).tolist(), strict=True))[0]
@@ -182,7 +182,7 @@ def feed_unit(entry: RunEntry, log: RunLog, timed: TimedProgram) -> float:
     steady = steady_value(np.log(ratio)) if len(ratio) else None
     name = entry.feed_unit or log.feed_unit
     stated = find_unit(name) if name is not None else None
-    # An override is between a half and twice the programmed feed: units lie further apart.
+    # An override is between a half and twice the programmed feed: units differ by more.
     units = [float(stated.factor) * 1000.0] if stated is not None else list(_FEED_UNITS.values())
     if steady is None:
         return units[0] if stated is not None else math.nan
@@ -191,14 +191,14 @@ def feed_unit(entry: RunEntry, log: RunLog, timed: TimedProgram) -> float:
         tried = name if stated is not None else f"no unit of {', '.join(_FEED_UNITS)}"
         raise RecordError(
             f"{log.source}: steady feeds of {entry.program.name} are {math.exp(steady):.4g} times the programmed ones "
-            f"in mm/s: {tried} does not make that an override of 50 to 200 %; the log is of another program, the "
+            f"in mm/s: {tried} would not be an override of 50 to 200 %; the log is of another program, the "
             f"program in another unit (G20, G21), or feed_unit must be stated{' otherwise' if stated else ''}"
         )
     return best
 
 
 def steady_value(values: FloatArray) -> float | None:
-    """Where values heap up."""
+    """Most frequent value, or None."""
     ordered = np.sort(values)
     count = np.searchsorted(ordered, ordered + _FEED_BIN, side="right") - np.arange(len(ordered))
     most = int(count.max())
@@ -211,13 +211,13 @@ def steady_value(values: FloatArray) -> float | None:
 def cut_sections_of(
     entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float, notes: list[str]
 ) -> list[CutSection]:
-    """Feed override of each section: what steady cuts show, else what is stated, else that of the run, else 1."""
+    """Feed override of each section: from steady cuts, else as stated, else that of the run, else 1."""
     ratio, line = np.empty(0), np.empty(0, dtype=np.int64)
     if log.feed is not None and math.isfinite(unit):
         line = lines_at(log.feed, log, timed)
         ratio = log.feed.value * unit / timed.feed_mm_per_s[line]
-        # A control shows feeds in steps, the largest usual one that all are multiples of: where it is much of the
-        # feed, that shows nothing.
+        # Displayed feeds are multiples of a step, the largest usual one that fits all: if it is coarse for the
+        # feed, the reading is useless.
         shown = ((step, log.feed.value / step) for step in _STEPS)
         step = next((each for each, parts in shown if np.all(np.abs(parts - np.round(parts)) < 1e-3)), 0.0)
         fine = timed.feed_mm_per_s[line] * _FEED_BIN > step * unit
@@ -235,43 +235,43 @@ def cut_sections_of(
         found.append(CutSection((first, last), to_whole_percent(value), seen is not None))
     used = sorted({cut_section.feed_override for cut_section in found if cut_section.measured})
     if any(abs(value - 1.0) > 0.005 for value in used):
-        notes.append("feed override " + ", ".join(f"{value:.1%}" for value in used) + " as steady cuts show")
+        notes.append("feed override " + ", ".join(f"{value:.1%}" for value in used) + " by steady cuts")
     if ratio.size == 0 and stated is None:
-        notes.append("no feed in the log: overrides are not known and are taken as 100 %")
+        notes.append("no feed in the log: overrides are unknown and assumed to be 100 %")
     return found
 
 
 def to_whole_percent(ratio: float) -> float:
-    """As an override switch has it: whole percents where they are within what a reading means."""
+    """Round to whole percent, as on an override switch, if within the accuracy of a reading."""
     whole = round(ratio, 2)
     return whole if abs(ratio - whole) < 0.002 else round(ratio, 4)
 
 
-# --- a log laid beside its program ------------------------------------------------------------------------------------
+# --- a log aligned with its program -----------------------------------------------------------------------------------
 
 _MIN_BLOCKS = 8
-_MISSING_S, _MISSING = 15.0, 0.15  # of a program: more than a machine's own times explain
-_MIN_RISING = 0.9  # of the reported lines
+_MISSING_S, _MISSING = 15.0, 0.15  # missing part of a program: more than a machine's own times explain
+_MIN_RISING = 0.9  # least ratio of ascending reported lines
 
 
 @dataclass(frozen=True, eq=False)
 class ObservedRun:
-    """One run of a program, as far as its log shows."""
+    """One run of a program, from its log."""
 
     timed: TimedProgram
     log: RunLog
-    entry: RunEntry  # what the file of runs says of it
-    time_s: FloatArray  # (n,) when the control first reported a line, since the start
-    line: IntArray  # (n,) the line, never falling
+    entry: RunEntry  # its entry in the file of runs
+    time_s: FloatArray  # (n,) time since the start at which a line was first reported
+    line: IntArray  # (n,) reported lines, never descending
     cut_sections: tuple[CutSection, ...]  # sections with their feed overrides
     rapid_override: float  # ratio of the rapid rates
-    feed_unit_mm_per_s: float  # what one unit of the logged feed is; NaN without a feed
-    notes: tuple[str, ...]  # what was found and bridged
-    whole: bool = True  # whether the log begins where the program does
+    feed_unit_mm_per_s: float  # one unit of the logged feed; NaN without a feed
+    notes: tuple[str, ...]  # findings and gaps
+    whole: bool = True  # the log begins with the program
 
     @property
     def duration_s(self) -> float | None:
-        """From start to completion; None: the log does not hold both."""
+        """From start to completion; None: not both are in the log."""
         return self.log.duration_s if self.log.complete and self.whole else None
 
 
@@ -286,17 +286,17 @@ def observe(entry: RunEntry, log: RunLog, timed: TimedProgram, machine: Machine)
     if entry.rapid_override_percent is not None:
         rapid_override = entry.rapid_override_percent / 100.0
     elif log.rapid_override is not None and len(log.rapid_override):
-        # The override may change for a moment, at the start mostly: what held longest counts.
+        # The override may change briefly, mostly at the start: use its longest value.
         rapid_override = held_longest(log.rapid_override, log.duration_s) or math.nan
     run = ObservedRun(timed, log, entry, time_s, line, cut_sections, rapid_override, unit, tuple(notes))
-    starts = timed.starts(fanuc_model(machine))  # by the machine's own limits, before anything is calibrated
+    starts = timed.starts(fanuc_model(machine))  # by the machine's own limits, before calibration
     whole = _is_whole(run, starts, notes)
     _require_same(run, starts)
     return replace(run, whole=whole, notes=tuple(notes))
 
 
 def _lines(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) -> tuple[FloatArray, IntArray]:
-    """Times and lines of what was reported, never falling."""
+    """Times and lines of the reported lines, never descending."""
     line = line_numbers(log, timed)
     time_s = log.block.time_s
     within = (line >= 1) & (line <= timed.line_count)
@@ -310,24 +310,24 @@ def _lines(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) 
     time_s, line = time_s[within], line[within]
     if len(line) < _MIN_BLOCKS:
         raise RecordError(f"{where}: the log reports {len(line)} lines of it; {_MIN_BLOCKS} are needed")
-    # What is reported before the first block is of the run before; single readings may be wrong.
+    # Lines reported before the first block belong to the previous run; single readings may be wrong.
     rises = _rising(line)
     if np.mean(rises) < _MIN_RISING:
         back = int(np.flatnonzero(~rises)[0])
         raise RecordError(
             f"{where}: {np.mean(~rises):.0%} of the reported lines go back (line {line[back]} after "
             f"{time_s[back]:.1f} s is out of order): log and program do not belong together, or it repeats parts of "
-            "itself, which cannot be laid beside a log by line numbers"
+            "itself, which cannot be aligned with a log by line numbers"
         )
     if not rises.all():
-        notes.append(f"{int(np.sum(~rises))} reported lines are out of order and left out")
+        notes.append(f"{int(np.sum(~rises))} reported lines are out of order and ignored")
     time_s, line = time_s[rises], line[rises]
     first = np.concatenate([[True], np.diff(line) > 0])
     return np.asarray(time_s[first], dtype=np.float64), np.asarray(line[first], dtype=np.int64)
 
 
 def _compare_tools(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) -> None:
-    """The tools that the log names must be those that the program calls there; numbers of another kind are noted."""
+    """Compare the logged tools with those called by the program; numbers of another kind are noted."""
     if log.tool is None:
         return
     called = {int(tool) for tool in timed.tools if tool >= 0}
@@ -341,15 +341,15 @@ def _compare_tools(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: lis
     if not wrong:
         return
     value, at, here = wrong[0]
-    said = f"tool {value} in the spindle at line {at}, where the program has T{min(here)}"
+    said = f"tool {value} in the spindle at line {at}, but the program has T{min(here)}"
     if len(wrong) > 1 and all(each[0] in called for each in wrong):
         raise RecordError(f"{log.source}: {said}: it is not the log of this version of {entry.program.name}")
     notes.append(f"{said}: numbers of another kind, or of a tool that was there before the start")
 
 
 def _rising(line: IntArray) -> npt.NDArray[np.bool_]:
-    """Which values belong to the longest row that never falls."""
-    ends: list[int] = []  # where the best row of each length ends
+    """Mask of the longest non-descending subsequence."""
+    ends: list[int] = []  # end of the best subsequence of each length
     before = np.full(len(line), -1, dtype=np.int64)
     values = line.tolist()
     for index, value in enumerate(values):
@@ -365,7 +365,7 @@ def _rising(line: IntArray) -> npt.NDArray[np.bool_]:
 
 
 def _is_whole(run: ObservedRun, starts: FloatArray, notes: list[str]) -> bool:
-    """Whether the log begins where the program does."""
+    """Whether the log begins with the program."""
     begin, total_s = starts[run.line], float(starts[-1])
     known = np.flatnonzero(np.isfinite(begin))
     if not len(known) or run.log.duration_s is None:
@@ -377,13 +377,13 @@ def _is_whole(run: ObservedRun, starts: FloatArray, notes: list[str]) -> bool:
             f"{run.entry.program.name}, {missing_s:.0f} s before its end: log and program do not belong together"
         )
     if float(begin[known[0]]) - float(run.time_s[known[0]]) > max(_MISSING_S, _MISSING * total_s):
-        notes.append(f"begins at line {run.line[known[0]]}, in the middle of the program: the run is not whole")
+        notes.append(f"begins at line {run.line[known[0]]}, in the middle of the program: the run is incomplete")
         return False
     return True
 
 
 def _require_same(run: ObservedRun, starts: FloatArray) -> None:
-    """The motion of the program between the reported lines must take time where the log says that it did."""
+    """Check that modelled times between reported lines correlate with those of the log."""
     begin = starts[run.line]
     known = np.isfinite(begin) & ~run.timed.function[run.line]
     if known.sum() < _MIN_BLOCKS:
@@ -397,28 +397,28 @@ def _require_same(run: ObservedRun, starts: FloatArray) -> None:
     agreement = float(np.corrcoef(one, other)[0, 1])
     if agreement < 0.3:
         raise RecordError(
-            f"{run.log.source}: its lines do not take the time that those of {run.entry.program.name} need "
+            f"{run.log.source}: times of its lines do not match those of {run.entry.program.name} "
             f"(correlation {agreement:.2f} over {groups} parts, at least 0.3 is expected): log and program do not "
             "belong together"
         )
 
 
-# --- what the feeds of all runs show directly: rate of rapids, acceleration in arcs -----------------------------------
+# --- directly from the feeds of all runs: rate of rapids, acceleration in arcs -----------------------------------
 
-_LIMITED = 0.9  # of the programmed feed: below it something else than the program sets the speed
+_LIMITED = 0.9  # ratio to the programmed feed below which something else limits the speed
 _MIN_ARC_READINGS = 12
 _DIALS = (1.0, 0.75, 0.5, 0.25, 0.1, 0.05)  # usual settings of the rapid override
 
 
 def _shown_feeds(run: ObservedRun) -> tuple[IntArray, FloatArray]:
-    """Lines at which the log has a feed, and the feed, mm/s; none where its unit is not known."""
+    """Lines with a logged feed, and the feed, mm/s; empty if its unit is unknown."""
     if run.log.feed is None or not math.isfinite(run.feed_unit_mm_per_s):
         return np.empty(0, dtype=np.int64), np.empty(0)
     return lines_at(run.log.feed, run.log, run.timed), run.log.feed.value * run.feed_unit_mm_per_s
 
 
 def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
-    """What the feeds shown in arcs say of the largest acceleration across the path: v²/r where v is below the feed."""
+    """Largest centripetal acceleration from the feeds shown in arcs, mm/s²: v²/r where v is below the feed."""
     found: list[FloatArray] = []
     for run in runs:
         line, speed = _shown_feeds(run)
@@ -426,7 +426,7 @@ def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
         inside = np.isfinite(radius) & np.isfinite(feed) & (speed > 0.0)
         for each, programmed in set(zip(np.round(radius[inside], 1), feed[inside], strict=True)):
             group = inside & (np.round(radius, 1) == each) & (feed == programmed)
-            # A reading may fall upon a corner or a ramp: the steady speed is the one that is hardly passed.
+            # A reading may be at a corner or on a ramp: the steady speed is the one rarely exceeded.
             top = float(np.percentile(speed[group], 90))
             if group.sum() >= _MIN_READINGS and top < _LIMITED * programmed:
                 found.append(np.full(int(group.sum()), top**2 / float(np.median(radius[group]))))
@@ -435,7 +435,7 @@ def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
 
 
 def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
-    """Rapid rate of the machine, and the runs with their overrides, from the feeds that its logs show in rapids."""
+    """Rapid rate of the machine, and the runs with their overrides, from the logged feeds of rapids."""
     shown = {id(run): _shown_rate(run) for run in runs}
     plateaus = [plateau for plateau, _ in shown.values() if math.isfinite(plateau)]
     if not plateaus:
@@ -452,17 +452,17 @@ def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
 
 
 def with_override(run: ObservedRun, rate_mm_per_s: float) -> ObservedRun:
-    """A run with its rapid override: as stated, else as measured from its rapids, else 1."""
+    """A run with its rapid override: as stated, else from its rapids, else 1."""
     if math.isfinite(run.rapid_override):
         return run
     ratio = _shown_rate(run)[0] / rate_mm_per_s
     override = to_whole_percent(min(1.0, ratio)) if math.isfinite(ratio) else 1.0
-    notes = (*run.notes, f"rapid override {override:.0%} as its rapids show") if override < 0.99 else run.notes
+    notes = (*run.notes, f"rapid override {override:.0%} by its rapids") if override < 0.99 else run.notes
     return replace(run, rapid_override=override, notes=notes)
 
 
 def _shown_rate(run: ObservedRun) -> tuple[float, float]:
-    """Feed at which rapids run steadily, and the highest one along Z alone; NaN and 0 where none is seen."""
+    """Steady feed of rapids, and the highest feed along Z alone, mm/s; NaN and 0 if not found."""
     line, speed = _shown_feeds(run)
     moving = np.isnan(run.timed.feed_mm_per_s[line]) & (line > 0)
     value = speed[moving]
@@ -477,7 +477,7 @@ def _shown_rate(run: ObservedRun) -> tuple[float, float]:
 
 
 def _along_z(timed: TimedProgram) -> npt.NDArray[np.bool_]:
-    """Lines whose only axis word is Z."""
+    """Mask of lines whose only axis word is Z."""
     alone = np.zeros(timed.line_count + 2, dtype=bool)
     for number, words in enumerate(timed.text_lines[: timed.line_count], start=1):
         alone[number] = set(words.split("(")[0].upper()) & set("XYZ") == {"Z"}

@@ -1,8 +1,8 @@
-"""What run logs leave open of a calibrated cycle-time model, in the form in which the machine file holds it.
+"""Directions of a calibrated cycle-time model that run logs do not determine, as rows for the machine file.
 
 Each row is a step of one standard deviation, independent of the others. The directions are those of the symmetric root
-of the covariance, each as near as possible to one parameter (Zuber and Strimmer, 2011, "CAR scores"): so the squares
-say how much each parameter contributes.
+of the covariance, each nearest to one parameter (Zuber and Strimmer, 2011, "CAR scores"): so the squares
+are the contributions of the parameters.
 """
 
 from __future__ import annotations
@@ -20,36 +20,36 @@ from shapegcode.settings.keys import toml
 from shapegcode.timing.calibration.motion import FunctionFit, MotionFit, misfit, section_residuals, sections_of
 from shapegcode.timing.calibration.observed import ObservedRun
 
-_Row = dict[str, object]  # of the table times.open
+_Row = dict[str, object]  # of times.open
 
-_NO_STEP = 2e-3  # of a logarithm, or in s: what changes less is left out
-_ALONE, _SMALL = 0.1, 0.2  # steps of others that do not matter, and those within which times are straight lines
-_MIN_PART = 0.05  # of a step that times, none of which is below 0, must leave possible
-_KIND_SPREAD = 0.1  # a kind so much worse on runs left out has exp(-1/2) times the weight
-MIN_WEIGHT = 0.02  # of a kind of look-ahead that is worth a row
+_NO_STEP = 2e-3  # in a logarithm or s: smaller changes are omitted
+_ALONE, _SMALL = 0.1, 0.2  # steps of others that are negligible, and those for which times are linear
+_MIN_PART = 0.05  # least fraction of a step that keeps all times at 0 or above
+_KIND_SPREAD = 0.1  # a kind worse by this ratio in cross-validation has exp(-1/2) times the weight
+MIN_WEIGHT = 0.02  # least weight of a kind of look-ahead with a row
 _BLOCK_TIME = "controller.look_ahead_block_time_s"
 _USUAL_BLOCK_TIME_S = 0.002 * math.e  # one deviation above that of a usual machine
-_NOTICED = 0.01  # of the misfit: what one deviation from a usual machine costs in the fit
-# What a model says wrongly of the cuts of a tool, before any log is seen, and for how many tools that counts
+_NOTICED = 0.01  # cost in misfit of one standard deviation from a usual machine
+# Prior of the model error for a tool's cuts, and its weight in tools
 _USUAL_CUTS, _USUAL_TOOLS = 0.01, 4
-_USUAL_RUNS = 0.003  # scatter between repeated runs where no program was run twice
+_USUAL_RUNS = 0.003  # scatter between repeated runs if no program was run twice
 
 
 def kind_weights(scores: Sequence[float], best: int) -> list[float]:
-    """Probability of each kind of look-ahead, by what it says of runs left out."""
+    """Probability of each kind of look-ahead, from cross-validation."""
     least = max(scores[best], 1e-9)
     found = [math.exp(-0.5 * (max(0.0, score / least - 1.0) / _KIND_SPREAD) ** 2) for score in scores]
     return [each / sum(found) for each in found]
 
 
 def motion_rows(fit: MotionFit, covariance: FloatArray, runs: Sequence[ObservedRun], machine: Machine) -> list[_Row]:
-    """A row for each parameter of the motion, and one for a block time that the model does not have."""
+    """A row for each parameter of the motion, and one for a block time if the model has none."""
     base, parameters = fit.file_values(), fit.family.parameters
     rows = []
     for index, step in enumerate(_symmetric_root(covariance).T):
         parameter, others = parameters[index], np.delete(np.abs(step), index)
-        # The slower way, and all of it: there a limit shows that nothing has reached yet. But where others must make
-        # up for it they do so for small steps alone.
+        # Step to the slower side, in full: a limit not yet reached shows there. If others must compensate,
+        # use a small step only.
         part = 1.0 if others.max(initial=0.0) < _ALONE else min(1.0, _SMALL / float(np.abs(step).max()))
         part *= 1.0 if parameter.unit == "s" else -1.0
         values = {
@@ -65,7 +65,7 @@ def motion_rows(fit: MotionFit, covariance: FloatArray, runs: Sequence[ObservedR
 
 
 def _unnoticed_block_time(fit: MotionFit, runs: Sequence[ObservedRun], machine: Machine) -> float:
-    """The largest block time that a usual machine has and the logs do not contradict, s."""
+    """Largest block time of a usual machine that the logs do not contradict, s."""
     sections, model = sections_of(runs), fit.model(machine)
     before, block_time = misfit(sections, model), _USUAL_BLOCK_TIME_S
     while block_time > 1e-4:
@@ -86,7 +86,7 @@ def function_rows(
     value = np.array(list(functions.values.values()))
     rows = []
     for name, step in zip(names, _symmetric_root(functions.covariance).T, strict=True):
-        # No time is below 0: a smaller step, or the other way, keeps the sums that the logs tell.
+        # Times stay at 0 or above: a smaller or opposite step keeps the sums that the logs determine.
         parts = {sign: _possible(value, sign * step) for sign in (1.0, -1.0)}
         sign = max(parts, key=lambda each: parts[each])
         part = max(min(parts[sign], _SMALL / float(np.abs(step).max())), _MIN_PART)
@@ -97,30 +97,30 @@ def function_rows(
 
 
 def _possible(value: FloatArray, step: FloatArray) -> float:
-    """The part of a step, at most 1, that leaves no value below 0."""
+    """Largest fraction of a step, at most 1, that keeps all values ≥ 0."""
     falls = step < -_NO_STEP
     return min(1.0, float(np.min(value[falls] / -step[falls], initial=1.0)))
 
 
 def open_row(name: str, base: Mapping[str, object], other: Mapping[str, object], weight: float = 1.0) -> list[_Row]:
-    """A row for what the values of the machine file may be instead; none where they are the same."""
-    # A key that the other kind leaves out is one that it does not look at.
+    """A row with alternative values of the machine file; none if they are the same."""
+    # Keys missing in the other kind are not used by it.
     values = [f"{key} = {toml(value)}" for key, value in other.items() if value is not None and value != base.get(key)]
     return [{"name": name, "values": values, "weight": float(f"{weight:.4g}")}] if values else []
 
 
 def _symmetric_root(covariance: FloatArray) -> FloatArray:
-    """(n, n) L of the covariance L L^T, whose column i is the direction nearest to parameter i."""
+    """Symmetric square root of the covariance, (n, n); column i is the direction nearest to parameter i."""
     deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-18))
     value, vector = np.linalg.eigh(covariance / np.outer(deviation, deviation))
     return np.asarray(deviation[:, None] * ((vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T))
 
 
-# --- what no parameter explains ---------------------------------------------------------------------------------------
+# --- scatter that no parameter explains -------------------------------------------------------------------------------
 
 
 def cut_scatter(runs: Sequence[ObservedRun], fit: MotionFit, machine: Machine) -> float:
-    """Relative standard deviation of what the cuts of a tool take: independent of the other tools."""
+    """Relative standard deviation of the cutting time of a tool, independent between tools."""
     from scipy.stats import t as student
 
     sums: dict[tuple[int, int], list[float]] = defaultdict(lambda: [0.0, 0.0])
@@ -133,7 +133,7 @@ def cut_scatter(runs: Sequence[ObservedRun], fit: MotionFit, machine: Machine) -
                 of = sums[id(run.timed), int(run.timed.tools[section.line[0]])]
                 of[0] += max(-0.2 * took, min(error, 0.2 * took))
                 of[1] += took
-    # Each tool counts by its time, together as many as they are.
+    # Tools are weighted by time, with their number as total weight.
     whole = sum(took for _, took in sums.values())
     square = sum(error**2 / took for error, took in sums.values()) / whole if whole > 0.0 else 0.0
     freedom = _USUAL_TOOLS + len(sums)

@@ -17,14 +17,14 @@ _MAX_RUNS = 20
 
 
 def plots_of(found: CycleTimeCalibration) -> dict[str, Plot]:
-    """Its pictures by name."""
+    """Pictures of a calibration, by name."""
     return {"clock": partial(plot_cycle_time_calibration, found)} if any(run.measured_s for run in found.runs) else {}
 
 
 def plot_cycle_time_calibration(found: CycleTimeCalibration, ax: Axes | None = None) -> Axes:
-    """How far is the calibrated model off? One row for each run: whole run, tools, kinds of motion.
+    """Plot the errors of the calibrated model, one row for each run: whole run, tools, kinds of motion.
 
-    How to read this: 0 is what the machine took; the bands are 2 % for a run and 5 % for a tool's share; a bar is the
+    How to read this: 0 is the measured time; the bands are 2 % for a run and 5 % for a tool's part; a bar is the
     95 % interval.
 
     Args:
@@ -32,7 +32,7 @@ def plot_cycle_time_calibration(found: CycleTimeCalibration, ax: Axes | None = N
         ax: where to draw; None: a new figure.
 
     Returns:
-        The axes drawn into.
+        The axes of the plot.
     """
     runs = [run for run in found.runs if run.measured_s is not None and run.measured_s > run.held_s][:_MAX_RUNS]
     title = f"Predicted against measured: {found.machine}, {found.family}"
@@ -42,7 +42,7 @@ def plot_cycle_time_calibration(found: CycleTimeCalibration, ax: Axes | None = N
     labelled: set[str] = set()
 
     def once(label: str) -> str | None:
-        """A label the first time, so that the legend has it once."""
+        """The label on first use only, so that the legend has it once."""
         first = label not in labelled
         labelled.add(label)
         return label if first else None

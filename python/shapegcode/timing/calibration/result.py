@@ -1,4 +1,4 @@
-"""A cycle-time model calibrated from run logs, and how well it says what the machine did."""
+"""A cycle-time model calibrated from run logs, and its errors."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ TOLERANCE_PERCENT = 2.0
 
 @dataclass(frozen=True)
 class FamilyScore(OldNames):
-    """One kind of look-ahead that was tried.
+    """One kind of look-ahead tried.
 
     Attributes:
-        name: of it.
-        meaning: in words.
-        fitted_s: how far its times differ from the logs that it was fitted to, s (weighted root mean square over
+        name: its name.
+        meaning: description.
+        fitted_s: error of its times in the logs used for the fit, s (weighted root mean square over
             windows of seconds to minutes).
-        cross_validated_s: the same on runs that it was not fitted to; null: too few runs to leave any out.
+        cross_validated_s: error in runs not used for the fit, s; null: too few runs for cross-validation.
     """
 
     name: str
@@ -35,18 +35,18 @@ class FamilyScore(OldNames):
 
 @dataclass(frozen=True)
 class CalibratedParameter(OldNames):
-    """One number of the machine file.
+    """One calibrated parameter of the machine file.
 
     Attributes:
-        key: of it.
-        meaning: in words.
-        value: as calibrated.
-        low: least value of the 95 % interval.
-        high: largest one.
-        unit: of all three.
-        is_determined: whether the runs determine it; else they allow very different values, or determine only sums
+        key: its key.
+        meaning: description.
+        value: calibrated value.
+        low: lower end of the 95 % interval.
+        high: upper end.
+        unit: unit of these values.
+        is_determined: whether the runs determine it; otherwise they allow very different values, or determine only sums
             with others.
-        previous_value: that of the machine file before; null: it had none.
+        previous_value: former value in the machine file; null: none.
     """
 
     key: str
@@ -65,8 +65,8 @@ class CycleTimePart:
 
     Attributes:
         name: "T3", "cuts", "between cuts".
-        measured_s: what it took in the log.
-        predicted_s: of the calibrated model.
+        measured_s: time in the log.
+        predicted_s: time of the calibrated model.
     """
 
     name: str
@@ -75,30 +75,30 @@ class CycleTimePart:
 
     @property
     def error_percent(self) -> float:
-        """Predicted over measured."""
+        """Error of the predicted time relative to the measured one, %."""
         return 100.0 * (self.predicted_s / self.measured_s - 1.0) if self.measured_s > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
 class CalibrationRun(OldNames):
-    """One run.
+    """One run, measured and predicted.
 
     Attributes:
         program: file.
         log: file.
         use: "fit" or "test".
-        measured_s: from start to completion, by the log; null: it does not hold both.
-        held_s: of it, holds: the machine waited where no program asks for it.
-        predicted_s: of the calibrated model, at the overrides of this run.
-        low_s: least time of the 95 % interval.
-        high_s: largest one.
-        cross_validated_s: of a model calibrated with the other programs (or runs) alone; null: no others.
-        feed_override: ratio at which most of it was cut.
-        rapid_override: ratio of its rapids.
-        tools: by tool.
-        kinds: cuts, and what lies between them.
-        holds: where it was held, in words.
-        notes: what was bridged in the log.
+        measured_s: from start to completion, by the log; null: not both are in the log.
+        held_s: part of it in holds, without a programmed stop.
+        predicted_s: time of the calibrated model at the overrides of this run.
+        low_s: lower end of the 95 % interval.
+        high_s: upper end.
+        cross_validated_s: time of a model calibrated only with the other programs (or runs); null: no others.
+        feed_override: feed override ratio of most cutting.
+        rapid_override: rapid override ratio.
+        tools: times by tool.
+        kinds: times of cuts, and between cuts.
+        holds: descriptions of its holds.
+        notes: gaps in the log.
     """
 
     program: str
@@ -119,23 +119,23 @@ class CalibrationRun(OldNames):
 
     @property
     def name(self) -> str:
-        """Program and log, without folders."""
+        """Names of program and log, without folders."""
         program, log = (each.replace("\\", "/").rsplit("/", 1)[-1] for each in (self.program, self.log))
         return f"{program.rsplit('.', 1)[0]}, {log}"
 
     @property
     def error_percent(self) -> float | None:
-        """Predicted over what was measured without holds."""
+        """Error of the predicted time relative to the measured one without holds, %."""
         return _error(self.predicted_s, self.measured_s, self.held_s)
 
     @property
     def cross_validated_percent(self) -> float | None:
-        """The same of the model calibrated with the others."""
+        """Error of the model calibrated with the others, %."""
         return _error(self.cross_validated_s, self.measured_s, self.held_s)
 
     @property
     def judged_percent(self) -> float | None:
-        """Error as a run left out, where there is one; else of the fit."""
+        """Cross-validation error if available, else error of the fit, %."""
         return self.cross_validated_percent if self.cross_validated_s is not None else self.error_percent
 
 
@@ -151,15 +151,15 @@ class CycleTimeCalibration(Result):
 
     Attributes:
         machine: name.
-        family: kind of look-ahead that says best what runs took that it was not fitted to.
-        families: all that were tried.
-        numbers: what was calibrated, one row for each key of the machine file.
+        family: kind of look-ahead that predicts best the runs not used for its fit.
+        families: all kinds tried.
+        numbers: calibrated parameters, one row for each key of the machine file.
         runs: one row for each run.
-        fitted: the machine with it.
-        remarks: for each key that was set, by its dotted name: interval and source.
-        undetermined: what the logs do not determine, in words.
-        warnings: runs that differ by more than 2 %, and where one was held.
-        largest_error_percent: of a run: as one left out where others are, without holds; null: no whole run.
+        fitted: the calibrated machine.
+        remarks: interval and source of each key set, by dotted name.
+        undetermined: parameters that the logs do not determine, in words.
+        warnings: runs with errors above 2 %, and holds.
+        largest_error_percent: of a run, by cross-validation if possible, without holds; null: no complete run.
     """
 
     machine: str
@@ -176,7 +176,7 @@ class CycleTimeCalibration(Result):
 
     @property
     def largest_error_percent(self) -> float | None:
-        """Largest error of a run: as one left out where others are, without holds."""
+        """Largest error of a run, by cross-validation if possible, without holds, %."""
         judged = [abs(run.judged_percent) for run in self.runs if run.judged_percent is not None]
         return max(judged) if judged else None
 
@@ -188,7 +188,7 @@ class CycleTimeCalibration(Result):
 
     @property
     def answer(self) -> str:
-        """How well it says what the machine did."""
+        """Number of parameters and largest error."""
         largest = self.largest_error_percent
         learned = sum(number.is_determined for number in self.numbers)
         head = f"{self.machine}: {learned} parameters calibrated with {sum(run.use == 'fit' for run in self.runs)} runs"
@@ -201,16 +201,16 @@ class CycleTimeCalibration(Result):
 
     @property
     def next_step(self) -> str:
-        """To use the machine file, or to give it more runs."""
+        """Use the machine file, or add runs."""
         if self.ok:
             return "write it with -o FILE; shapegcode time part.nc -m FILE gives the time of other programs"
         return "add runs of other programs, or state what the operator had set (override_percent in RUNS.toml)"
 
     def next_step_after(self, file: str) -> str:
-        """The same where the machine file was written.
+        """Next step after the machine file was written.
 
         Args:
-            file: name of it.
+            file: name of the machine file.
 
         Returns:
             One sentence.
@@ -218,15 +218,15 @@ class CycleTimeCalibration(Result):
         return f"shapegcode time part.nc -m {file} gives the time of other programs" if self.ok else self.next_step
 
     def plots(self) -> Mapping[str, Plot]:
-        """Predicted against measured."""
+        """Picture of predicted against measured times."""
         return self._drawn_beside()
 
     def to_toml(self) -> str:
-        """The machine file with the calibrated parameters, each with a remark."""
+        """Text of the machine file with the calibrated parameters, each with a remark."""
         return self.fitted.to_toml(self.remarks)
 
     def tables(self) -> list[Table]:
-        """Runs, tools, kinds of look-ahead, numbers."""
+        """Tables of runs, tools, kinds of look-ahead, parameters."""
         tools = [(run, share) for run in self.runs for share in (*run.tools, *run.kinds)]
         return [
             Table("runs", _RUNS, self.runs),
@@ -257,7 +257,7 @@ _FAMILIES = (
     Column("kind", value="name", text=True),
     Column("fitted", "s", "fitted_s", digits=3),
     Column("left out", "s", "cross_validated_s", digits=3),
-    Column("what it is", value="meaning", text=True),
+    Column("description", value="meaning", text=True),
 )
 _NUMBERS = (
     Column("number", value="meaning", text=True),

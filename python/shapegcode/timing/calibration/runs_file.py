@@ -1,4 +1,4 @@
-"""The file of runs (RUNS.toml): which program made which log, and what to do with each.
+"""The file of runs (RUNS.toml): programs with the logs of their runs, and their use.
 
 [[runs]]
 program = "programs/COVER.NC"
@@ -38,15 +38,15 @@ class RunEntry:
         program: file.
         logs: files, sorted within each pattern.
         use: "fit", or "test": predicted only, never fitted.
-        feed_unit: of the feed in the logs; None: by the data.
-        items: (what it is, name in the log) of items that are named.
-        format: of the logs; None: by their content.
-        override_percent: what the operator had set for the feed, where a log does not say; None: not known.
-        rapid_override_percent: the same of rapids.
-        leave_out: why it is not used at all; None: it is.
+        feed_unit: unit of the feed in the logs; None: found from the data.
+        items: (role, name in the log) of the named items.
+        format: format of the logs; None: by content.
+        override_percent: feed override set by the operator, if a log does not contain it; None: unknown.
+        rapid_override_percent: rapid override likewise.
+        leave_out: reason not to use the entry; None: used.
         logged_as: name of the program in the logs; None: that of its file, or its O number.
-        shared: logs that other programs have too: only runs that name this program are taken from them.
-        line: of the entry in the file; None: not known.
+        shared: logs shared with other programs: only runs that name this program are used.
+        line: line of the entry in the file; None: unknown.
     """
 
     program: Path
@@ -64,7 +64,7 @@ class RunEntry:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Under which a log may know the program."""
+        """Names of the program in a log."""
         if self.logged_as is not None:
             return (self.logged_as,)
         with open_file(self.program) as file:
@@ -73,7 +73,7 @@ class RunEntry:
         return (self.program.name, number[1]) if number and int(number[1][1:]) else (self.program.name,)
 
     def read(self) -> tuple[RunLog, ...]:
-        """The runs of all its logs; of a log that names programs only those of this one.
+        """Read the runs of all its logs; from a log that names programs only those of this one.
 
         Returns:
             The runs, log by log.
@@ -90,7 +90,7 @@ class RunEntry:
             if log in self.shared and any(run.program is None for run in runs):
                 raise RecordError(
                     f"{log}: it is a log of several programs, and a run in it (from line {runs[0].lines[0]}) names "
-                    f"none: whether {self.program.name} made it is not known; divide the log"
+                    f"none: it is unknown whether {self.program.name} made it; split the log"
                 )
             found += runs
         return tuple(found)
@@ -101,8 +101,8 @@ class RunsFile:
     """A file of runs.
 
     Attributes:
-        path: of the file.
-        entries: in the order of the file, those that are left out as well.
+        path: path of the file.
+        entries: in file order, including unused ones.
     """
 
     path: Path
@@ -110,7 +110,7 @@ class RunsFile:
 
     @property
     def used(self) -> tuple[RunEntry, ...]:
-        """The entries that are not left out."""
+        """The used entries."""
         return tuple(entry for entry in self.entries if entry.leave_out is None)
 
 
@@ -124,23 +124,23 @@ class _RunsRow(TomlTable):
     )
     use: Use = key('"fit": calibrated with; "test": predicted only', default="fit")
     feed_unit: Text | None = key("unit of the feed in the logs; left out: by the data", default=None)
-    items: dict[Text, Text] | None = key("names of the items in the logs by what they are", default=None)
-    format: LogFormat | None = key("of the logs; left out: by their content", default=None)
+    items: dict[Text, Text] | None = key("names of the items in the logs by role", default=None)
+    format: LogFormat | None = key("format of the logs; left out: by their content", default=None)
     override_percent: _Percent | None = key(
-        "override of the feed that the operator had set, where the log does not say", default=None
+        "feed override set by the operator, if the log does not contain it", default=None
     )
-    rapid_override_percent: _Percent | None = key("the same of rapids", default=None)
+    rapid_override_percent: _Percent | None = key("rapid override likewise", default=None)
     logged_as: _Path | None = key(
         "name of the program in the logs; left out: that of its file, or its O number", default=None
     )
-    leave_out: _Path | None = key("why it is not used", default=None)
+    leave_out: _Path | None = key("reason not to use it", default=None)
 
     @model_validator(mode="after")
     def _fits(self) -> _RunsRow:
         if self.log is None and self.logs is None:
-            raise ValueError("one of log and logs must be given")
+            raise ValueError("one of log and logs is required")
         if self.log is not None and self.logs is not None:
-            raise KeyProblem("logs", self.logs, "only one of log and logs must be given")
+            raise KeyProblem("logs", self.logs, "specify only one of log and logs")
         for name, read in (("feed_unit", stated_feed_unit), ("items", ItemTable)):
             value = getattr(self, name)
             try:
@@ -182,16 +182,16 @@ def load_runs(path: str | Path) -> RunsFile:
 
 
 class _Found:
-    """The programs and logs of a file of runs, as they are on the disk."""
+    """The programs and logs of a file of runs, found on disk."""
 
     def __init__(self, path: Path, text: str) -> None:
         self.problems: list[Problem] = []
         self._folder = path.parent
         self._text = text
-        self._users: dict[Path, list[tuple[int, Path]]] = {}  # of a log: number and program of its entries
+        self._users: dict[Path, list[tuple[int, Path]]] = {}  # by log: number and program of its entries
 
     def entry(self, number: int, row: _RunsRow) -> RunEntry:
-        """An entry; what is wrong goes to the problems, unless it is left out."""
+        """Check an entry; adds its problems unless it is unused."""
         where = f"runs.{number}"
         program = self._folder / row.program
         if row.leave_out is None and not program.is_file():
@@ -206,7 +206,7 @@ class _Found:
         )  # fmt: skip
 
     def shared(self, entry: RunEntry) -> tuple[Path, ...]:
-        """The logs of an entry that others have too."""
+        """Logs of an entry that others use too."""
         return tuple(log for log in entry.logs if len(self._users.get(log.resolve(), ())) > 1)
 
     def _logs(self, where: str, pattern: str, number: int, program: Path, used: bool) -> list[Path]:
@@ -218,7 +218,7 @@ class _Found:
             users = self._users.setdefault(log.resolve(), [])
             before = next((one for one, other in users if other.resolve() == program.resolve()), None)
             if before is not None:
-                self._problem(where, pattern, f"{log.name} is a log of runs.{before} already: each run counts once")
+                self._problem(where, pattern, f"{log.name} is already a log of runs.{before}: each run counts once")
             users.append((number, program))
         return found
 
