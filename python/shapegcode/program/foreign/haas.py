@@ -12,7 +12,7 @@ from itertools import accumulate
 from pathlib import Path
 
 from shapegcode.machine import Machine
-from shapegcode.program.foreign.read import ForeignProgram, ForeignSettings, Note, number_text, refusal
+from shapegcode.program.foreign.read import ForeignProgram, ForeignSettings, Note, refusal
 
 _AS_FANUC = frozenset((
     "0", "1", "2", "3", "4", "9", "10", "17", "18", "19", "20", "21", "28", "40", "41", "42", "43", "49", "52", "53",
@@ -207,7 +207,7 @@ def _with_dwell(words: str, codes: list[str], note: Callable[[str, str], None]) 
     milliseconds = round(seconds * 1e3)
     if "4" not in codes and abs(milliseconds - seconds * 1e3) > 1e-6:
         raise ValueError(f"P{match[1]} is no whole number of milliseconds, in which FANUC's cycles wait")
-    word = f"X{number_text(seconds)}" if "4" in codes else f"P{milliseconds}"
+    word = f"X{match[1]}" if "4" in codes else f"P{milliseconds}"
     return words[: match.start()] + word + words[match.end() :]
 
 

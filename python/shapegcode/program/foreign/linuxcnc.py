@@ -15,7 +15,7 @@ from shapegcode.errors import ProgramError, located_error
 from shapegcode.io.data_file import read_file
 from shapegcode.io.ini import UNITS_MM, ini_entries
 from shapegcode.machine import Machine
-from shapegcode.program.foreign.read import ForeignProgram, ForeignSettings, Note, program_folders, refusal
+from shapegcode.program.foreign.read import ForeignProgram, ForeignSettings, program_folders, program_of_core, refusal
 
 _MAX_BYTES = 10_000_000  # of a tool table, and of a program that another one calls
 _LAST_TOOL = 2**31 - 1
@@ -43,16 +43,7 @@ def read_linuxcnc(source: str, *, file: str, machine: Machine, folder: Path | No
         peck_clearance_mm=_core.linuxcnc_peck_clearance_mm,
         path_tolerance_mm=program.path_tolerance_mm,
     )
-    expanded = program.expanded
-    return ForeignProgram(
-        "linuxcnc",
-        expanded.text.decode("latin-1"),
-        expanded.lines,
-        notes=tuple(Note(line, text) for line, text in expanded.notes),
-        files=tuple(expanded.files),
-        line_files=expanded.line_files,
-        settings=settings,
-    )
+    return program_of_core("linuxcnc", program.expanded, settings)
 
 
 def _options(machine: Machine, table: ToolTable | None) -> _core.LinuxcncOptions:

@@ -14,7 +14,13 @@ from pathlib import Path
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.program.foreign.read import ForeignProgram, ForeignSettings, Note, called_source, program_folders
+from shapegcode.program.foreign.read import (
+    ForeignProgram,
+    ForeignSettings,
+    called_source,
+    program_folders,
+    program_of_core,
+)
 
 
 def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
@@ -36,16 +42,7 @@ def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | Non
     options.refused = lambda word: next((why for pattern, why in refused.items() if pattern.fullmatch(word)), "")
     options.called = _finder(machine, folder)
     program = _core.read_siemens(source, options)
-    expanded = program.expanded
-    return ForeignProgram(
-        "siemens",
-        expanded.text.decode("ascii"),
-        expanded.lines,
-        notes=tuple(Note(line, text) for line, text in expanded.notes),
-        files=tuple(expanded.files),
-        line_files=expanded.line_files,
-        settings=ForeignSettings(names=dict(program.names)),
-    )
+    return program_of_core("siemens", program.expanded, ForeignSettings(names=dict(program.names)))
 
 
 @cache
