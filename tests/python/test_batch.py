@@ -299,7 +299,7 @@ def test_ctrl_c_says_how_to_go_on(folder: Path) -> None:
     process.send_signal(signal.SIGINT)
     out, err = process.communicate()
     assert process.returncode == 130, out + err
-    assert "go on with: shapegcode batch --resume parts/a.nc parts/long.nc" in out
+    assert "resume with: shapegcode batch --resume parts/a.nc parts/long.nc" in out
     assert {file.name for file in (folder / "out").iterdir()} == {"a.nc", "a.nc.json", "batch.jsonl", "summary.csv"}
 
 

@@ -68,7 +68,7 @@ def test_a_page_made_later_is_the_same(tmp_path: Path) -> None:
     ("change", "said"),
     [
         (lambda folder: (folder / "part.nc").write_text("M30\n"), "input part.nc was changed since"),
-        (lambda folder: (folder / "out.nc").unlink(), "output out.nc is not where it was"),
+        (lambda folder: (folder / "out.nc").unlink(), "output out.nc was not found"),
         (lambda folder: edit(folder / "r.json", by="shapegcode 0.0.9"), "made by shapegcode 0.0.9; this page by"),
         (lambda folder: edit(folder / "r.json", format=7), "provenance.format = 7: written by"),
         (lambda folder: edit(folder / "r.json", command="shapegcode convert --unheard"), "its command cannot be read"),

@@ -441,7 +441,7 @@ def test_a_choice_that_nothing_bears_is_code_1_and_draws_none(tmp_path: Path) ->
     done = run(written(tmp_path, text), "optimize", "STUDY.toml", "--set", "tolerance.contour_um=0.2", "--plots", "p")
     assert done.returncode == 1, done.stderr
     assert done.stdout.startswith("none of 4 choices stays within tolerance on 95 % of the machines")
-    assert "pictures: there are none of this result" in done.stdout
+    assert "pictures: this result has none" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -456,7 +456,7 @@ def test_a_choice_that_nothing_bears_is_code_1_and_draws_none(tmp_path: Path) ->
         ("sd = 2.0", "sd = 2.0, known = true", "it belongs into choose"),
         ("x.modes.1", "x.modes.0", "counts from 1, and there is 1"),
         ("part.nc", "nothing.nc", "no such file"),
-        ('machine = "vx500"', "", "no machine: name one there, or with -m"),
+        ('machine = "vx500"', "", "no machine: give one there, or with -m"),
     ],
 )
 def test_bad_choices_name_key_value_and_limit(tmp_path: Path, old: str, new: str, said: str) -> None:
