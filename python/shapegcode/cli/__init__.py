@@ -80,9 +80,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("sweep", "write a program that shakes an axis, to find modes without a hammer (identify --sweep)"),
     Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
     Command("batch", "run a command over many programs and machines, and resume where it stopped"),
-    Command(
-        "study", "simulate a program on sampled machines (Monte Carlo): probability of staying within tolerance"
-    ),
+    Command("study", "simulate a program on sampled machines (Monte Carlo): probability of staying within tolerance"),
     Command(
         "optimize", "choose settings for the shortest program that stays within tolerance on most sampled machines"
     ),

@@ -50,9 +50,7 @@ def _identify(args: argparse.Namespace) -> int:
     if not args.files:
         raise ArgumentError("give the file of a tap test or decay; instructions for the test: identify --tap-plan")
     if args.sweep is None and (args.machine is not None or args.set):
-        raise ArgumentError(
-            "-m and --set belong to --tap-plan and --sweep; --update gives the machine file to update"
-        )
+        raise ArgumentError("-m and --set belong to --tap-plan and --sweep; --update gives the machine file to update")
     if args.sweep is not None and args.machine is None:
         raise ArgumentError("--sweep needs -m, the machine file of the control that ran the program")
     return _fit(args)
