@@ -343,7 +343,7 @@ def test_tables_of_offsets_and_variables(tmp_path: Path) -> None:
     # 40B1940000000000 is the double 4500.0; all ones is a vacant variable.
     assert read.variables == {"504": 4500.0}
     assert any("#100" in row.why for row in found.missing)
-    assert any("1 of 2 tool offsets are zero" in row.why for row in found.missing)
+    assert any("1 of 2 tool offsets are all zero" in row.why for row in found.missing)
     assert {row.key for row in found.tables_read} >= {"input.variables", "input.tool_length_mm", "input.work_offsets"}
 
 

@@ -408,9 +408,7 @@ class Conversion(ProgramFigures, Result):
         rows.append(BeforeAfter("duration of the shaper", "ms", None, self.shaper.duration_s * 1e3, 3))
         if self.shaper.per_axis_duration_s:
             shorter_ms = self.shaper.per_axis_duration_s * 1e3
-            rows.append(
-                BeforeAfter("duration with one shaper per axis (--per-axis, not used)", "ms", None, shorter_ms, 3)
-            )
+            rows.append(BeforeAfter("duration, one shaper per axis (--per-axis, not used)", "ms", None, shorter_ms, 3))
         return rows
 
     def plots(self) -> Mapping[str, Plot]:
