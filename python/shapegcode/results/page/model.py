@@ -49,9 +49,7 @@ class HeatRow:
 
     name: str  # heading of the line
     values: tuple[float | None, ...]  # by column; None: not measured
-    shares: tuple[
-        float | None, ...
-    ]  # ratios to a limit, for the colour of the cells: below 1 is within; None: no colour
+    shares: tuple[float | None, ...]  # ratios to a limit, for the colours: below 1 is within; None: no colour
     remark: str = ""  # text at its end
     counts: bool = True  # it counts in the verdict; False: it is only shown
     keys: tuple[str, ...] = ()  # position of each value in the JSON, as in `Figure`; empty: none
