@@ -90,7 +90,7 @@ def test_the_command_says_it_first(tmp_path: Path) -> None:
     done = run(tmp_path, "convert", "slow.nc", "-m", "vx500", "-o", "out.nc", "--json", "out.json")
     assert done.returncode == 0
     assert done.stdout.startswith("no benefit: run the original")
-    assert "shaping would gain" in done.stdout and "(least: 3)" in done.stdout
+    assert "shaping would gain" in done.stdout and "(required: 3)" in done.stdout
     assert (tmp_path / "out.nc").read_text() == part(SLOW)
     data = json.loads((tmp_path / "out.json").read_text())
     jsonschema.validate(data, schema(sg.Conversion))

@@ -305,7 +305,7 @@ def test_what_is_read_and_not_used_is_said() -> None:
     found = taken("N05003Q1P00000010\nN01732Q1P100\nN00103Q1P12\nN06080Q1P-5")
     said = {row.parameter: row.why for row in found.missing}
     assert "type C" in said["5003"]
-    assert "no key" in said["1732"]
+    assert "without a key" in said["1732"]
     assert "0020" in said["103"]
     assert "not used" in said["6080"]
 

@@ -104,7 +104,7 @@ def test_what_is_no_result_is_refused_and_nothing_is_written(tmp_path: Path) -> 
         (["r.json", "r.json", "-o", "both.html"], "2 results need a page each"),
         (["r.json", "-o", "r.json"], "would overwrite"),
         (["none.json"], "none.json: no such file"),
-        (["nan.json"], "NaN is no number in JSON"),
+        (["nan.json"], "NaN is not a number in JSON"),
         (["r.json", "-o", "-"], "name a file"),
     ):
         done = run(tmp_path, "report", *words)

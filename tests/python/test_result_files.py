@@ -198,10 +198,10 @@ def test_a_file_that_was_cut_off_says_where(tmp_path: Path) -> None:
     with pytest.raises(sg.ArgumentError, match="byte 0 is not UTF-8"):
         load_result(file)
     file.write_text("3")
-    with pytest.raises(sg.ArgumentError, match="the file is no object"):
+    with pytest.raises(sg.ArgumentError, match="the file is not an object"):
         load_result(file)
     file.write_text(f"[{text},{text}]")
-    with pytest.raises(sg.ArgumentError, match="holds 2 results"):
+    with pytest.raises(sg.ArgumentError, match="contains 2 results"):
         load_result(file)
     file.write_text("[" * 100_000)
     with pytest.raises(sg.ArgumentError, match=r"nested too deeply|cut off"):

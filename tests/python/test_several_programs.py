@@ -104,7 +104,7 @@ def test_time_of_all_is_the_time_of_each(tmp_path: Path) -> None:
         "blocks-O0002.csv", "blocks-ONE-O0001.csv", "blocks-PART-7.csv", "blocks-TWO-O0001.csv",
     ]  # fmt: skip
     refused = every(tmp_path, "time", "--csv", "-")
-    assert refused.returncode == 2 and "a file of its own" in refused.stderr
+    assert refused.returncode == 2 and "each program needs a file" in refused.stderr
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\n\r\r"], ids=["LF", "CR LF", "LF CR CR"])

@@ -88,9 +88,7 @@ class Answers(TomlTable):
     @classmethod
     def _plain(cls, answer: str) -> str:
         if not re.fullmatch(r"[\x20-\x7e]{1,60}", answer) or not answer.strip():
-            raise ValueError(
-                "must be 1 to 60 plain ASCII characters, since it is written into the header of programs"
-            )
+            raise ValueError("must be 1 to 60 plain ASCII characters, since it is written into the header of programs")
         return answer
 
     @model_validator(mode="after")
