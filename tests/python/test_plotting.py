@@ -227,7 +227,7 @@ def test_bad_pictures_are_refused(tmp_path: Path) -> None:
         plot_path(quarter(20), traces(), whole_mm=np.zeros((1, 3)))
     with pytest.raises(ValueError, match="programmed_mm"):
         plot_path(np.zeros((4, 2)), traces())
-    with pytest.raises(ValueError, match="no place in a grid"):
+    with pytest.raises(ValueError, match="not in a grid"):
         plot_feed([View(traces())], plot.figure(4, 4).add_axes((0, 0, 1, 1)))
     assert not list(tmp_path.iterdir())
 

@@ -152,7 +152,7 @@ def test_output_fits_80_columns_and_begins_with_the_answer(shown: Shown) -> None
 def test_what_the_json_does_not_hold_says_so(tmp_path: Path) -> None:
     """No silent emptiness in place of programs and samples."""
     result: Any = load_result(made(tmp_path, "Conversion"))
-    with pytest.raises(NotKeptError, match="placed: the JSON of a result does not hold it"):
+    with pytest.raises(NotKeptError, match="placed: the JSON of a result does not contain it"):
         len(result.placed)
     with pytest.raises(NotKeptError, match="emitted: the JSON"):
         _ = result.emitted.regions

@@ -582,5 +582,5 @@ def test_more_choices_than_conversions_are_searched() -> None:
         ask(choose={"shaping.family": []})
     with pytest.raises(MachineError, match=r"shaping\.family = \"soft\": must be"):
         ask(choose={"shaping.family": ["soft"]})
-    with pytest.raises(ArgumentError, match=r"controller\.block_time_s: the converter would know it"):
+    with pytest.raises(ArgumentError, match=r"controller\.block_time_s: the converter reads it"):
         sg.optimize(path_program(200, VX500), VX500, {"controller.block_time_s": [0.005]})
