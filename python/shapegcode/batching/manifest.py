@@ -64,7 +64,7 @@ class Manifest:
             raise
 
     def earlier(self, key: str) -> dict[str, Any] | None:
-        """The row of an earlier batch, also of a run to be repeated: it lists its files."""
+        """The row of an earlier batch, also without *resume*: it lists the files of the run."""
         at = self._known.get(short(key))
         if at is None or self._before is None:
             return None

@@ -37,7 +37,7 @@ PROGRAM = (
 JSON = ("--json", "FILE", None, "write the result as JSON to FILE; -: to standard output, without other output")
 SCRIPT = (
     "--html-script", None, ("inline", "beside"),
-    "the page's script in the page (default), or in a separate file, shared by the pages there", "inline",
+    "script inside the page (default), or in a separate file, shared by the pages of the folder", "inline",
 )  # fmt: skip
 QUIET = ("-q --quiet", None, bool, "only the answer, warnings and errors")
 AMOUNT = OneOf("verbosity", (

@@ -22,7 +22,7 @@ def take_motion(draft: Draft) -> None:
     """Read all motion data."""
     before = _limits_and_law(draft)
     _shaped_filter(draft)
-    # If the control starts every program with look-ahead on, the verdict includes that.
+    # If programs start with look-ahead on, they switch it off, and the verdict covers look-ahead left on.
     if draft.choose("verdict.look_ahead", 1604, 0):
         draft.set("emission.prologue", ("G05.1Q0",), 1604)
         draft.set("emission.epilogue", ("G05.1Q1",), 1604)
