@@ -290,7 +290,7 @@ def test_no_number_may_be_nan_or_infinite(key: str, number: str) -> None:
         (
             'name = "M"',
             'name = "Fräse"',
-            '2: name = "Fräse": malformed; short name, in plain ASCII because it is written into the header of programs',
+            '2: name = "Fräse": malformed; short name, in plain ASCII for the header of programs',
         ),
     ],
 )

@@ -191,7 +191,7 @@ class Plan:
         return len(self.sources) * len(self.lines)
 
     def job(self, rank: int) -> BatchJob:
-        """A run."""
+        """Make the run with a number."""
         line, source = self._of(rank)
         target = os.path.join(self.output, line.below, source.place)
         page = os.path.join(self.html, line.below, f"{source.place}.html") if self.html else ""

@@ -57,7 +57,7 @@ class Machine(TomlTable):
     """A machine tool and its controller, as a machine file describes them."""
 
     name: Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[\x20-\x7e]+$")] = key(
-        "short name, in plain ASCII because it is written into the header of programs"
+        "short name, in plain ASCII for the header of programs"
     )
     description: Text = key("description of the machine and origin of its values", default="")
     axes: Axes = key("limits and vibration modes of the axes")
