@@ -5,7 +5,7 @@
 >>> program = sg.Program.read("part.nc", machine)
 >>> conversion = sg.convert(program, machine)
 
-The public names stand in `__init__.pyi`, which type checkers read too. Everything is loaded on first use, so that
+The public names are listed in `__init__.pyi`, also for type checkers. Everything is loaded on first use, so that
 ``import shapegcode`` costs nothing.
 """
 
@@ -13,7 +13,7 @@ import functools
 import importlib
 from typing import Any
 
-# Names of the version before, which this one still reads.
+# Former names, still accepted.
 _RENAMED = {
     "LearnedClock": "CycleTimeCalibration",
     "LearnedNumber": "CalibratedParameter",
@@ -26,7 +26,7 @@ _RENAMED = {
 
 @functools.cache
 def _home() -> dict[str, str]:
-    """Full name of the module of each public name, as the stub says."""
+    """Module of each public name, from the stub."""
     import ast
     from pathlib import Path
 
@@ -45,7 +45,7 @@ def __getattr__(name: str) -> Any:
         new = _RENAMED[name]
         warnings.warn(f"shapegcode.{name} is shapegcode.{new} now", FutureWarning, stacklevel=2)
         return __getattr__(new)
-    # Python itself asks for names such as __path__ and _core, before anybody uses a public one.
+    # Python itself asks for names such as __path__ and _core, before a public one is used.
     if (name != "__version__" and name.startswith("_")) or name not in _home():
         raise AttributeError(f"module 'shapegcode' has no attribute {name!r}{_near(name)}")
     value = getattr(importlib.import_module(_home()[name]), name)
@@ -58,7 +58,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _near(name: str) -> str:
-    """The public name that was probably meant."""
+    """Hint with the most similar public name."""
     import difflib
 
     near = [] if name.startswith("_") else difflib.get_close_matches(name, _home(), n=1)

@@ -25,7 +25,7 @@ def main() -> int:
 
 
 def _interrupt_once_more(lost: Any) -> None:
-    """Within a finalizer Python drops what is raised: interrupt again, when that has ended."""
+    """Python ignores exceptions in a finalizer: interrupt again after it."""
     if lost.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(lost)
         return

@@ -1,8 +1,8 @@
-"""Every error of shapegcode that is the user's to mend, as one family under :class:`ShapegcodeError`.
+"""All errors of shapegcode that the user can correct, derived from :class:`ShapegcodeError`.
 
-The core's: :class:`ArgumentError`, :class:`DesignError`, :class:`NumericError`, :class:`ProgramError`. Of files of
-settings: :class:`MachineError`, :class:`ToolError`, :class:`StockError`, :class:`RunsFileError`. Of measured
-records: :class:`RecordError`. Files that cannot be read or written raise what Python raises, :class:`OSError`.
+From the core: :class:`ArgumentError`, :class:`DesignError`, :class:`NumericError`, :class:`ProgramError`. From settings
+files: :class:`MachineError`, :class:`ToolError`, :class:`StockError`, :class:`RunsFileError`. From measured
+records: :class:`RecordError`. Files that cannot be read or written raise Python's :class:`OSError`.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ def located_error(source: str, line: int, column: int, message: str, alarm: int 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong in a file of settings.
+    """One error in a settings file.
 
     Attributes:
         key: dotted name of the key, for example ``axes.x.max_feed_mm_per_min``; empty if the file is bad.
-        value: the offending value as written in TOML; empty where there is none (a missing key).
-        limit: what the value must be.
-        line: line number in the file where it is known, else None.
+        value: the offending value as written in TOML; empty for a missing key.
+        limit: rule for the value.
+        line: line number in the file, None if unknown.
     """
 
     key: str
@@ -47,11 +47,11 @@ class Problem:
 
 
 class FileError(ShapegcodeError, ValueError):
-    """A file of settings that cannot be used; the message lists every problem, one line each.
+    """A settings file that cannot be used; the message lists every problem, one line each.
 
     Attributes:
-        file: name of the file (or of what is built in).
-        problems: what is wrong, in the order of the keys.
+        file: name of the file (or of the built-in data).
+        problems: all errors, in the order of the keys.
     """
 
     def __init__(self, file: str, problems: tuple[Problem, ...]) -> None:
@@ -71,7 +71,7 @@ class ToolError(FileError):
 
 
 class StockError(FileError):
-    """A stock file that cannot be used, or that does not suit the program."""
+    """A stock file that cannot be used, or that does not match the program."""
 
 
 class RunsFileError(FileError):
@@ -79,8 +79,8 @@ class RunsFileError(FileError):
 
 
 class RecordError(ArgumentError):
-    """A record cannot be used: the message says what was found and what is needed."""
+    """A record cannot be used: the message gives the defect and the requirement."""
 
 
 class RoundTripError(ShapegcodeError):
-    """The emitted text does not say what it should: a defect of shapegcode, never of the input. Nothing is written."""
+    """The emitted program is wrong: a defect of shapegcode, never of the input. Nothing is written."""

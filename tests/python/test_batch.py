@@ -80,7 +80,7 @@ def test_the_bytes_are_those_of_the_single_command(folder: Path) -> None:
     assert ended == {
         "parts/a.nc": "ok", "parts/bad.nc": "refused", "parts/caller.nc": "ok", "parts/deep/a.nc": "ok",
     }  # fmt: skip
-    assert report["warnings"] == ["subprograms (M99), done where they are called: parts/O1234"]
+    assert report["warnings"] == ["subprograms (M99), converted where they are called: parts/O1234"]
     (refused,) = (row for row in report["rows"] if row["ended"] == "refused")
     assert "parts/bad.nc:6:1: " in refused["answer"]
     found = contents(folder / "out", folder / "pages")
@@ -299,7 +299,7 @@ def test_ctrl_c_says_how_to_go_on(folder: Path) -> None:
     process.send_signal(signal.SIGINT)
     out, err = process.communicate()
     assert process.returncode == 130, out + err
-    assert "go on with: shapegcode batch --resume parts/a.nc parts/long.nc" in out
+    assert "resume with: shapegcode batch --resume parts/a.nc parts/long.nc" in out
     assert {file.name for file in (folder / "out").iterdir()} == {"a.nc", "a.nc.json", "batch.jsonl", "summary.csv"}
 
 
@@ -320,17 +320,17 @@ def test_one_batch_at_a_time(folder: Path) -> None:
         (("nothing", *ONE), "nothing: no such file, folder or match"),
         (("lib", *ONE), "lib: no program in it; programs end in .nc"),
         (("parts/a.nc", "parts/deep/a.nc", *ONE), "would both be written to a.nc"),
-        (("@empty.txt", *ONE), "empty.txt: the list names no program"),
+        (("@empty.txt", *ONE), "empty.txt: the list contains no program"),
         (("@gone.txt", *ONE), "gone.txt:3: gone.nc: no such file, folder or match"),
-        (("@nested.txt", *ONE), "nested.txt:1: @gone.txt: a list names no lists"),
-        (("@bytes.txt", *ONE), "bytes.txt: no list of programs: it is no text"),
+        (("@nested.txt", *ONE), "nested.txt:1: @gone.txt: a list must not contain lists"),
+        (("@bytes.txt", *ONE), "bytes.txt: not a list of programs: it is not text"),
         (("parts/d*", *ONE), "parts/d*: no such file, folder or match"),
         (("only", *ONE), "only/O5: a subprogram (M99)"),
         (("parts", "-m", "mine.toml", "-o", "out"), "mine.toml: no such file"),
         (("parts", "-m", "vx500", "-m", "vx500", "-o", "out"), "two machines would be written to out/vx500"),
         (("parts", *ONE, "--", "--shaper", "none"), "--shaper"),
-        (("parts", *ONE, "--", "--json", "x.json"), "--json behind --: names a file of one run"),
-        (("parts", *ONE, "--scheduler", "tcp://127.0.0.1:9"), "no scheduler answers there"),
+        (("parts", *ONE, "--", "--json", "x.json"), "--json after --: is a file of one run"),
+        (("parts", *ONE, "--scheduler", "tcp://127.0.0.1:9"), "no answer from a scheduler"),
         (("parts", "-m", "vx500", "-o", "full"), "full/batch.jsonl: not a manifest of this version"),
     ],
     ids=str,

@@ -90,7 +90,7 @@ def test_the_command_says_it_first(tmp_path: Path) -> None:
     done = run(tmp_path, "convert", "slow.nc", "-m", "vx500", "-o", "out.nc", "--json", "out.json")
     assert done.returncode == 0
     assert done.stdout.startswith("no benefit: run the original")
-    assert "shaping would gain" in done.stdout and "(least: 3)" in done.stdout
+    assert "shaping would gain" in done.stdout and "(required: 3)" in done.stdout
     assert (tmp_path / "out.nc").read_text() == part(SLOW)
     data = json.loads((tmp_path / "out.json").read_text())
     jsonschema.validate(data, schema(sg.Conversion))
@@ -125,12 +125,14 @@ def test_no_benefit_names_the_moving_axes_of_which_nobody_knows_a_mode() -> None
     ):
         conversion = convert(along_y, MACHINE.with_values(keys), shape_all=False).conversion
         assert conversion.nothing_shaped
-        assert any(warning.startswith("Y moves, and whether") for warning in conversion.warnings) == named
+        assert (
+            any(warning.startswith("Y moves, but it is not known whether") for warning in conversion.warnings) == named
+        )
 
 
 def test_no_benefit_asks_for_the_unit_first() -> None:
     conversion = convert(part(SLOW).replace("G21", ""), MACHINE, shape_all=False).conversion
-    assert conversion.nothing_shaped and conversion.next_step.startswith("make sure of the unit")
+    assert conversion.nothing_shaped and conversion.next_step.startswith("check the unit")
     assert "power_on.units=G20" in conversion.next_step
 
 

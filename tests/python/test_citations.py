@@ -114,7 +114,7 @@ def test_what_no_json_holds_is_said(tmp_path: Path) -> None:
     program = ROOT / "python" / "shapegcode" / "data" / "paper_path.nc"
     file = tmp_path / "s.json"
     assert main(["simulate", str(program), "-m", "vx500", "--json", str(file), "-q"]) == 0
-    with pytest.raises(NotKeptError, match="run the command with --cite"):
+    with pytest.raises(NotKeptError, match="use --cite"):
         sg.load_result(file).citations  # noqa: B018
 
 

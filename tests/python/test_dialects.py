@@ -418,8 +418,8 @@ def test_what_a_shop_states_is_written() -> None:
     ("keys", "message"),
     [
         ({"emission.dialect": "okuma"}, "emission.dialect"),
-        ({"emission.words": {"M88": "M61"}}, "counts only where emission.dialect is another one"),
-        ({"emission.dialect": "haas", "emission.words": {"X": "Y"}}, "is no G or M code"),
+        ({"emission.words": {"M88": "M61"}}, "has an effect only if emission.dialect is not fanuc"),
+        ({"emission.dialect": "haas", "emission.words": {"X": "Y"}}, "is not a G or M code"),
         ({"emission.dialect": "haas", "emission.words": {"M8": "M8", "M08": "M9"}}, "a code is named twice"),
         ({"emission.dialect": "haas", "controller.block_time_s": 0.0005}, "controller.block_time_s = 0.0005"),
         ({"emission.dialect": "linuxcnc", "emission.prologue": ["G05.1Q0"]}, "a quadratic spline on LinuxCNC"),

@@ -305,7 +305,7 @@ def test_what_is_read_and_not_used_is_said() -> None:
     found = taken("N05003Q1P00000010\nN01732Q1P100\nN00103Q1P12\nN06080Q1P-5")
     said = {row.parameter: row.why for row in found.missing}
     assert "type C" in said["5003"]
-    assert "no key" in said["1732"]
+    assert "without a key" in said["1732"]
     assert "0020" in said["103"]
     assert "not used" in said["6080"]
 
@@ -343,7 +343,7 @@ def test_tables_of_offsets_and_variables(tmp_path: Path) -> None:
     # 40B1940000000000 is the double 4500.0; all ones is a vacant variable.
     assert read.variables == {"504": 4500.0}
     assert any("#100" in row.why for row in found.missing)
-    assert any("1 of 2 tool offsets are zero" in row.why for row in found.missing)
+    assert any("1 of 2 tool offsets are all zero" in row.why for row in found.missing)
     assert {row.key for row in found.tables_read} >= {"input.variables", "input.tool_length_mm", "input.work_offsets"}
 
 

@@ -85,7 +85,7 @@ def test_convert_takes_a_text_a_file_and_a_program(tmp_path: Path) -> None:
     by_name = sg.convert(TEXT, "vx500")
     assert by_name.text == sg.convert(file, sg.Machine.load("vx500")).text
     assert by_name.text == sg.convert(sg.Program.read(TEXT, "vx500"), "vx500").text
-    with pytest.raises(sg.ArgumentError, match="a Machine, a file or a built-in name is needed, not int"):
+    with pytest.raises(sg.ArgumentError, match="must be a Machine, a file or a built-in name, not int"):
         sg.convert(TEXT, 5)  # type: ignore[arg-type]
 
 
@@ -114,7 +114,7 @@ def test_a_simple_machine() -> None:
     assert [mode.frequency_hz for mode in machine.axes.y.modes] == [131.0, 200.0]
     assert machine.axes.z.modes == ()
     assert sg.convert(TEXT, machine).machine == "simple"
-    with pytest.raises(sg.ArgumentError, match="'a' is no axis"):
+    with pytest.raises(sg.ArgumentError, match="'a' is not an axis"):
         sg.Machine.simple(modes={"a": 46})
     with pytest.raises(sg.MachineError, match="frequency_hz"):
         sg.Machine.simple(modes={"x": -46})

@@ -312,7 +312,7 @@ def test_what_is_refused_before_the_work(
         ([taps[0], "--update", str(mine)], "must be a text"),
         ([taps[0], "--update", str(tmp_path / "none.toml")], "no such file"),
         ([taps[0], "--json", taps[0]], "would overwrite"),
-        ([taps[0], "-m", str(mine)], "--update names the machine file"),
+        ([taps[0], "-m", str(mine)], "--update gives the machine file"),
         ([str(tmp_path / "none.csv")], "no such file"),
     ):
         assert main(["identify", *words]) == 2

@@ -76,7 +76,7 @@ def test_inches(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("[TRAJ]", "[PATH]", "no INI file of LinuxCNC"),
+        ("[TRAJ]", "[PATH]", "not an INI file of LinuxCNC"),
         ("MAX_VELOCITY = 100", "MAX_VELOCITY = fast", r'\[AXIS_Y\] MAX_VELOCITY = "fast": must be a number'),
         ("MAX_ACCELERATION = 1000\n", "", r"\[AXIS_Z\] MAX_ACCELERATION: is missing"),
         ("UNITS = mm", "UNITS = furlong", r'LINEAR_UNITS = "furlong": must be mm or inch'),

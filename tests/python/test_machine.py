@@ -290,7 +290,7 @@ def test_no_number_may_be_nan_or_infinite(key: str, number: str) -> None:
         (
             'name = "M"',
             'name = "Fräse"',
-            '2: name = "Fräse": malformed; short name, in plain ASCII because it goes into the header of programs',
+            '2: name = "Fräse": malformed; short name, in plain ASCII for the header of programs',
         ),
     ],
 )
@@ -364,7 +364,7 @@ def test_message_has_file_line_key_value_and_limit(old: str, new: str, message: 
         ),
         (
             "[input]\nwork_offsets = {G60 = [1, 2, 3]}\n",
-            '16: input.work_offsets: G60 is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"',
+            '16: input.work_offsets: G60 is not a work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"',
         ),
         (
             "[emission]\nblock_period_s = 0.0125\n",
@@ -378,7 +378,7 @@ def test_message_has_file_line_key_value_and_limit(old: str, new: str, message: 
         (
             '[emission]\nprologue = ["%"]\n',
             '16: emission.prologue = ["%"]: the line "%" has a character other than capital letters, '
-            "digits and signs that a program may hold (no %, no end of line)",
+            "digits and signs allowed in a program (no %, no end of line)",
         ),
         (
             "[emission]\nprologue = ['" + "X" * 61 + "']\n",

@@ -247,7 +247,7 @@ def test_a_file_written_by_hand() -> None:
 def test_a_line_that_could_not_stay_as_it_is_is_refused_with_its_number() -> None:
     text = HAND.replace("[axes.y]", '[ axes . "y" ]').replace("[[axes.y.modes]]", "[[ axes . y . modes ]]")
     line = text.splitlines().index("  [[ axes . y . modes ]]  # first") + 1
-    with pytest.raises(ArgumentError, match=rf"mine.toml:{line}: .*cannot be kept as it is: write it as"):
+    with pytest.raises(ArgumentError, match=rf"mine.toml:{line}: .*cannot be kept unchanged: write it as"):
         update_modes(text, "y", [tap(41.0)], source="s", file="mine.toml")
     with pytest.raises(MachineError, match="contour_um"):
         update_modes(VX500.replace("contour_um = 20", "contour_um = -5"), "x", [tap(46.0)], source="s")

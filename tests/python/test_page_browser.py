@@ -165,7 +165,7 @@ def test_without_a_script_it_is_read(chrome: Browser, folder: Path) -> None:
         words = chrome.one("body").text
         chrome.keep("without-script")
         assert chrome.one("#theme").is_displayed() is False
-    for part in ("Why:", "What it gains", "cycle time", "Run sheet", "JavaScript is off in this browser"):
+    for part in ("Why:", "Before and after", "cycle time", "Run sheet", "JavaScript is off in this browser"):
         assert part in words
     assert "loading" not in words
 
@@ -211,7 +211,7 @@ def test_on_paper_it_has_four_pages(chrome: Browser, folder: Path) -> None:
     pages = [unicodedata.normalize("NFKC", page.extract_text()) for page in paper.pages]
     assert len(pages) <= 4
     (sheet,) = [page for page in pages if "Run sheet" in page]
-    assert "What it gains" not in sheet
+    assert "Before and after" not in sheet
     assert "first run" in sheet
     assert any("Path from above" in page for page in pages)
     assert not any("Colour by" in page or "Play" in page for page in pages)

@@ -147,7 +147,7 @@ def test_no_line_joins_the_two_sides_of_a_rounded_corner() -> None:
     steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
     assert np.isnan(steps).sum() == 2  # to the gap, and from it
     assert np.nanmax(steps) < 0.3
-    assert "rounds corners off" in " ".join(text.get_text() for text in panel.texts)
+    assert "rounds corners" in " ".join(text.get_text() for text in panel.texts)
 
 
 def test_numbers_in_titles_are_never_powers_of_ten() -> None:
@@ -184,9 +184,9 @@ def test_a_long_region_shows_its_worst_place_and_its_stop(tmp_path: Path, monkey
     conversion = convert(Program.from_text(LONG.encode(), machine, source="long"), machine, shape_all=True)
     assert len(conversion.save_plots(tmp_path)) == 8
     text = svg_text(tmp_path / "path.svg")
-    assert "around the worst place of the original" in text and "on the whole path" in text
+    assert "around the worst position of the original" in text and "on the whole path" in text
     text = svg_text(tmp_path / "vibration.svg")
-    assert "the worst place, at" in text and "the stop, at" in text and "come to rest" in text
+    assert "worst position, at" in text and "the stop, at" in text and "come to rest" in text
 
     monkeypatch.setattr(pictures, "RECORD_SAMPLES", 20_000)
     conversion.save_plots(tmp_path)
@@ -227,7 +227,7 @@ def test_bad_pictures_are_refused(tmp_path: Path) -> None:
         plot_path(quarter(20), traces(), whole_mm=np.zeros((1, 3)))
     with pytest.raises(ValueError, match="programmed_mm"):
         plot_path(np.zeros((4, 2)), traces())
-    with pytest.raises(ValueError, match="no place in a grid"):
+    with pytest.raises(ValueError, match="not in a grid"):
         plot_feed([View(traces())], plot.figure(4, 4).add_axes((0, 0, 1, 1)))
     assert not list(tmp_path.iterdir())
 

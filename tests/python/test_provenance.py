@@ -274,7 +274,7 @@ def test_origins_survive_writing_reading_and_changing() -> None:
 
 
 def test_a_mode_and_rigid_contradict_each_other() -> None:
-    with pytest.raises(sg.MachineError, match="rigid is true, and there are modes"):
+    with pytest.raises(sg.MachineError, match="rigid is true, but there are modes"):
         machine_with({"axes.x.rigid": True})
 
 

@@ -68,7 +68,7 @@ def test_a_page_made_later_is_the_same(tmp_path: Path) -> None:
     ("change", "said"),
     [
         (lambda folder: (folder / "part.nc").write_text("M30\n"), "input part.nc was changed since"),
-        (lambda folder: (folder / "out.nc").unlink(), "output out.nc is not where it was"),
+        (lambda folder: (folder / "out.nc").unlink(), "output out.nc was not found"),
         (lambda folder: edit(folder / "r.json", by="shapegcode 0.0.9"), "made by shapegcode 0.0.9; this page by"),
         (lambda folder: edit(folder / "r.json", format=7), "provenance.format = 7: written by"),
         (lambda folder: edit(folder / "r.json", command="shapegcode convert --unheard"), "its command cannot be read"),
@@ -104,7 +104,7 @@ def test_what_is_no_result_is_refused_and_nothing_is_written(tmp_path: Path) -> 
         (["r.json", "r.json", "-o", "both.html"], "2 results need a page each"),
         (["r.json", "-o", "r.json"], "would overwrite"),
         (["none.json"], "none.json: no such file"),
-        (["nan.json"], "NaN is no number in JSON"),
+        (["nan.json"], "NaN is not a number in JSON"),
         (["r.json", "-o", "-"], "name a file"),
     ):
         done = run(tmp_path, "report", *words)

@@ -152,7 +152,7 @@ def test_output_fits_80_columns_and_begins_with_the_answer(shown: Shown) -> None
 def test_what_the_json_does_not_hold_says_so(tmp_path: Path) -> None:
     """No silent emptiness in place of programs and samples."""
     result: Any = load_result(made(tmp_path, "Conversion"))
-    with pytest.raises(NotKeptError, match="placed: the JSON of a result does not hold it"):
+    with pytest.raises(NotKeptError, match="placed: the JSON of a result does not contain it"):
         len(result.placed)
     with pytest.raises(NotKeptError, match="emitted: the JSON"):
         _ = result.emitted.regions
@@ -198,10 +198,10 @@ def test_a_file_that_was_cut_off_says_where(tmp_path: Path) -> None:
     with pytest.raises(sg.ArgumentError, match="byte 0 is not UTF-8"):
         load_result(file)
     file.write_text("3")
-    with pytest.raises(sg.ArgumentError, match="the file is no object"):
+    with pytest.raises(sg.ArgumentError, match="the file is not an object"):
         load_result(file)
     file.write_text(f"[{text},{text}]")
-    with pytest.raises(sg.ArgumentError, match="holds 2 results"):
+    with pytest.raises(sg.ArgumentError, match="contains 2 results"):
         load_result(file)
     file.write_text("[" * 100_000)
     with pytest.raises(sg.ArgumentError, match=r"nested too deeply|cut off"):

@@ -86,7 +86,7 @@ def test_numbers_are_written_as_a_person_would() -> None:
         "before": {"original": None, "emitted": 1e-12},
     }
     assert "-0" not in to_text(plain(part))
-    with pytest.raises(TypeError, match="bytes has no form in JSON"):
+    with pytest.raises(TypeError, match="bytes cannot be written as JSON"):
         plain({"a": b"x"})
     with pytest.raises(ValueError, match="not JSON compliant"):
         to_text(math.inf)

@@ -211,7 +211,7 @@ def test_machine_file_and_command(tmp_path: Path) -> None:
         assert message in done.stderr.replace("\n", " ")
     done = run(tmp_path, "characterize", "--fit", "x", "-m", "vx500", "--drive")
     assert done.returncode == 2
-    assert "--drive: goes with --servo alone" in done.stderr
+    assert "--drive: only with --servo" in done.stderr
 
 
 def test_a_csv_log(tmp_path: Path) -> None:

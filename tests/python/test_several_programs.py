@@ -82,7 +82,7 @@ def test_every_program_has_its_table_and_its_place_in_the_json(words: list[str],
     assert [report["program_address"] for report in reports] == DONE
     lines = told.stdout.splitlines()
     assert [line.rstrip(":") for line in lines if line.rstrip(":") in DONE] == DONE
-    assert "called by others and done there: O0003" in lines
+    assert "called by others and expanded there: O0003" in lines
     alone = run(tmp_path, words[0], "all.nc", "-m", "vx500", "--program", "O2", "--json", "one.json", *words[1:])
     one = json.loads((tmp_path / "one.json").read_text())
     ours = {key: value for key, value in reports[1].items() if key != "program_address"}
@@ -104,7 +104,7 @@ def test_time_of_all_is_the_time_of_each(tmp_path: Path) -> None:
         "blocks-O0002.csv", "blocks-ONE-O0001.csv", "blocks-PART-7.csv", "blocks-TWO-O0001.csv",
     ]  # fmt: skip
     refused = every(tmp_path, "time", "--csv", "-")
-    assert refused.returncode == 2 and "a file of its own" in refused.stderr
+    assert refused.returncode == 2 and "each program needs a file" in refused.stderr
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\n\r\r"], ids=["LF", "CR LF", "LF CR CR"])
@@ -181,7 +181,7 @@ def test_each_emitted_program_is_held_against_its_own_header(tmp_path: Path) -> 
     assert list(found) == DONE
     assert not any({"edited", "unmarked"} & each for each in found.values())
     told = run(tmp_path, "time", "out.nc", "-m", "vx500", "--program", "all")
-    assert "nothing calls any more, as the shaped programs hold their moves: O0003" in told.stdout
+    assert "no longer called, since the shaped programs contain their moves: O0003" in told.stdout
     alone = run(tmp_path, "check", "out.nc", "-m", "vx500", "--program", "O3")
     assert "no region is marked" not in alone.stdout and "was changed" not in alone.stdout
     for number in (2, "O2", "#2"):
@@ -233,7 +233,7 @@ def test_programs_whose_calls_were_kept_stand_behind_the_one_that_was_asked_for(
     checked = run(tmp_path, "check", "out.nc", "-m", "vx500", "--program", "O1", "--json", "c.json")
     found = json.loads((tmp_path / "c.json").read_text())
     assert checked.returncode == 0 and "edited" not in found["counts_by_code"]
-    # All of them: the two are done there, and stand as they were.
+    # All of them: the two are expanded there, and unchanged.
     every(tmp_path, "convert", "--shape-all", "-o", "whole.nc")
     whole = (tmp_path / "whole.nc").read_bytes()
     assert [place.address for place in programs_of(whole)] == ["O0001", "O0002", "O0003", "O0004"]

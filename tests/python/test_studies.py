@@ -224,7 +224,7 @@ def test_draws_without_a_text_are_out_of_tolerance_and_listed() -> None:
     found = sg.study(path_program(200, VX500), VX500, vary, n=16)
     assert (found.n, found.within) == (8, 0.5)
     assert [each.draws for each in found.refused] == [8]
-    assert "8 of 16 draws have no text" in found.warnings[0]
+    assert "8 of 16 samples have no program" in found.warnings[0]
 
 
 def test_the_dataset_has_every_draw_with_units() -> None:
@@ -291,7 +291,7 @@ def test_the_command_draws_and_writes_its_page(tmp_path: Path) -> None:
     done = run(written(tmp_path), "study", "STUDY.toml", "--html", "s.html", "--plots", "plots")
     assert done.returncode == 0, done.stderr
     assert {file.name for file in (tmp_path / "plots").iterdir()} >= {"study-tornado.png", "study-bands.svg"}
-    assert "What decides the verdict" in (tmp_path / "s.html").read_text()
+    assert "Influence on the verdict" in (tmp_path / "s.html").read_text()
 
 
 @pytest.mark.parametrize(
@@ -441,7 +441,7 @@ def test_a_choice_that_nothing_bears_is_code_1_and_draws_none(tmp_path: Path) ->
     done = run(written(tmp_path, text), "optimize", "STUDY.toml", "--set", "tolerance.contour_um=0.2", "--plots", "p")
     assert done.returncode == 1, done.stderr
     assert done.stdout.startswith("none of 4 choices stays within tolerance on 95 % of the machines")
-    assert "pictures: there are none of this result" in done.stdout
+    assert "pictures: this result has none" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -453,10 +453,10 @@ def test_a_choice_that_nothing_bears_is_code_1_and_draws_none(tmp_path: Path) ->
         ("shaping.family", "axes.x.modes.1.frequency_hz", "either sampled or chosen"),
         ("n = 40", "most = 0", "STUDY.toml:3: most = 0: must be 1 or more"),
         ("n = 40", "n = 400000", "n = 400000: must be at most 250000"),
-        ("sd = 2.0", "sd = 2.0, known = true", "it belongs into choose"),
+        ("sd = 2.0", "sd = 2.0, known = true", "put it into choose"),
         ("x.modes.1", "x.modes.0", "counts from 1, and there is 1"),
         ("part.nc", "nothing.nc", "no such file"),
-        ('machine = "vx500"', "", "no machine: name one there, or with -m"),
+        ('machine = "vx500"', "", "no machine: give one there, or with -m"),
     ],
 )
 def test_bad_choices_name_key_value_and_limit(tmp_path: Path, old: str, new: str, said: str) -> None:
@@ -471,7 +471,7 @@ def test_bad_arguments_name_key_value_and_limit() -> None:
     ask = partial(sg.study, path_program(200, VX500), VX500)
     with pytest.raises(ArgumentError, match="nothing is varied"):
         ask({})
-    with pytest.raises(ArgumentError, match="n = 0: must be a whole number of draws, 1 or more"):
+    with pytest.raises(ArgumentError, match="n = 0: must be a whole number of samples, 1 or more"):
         ask({X_HZ: [45.0]}, n=0)
     with pytest.raises(ArgumentError, match="46: must be a distribution or a list of values"):
         ask({X_HZ: 46})
@@ -482,7 +482,7 @@ def test_bad_arguments_name_key_value_and_limit() -> None:
     with pytest.raises(MachineError, match=r"axes\.x\.mode: no such key"):
         ask({"axes.x.mode": [45.0]})
     for keys in ([X_HZ], {1: [45.0]}):
-        with pytest.raises(ArgumentError, match=r"vary = .*: must go by keys of the machine file"):
+        with pytest.raises(ArgumentError, match=r"vary = .*: must be a mapping by keys of the machine file"):
             ask(keys)
     with pytest.raises(ArgumentError, match=r"n = 1000000000000: .* at most 1000000"):
         ask({X_HZ: [45.0]}, n=10**12)
@@ -576,11 +576,11 @@ def test_more_choices_than_conversions_are_searched() -> None:
         ask(most=0)
     with pytest.raises(ArgumentError, match="most = '3': must be a whole number of conversions"):
         ask(most="3")
-    with pytest.raises(ArgumentError, match=r"choose = \['zv'\]: must go by keys of the machine file"):
+    with pytest.raises(ArgumentError, match=r"choose = \['zv'\]: must be a mapping by keys of the machine file"):
         ask(choose=["zv"])
     with pytest.raises(ArgumentError, match="must be a list of one value or more"):
         ask(choose={"shaping.family": []})
     with pytest.raises(MachineError, match=r"shaping\.family = \"soft\": must be"):
         ask(choose={"shaping.family": ["soft"]})
-    with pytest.raises(ArgumentError, match=r"controller\.block_time_s: the converter would know it"):
+    with pytest.raises(ArgumentError, match=r"controller\.block_time_s: the converter reads it"):
         sg.optimize(path_program(200, VX500), VX500, {"controller.block_time_s": [0.005]})

@@ -412,7 +412,7 @@ def test_the_table_is_not_written_over_a_tool_file(tmp_path: Path, capsys: pytes
     file = saved(tmp_path / "a.csv", radial_depth_mm=depth, fx_n=force[:, 0], fy_n=force[:, 1])
     tool = tmp_path / "tool.toml"
     assert main(["testcut", "fit", file, "--cut", str(tmp_path / "CUT.json"), "-o", str(tool)]) == 2
-    assert "holds more than [cutting] (tool), which would be lost" in capsys.readouterr().err
+    assert "contains more than [cutting] (tool), which would be lost" in capsys.readouterr().err
     assert tool.read_text(encoding="utf-8") == TOOL
 
 
@@ -502,7 +502,7 @@ def test_bad_arguments_of_the_fit_are_refused(tmp_path: Path, capsys: pytest.Cap
         ([f"3={file}", *cut], "pass 3: the test cut has 2 passes"),
         ([file, f"1={file}", *cut], "pass 1 is given twice"),
         ([file, *cut, "--edge-forces"], "edge forces and chip thickness go with a taper"),
-        ([file, *cut, "-o", str(tmp_path / "c.toml")], "describes a corner: -o goes with a taper"),
+        ([file, *cut, "-o", str(tmp_path / "c.toml")], "describes a corner: -o only with a taper"),
         ([file, "--cut", file], "not valid JSON"),
         ([file, *cut, "--json", file], "would overwrite"),
         ([file, *cut], "a table of means: a corner needs"),

@@ -318,7 +318,7 @@ def test_a_program_that_takes_no_time(folder: Path, capsys: pytest.CaptureFixtur
         (["part.nc", "-m", "kimm004", "--override", "0"], "above 0 and at most 254%"),
         (["part.nc", "-m", "kimm004", "--override", "255%"], "above 0 and at most 254%"),
         (["part.nc", "-m", "kimm004", "--rapid-override", "101%"], "above 0 and at most 100%"),
-        (["part.nc", "-m", "kimm004", "--override", "fast"], "is no number"),
+        (["part.nc", "-m", "kimm004", "--override", "fast"], "is not a number"),
         (["part.nc", "-m", "kimm004", "--csv", "-", "--json", "-"], "only one of them"),
         (["part.nc", "-m", "kimm004", "--csv", "part.nc"], "would overwrite"),
         (["part.nc", "-m", "kimm004", "--csv", "x", "--json", "x"], "would overwrite"),

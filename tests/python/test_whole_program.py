@@ -258,7 +258,7 @@ def test_only_and_leave_choose_cuts_by_their_lines(tmp_path: Path) -> None:
     first, _, square, _ = (cut.lines for cut in free.cuts)
     only = converted(MIXED, machine, only=[square])
     assert [cut.lines for cut in only.regions] == [square]
-    assert {cut.reason for cut in only.cuts if not cut.is_shaped} == {"not chosen by --only"}
+    assert {cut.reason for cut in only.cuts if not cut.is_shaped} == {"not listed in --only"}
     (tmp_path / "part.nc").write_text(MIXED)
     lines = "{}-{}".format(*first)
     done = run(tmp_path, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--leave", lines, "--json", "out.json",
@@ -382,7 +382,7 @@ def test_shaped_rapids_stay_within_the_price_too() -> None:
 
 
 def test_a_cut_that_is_chosen_and_left_is_refused() -> None:
-    with pytest.raises(sg.ShapegcodeError, match="--only and --leave both name the cut in lines 8 to"):
+    with pytest.raises(sg.ShapegcodeError, match="--only and --leave both contain the cut in lines 8 to"):
         converted(MIXED, machine_with({}), only=[(8, 20)], leave=[(10, 12)])
 
 

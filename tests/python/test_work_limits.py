@@ -204,7 +204,7 @@ def test_a_region_too_long_for_one_piece_keeps_its_text_and_is_named(monkeypatch
     text = f"{HEAD}G01 X200. F2000\nY100.\nX0\nG00 Z50.\nX0 Y0\nG01 X10. F2000\nY20.\n{END}"
     converted = sg.convert(sg.Program.from_text(text, machine), machine, shape_all=True)
     assert b"\nG01 X200. F2000\nY100.\nX0\n" in converted.text
-    assert any("more than can be shaped in one piece" in warning for warning in converted.warnings)
+    assert any("exceed what can be shaped at a time" in warning for warning in converted.warnings)
     assert len(converted.placed) == 1
 
 

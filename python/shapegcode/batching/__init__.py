@@ -1,1 +1,1 @@
-"""Many programs, machines and processes: a command over all of them, resumed where it stopped."""
+"""Batch runs: a command on many programs and machines, in many processes, resumable."""

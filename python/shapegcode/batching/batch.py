@@ -1,4 +1,4 @@
-"""A command over many programs and machines: each run in a process of its own, each result complete or absent."""
+"""A command on many programs and machines: each run in a separate process, each result complete or absent."""
 
 from __future__ import annotations
 
@@ -40,33 +40,33 @@ def batch(
     memory_limit_bytes: int = 0,
     on_progress: OnBatch = lambda _share, _text: None,
 ) -> Batch:
-    """Run a command over programs and machines, and record the results.
+    """Run a command on programs and machines, and record the results.
 
-    Each run has a process of its own; a crash of one is a row of the result. Outputs, JSON and page of a run are those
-    of the single command to the byte, and appear complete or not at all. ``batch.jsonl`` in the output folder says what
-    is done.
+    Each run has a separate process; a crash is a row of the result. Outputs, JSON and page of a run are identical to
+    those of the single command, and appear complete or not at all. ``batch.jsonl`` in the output folder lists
+    finished runs.
 
     Args:
         programs: files, folders, patterns, and ``@LIST`` files, see `find_programs`.
-        machines: files or built-in names; several make the product, each in a folder of its name.
+        machines: files or built-in names; with several, every program runs on each, in folders of their names.
         output: folder of the results.
         command: "convert", "time", "check", "feed", "measure" or "simulate".
-        options: further words of the command line; a word that is a file travels with each run.
-        jobs: processes at a time; 0: as many as there are processors.
+        options: further arguments of the command line; files among them are sent with each run.
+        jobs: parallel processes; 0: one per processor.
         cluster: run on Dask instead; None: on this machine.
-        resume: do only what is missing, has failed or has changed since.
-        html: folder of a page for each run, and an index of them; None: none.
-        time_limit_s: of a run; 0: none.
-        memory_limit_bytes: of a run, beyond what is loaded; 0: none.
-        on_progress: called with the share that is done and with words.
+        resume: run only what is missing, failed or changed.
+        html: folder for a page of each run, and an index; None: no pages.
+        time_limit_s: time limit of a run; 0: none.
+        memory_limit_bytes: memory limit of a run, beyond the loaded program; 0: none.
+        on_progress: called with the finished ratio and a text.
 
     Returns:
         A row for each run.
 
     Raises:
         ArgumentError: nothing to do, another batch writes there, or a bad value.
-        MachineError: a machine is none.
-        OSError: a full disk, a file that cannot be read; what was done until then stays, and `resume` goes on.
+        MachineError: an invalid machine.
+        OSError: a full disk, an unreadable file; finished runs are kept, and `resume` continues.
     """
     if command not in COMMANDS:
         raise ArgumentError(f"command {command}: must be one of {', '.join(COMMANDS)}")
@@ -82,18 +82,18 @@ def batch(
         called = [source.path for source in sources if source.subprogram]
         sources = tuple(source for source in sources if not source.subprogram)
         if not sources:
-            raise ArgumentError(f"{called[0]}: a subprogram (M99), as all that were named: name what calls them")
+            raise ArgumentError(f"{called[0]}: a subprogram (M99), like all given programs: give their callers")
         base = Base(base_folder(output) if resume else os.getcwd())
         planned = plan(sources, [str(each) for each in machines], str(output), command, options, html, base)
-        # A scheduler that does not answer is found before anything is written; processes of this machine end before
-        # the folder goes that they work in.
+        # The scheduler is tried before anything is written; local processes end before
+        # their working folder is removed.
         remote = None if cluster is None else stack.enter_context(cluster_executor(cluster, processes))
         manifest = Manifest(Path(output), resume=resume, base=base.folder)
         stack.callback(manifest.close)
         if html is not None:
             Path(html).mkdir(parents=True, exist_ok=True)
         scratch = Path(output) / _SCRATCH
-        # What a batch that was killed has left goes before this one writes.
+        # Remove remains of a killed batch first.
         shutil.rmtree(scratch, ignore_errors=True)
         for file in (file for folder in folders for file in folder.rglob(".*.tmp") if is_temporary(file)):
             file.unlink(missing_ok=True)
@@ -121,5 +121,5 @@ def _warnings(stopped: str, called: Sequence[str]) -> tuple[str, ...]:
     found = [f"stopped: {stopped}"] if stopped else []
     if called:
         more = f" and {len(called) - _NAMED} more" if len(called) > _NAMED else ""
-        found.append(f"subprograms (M99), done where they are called: {', '.join(called[:_NAMED])}{more}")
+        found.append(f"subprograms (M99), converted where they are called: {', '.join(called[:_NAMED])}{more}")
     return tuple(found)

@@ -1,6 +1,6 @@
-"""What a batch has done, row by row: a file of JSON lines that outlives it, and stays on the disk.
+"""Manifest of a batch: a file of JSON lines, one per finished run, kept for resuming.
 
-The first line says what the file is; of several rows with one key the last counts, and none that was cut off.
+The first line identifies the file; of several rows with one key the last counts; truncated rows are ignored.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ def base_folder(output: str | Path) -> str:
 
 
 def short(text: str) -> bytes:
-    """Sixteen bytes that stand for a text of any length."""
+    """Sixteen-byte hash of a text."""
     return hashlib.blake2b(os.fsencode(text), digest_size=16).digest()
 
 
 class Manifest:
-    """The manifest of an output folder, held by one batch at a time."""
+    """The manifest of an output folder, locked by one batch at a time."""
 
     def __init__(self, folder: Path, *, resume: bool, base: str = "") -> None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -50,7 +50,7 @@ class Manifest:
         self._old, self._new = array("q"), array("q")
         self._lock = _locked(folder)
         try:
-            # The file of before stays open, so that its rows can be read though a new one has its name.
+            # The former file stays open, so that its rows can be read after a new one has its name.
             with contextlib.suppress(FileNotFoundError):
                 self._before = self.path.open("rb")
                 _base_of(self._before, folder)
@@ -64,7 +64,7 @@ class Manifest:
             raise
 
     def earlier(self, key: str) -> dict[str, Any] | None:
-        """The row of an earlier batch, also one that is forgotten: its files are known by it."""
+        """The row of an earlier batch, also without *resume*: it lists the files of the run."""
         at = self._known.get(short(key))
         if at is None or self._before is None:
             return None
@@ -73,11 +73,11 @@ class Manifest:
         return row
 
     def kept_at(self, key: str) -> int:
-        """Where the row of an earlier batch stands now."""
+        """Present position of the row of an earlier batch."""
         return self._new[bisect.bisect_left(self._old, self._known[short(key)])]
 
     def add(self, row: Mapping[str, Any]) -> int:
-        """Write a row, to the disk itself."""
+        """Write a row and flush it to the disk."""
         with named_errors(self.path):
             end = self._stream.tell()
             try:
@@ -91,7 +91,7 @@ class Manifest:
         return end
 
     def close(self) -> None:
-        """Let others write into the folder."""
+        """Release the lock of the folder."""
         with contextlib.suppress(AttributeError, OSError):
             self._stream.close()
         if self._before is not None:
@@ -99,7 +99,7 @@ class Manifest:
         os.close(self._lock)
 
     def _rows(self) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Rows of before and where they begin, from where the file is read."""
+        """Yield former rows and their positions, from the present position of the file."""
         assert self._before is not None
         at = self._before.tell()
         for line in self._before:
@@ -122,10 +122,10 @@ class Manifest:
 
 
 def _locked(folder: Path) -> int:
-    """Lock a folder, and return what unlocks it when closed; the lock vanishes with the process."""
+    """Lock a folder; closing the returned descriptor unlocks it, as does the end of the process."""
     lock = -1
     try:
-        if sys.platform == "win32":  # deleted by the system when it is closed
+        if sys.platform == "win32":  # deleted by the system on closing
             return os.open(folder / ".batch.lock", os.O_CREAT | os.O_EXCL | os.O_TEMPORARY)
         import fcntl
 
@@ -134,17 +134,17 @@ def _locked(folder: Path) -> int:
     except (BlockingIOError, FileExistsError):
         if lock >= 0:
             os.close(lock)
-        raise ArgumentError(f"{folder}: another batch is writing there; wait for it or name another folder") from None
+        raise ArgumentError(f"{folder}: another batch is writing there; wait for it or use another folder") from None
     return lock
 
 
 def _base_of(stream: BinaryIO, output: str | Path) -> str:
-    """What the first line says; empty: there is none."""
+    """Base folder from the first line; empty: there is none."""
     line, head = stream.readline(), None
     with contextlib.suppress(ValueError):
         head = json.loads(line)
     folder = head.pop(_FOLDER, None) if isinstance(head, dict) else None
     if line and (head != _HEAD or not isinstance(folder, str)):
         file = Path(output) / MANIFEST
-        raise ArgumentError(f"{file}: not a manifest of this version; name another folder or remove it")
+        raise ArgumentError(f"{file}: not a manifest of this version; use another folder or remove it")
     return os.path.normpath(Path(output).absolute() / folder) if isinstance(folder, str) else ""

@@ -1,4 +1,4 @@
-"""The runs of a batch: programs times machines, each with the words of its command line and the files it reads."""
+"""The runs of a batch: programs times machines, each with its command line and the files it reads."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ _COMPUTED = re.compile(rb"P *[\[#]", re.IGNORECASE)
 class Source:
     """A program of a batch."""
 
-    path: str  # as it was given
-    place: str  # where its results go below the output folder: its path below the folder that was given
-    # it stands in a folder that was given, and only returns to who called it: it is done there
+    path: str  # as given
+    place: str  # position of its results in the output folder: its path below the given folder
+    # found in a given folder, and only returns to its caller: converted there
     subprogram: bool = False
 
 
 def find_programs(given: Sequence[str], output: str | Path) -> tuple[Source, ...]:
-    """The programs that folders, patterns and lists name."""
+    """Find the programs of folders, patterns and lists."""
     found: list[Source] = []
     files, places = set[bytes](), set[bytes]()
     for source in _each(given, Path(output).absolute()):
@@ -65,17 +65,17 @@ def _each(given: Iterable[str], avoid: Path) -> Iterator[Source]:
 
 
 def _listed(file: Path, avoid: Path) -> Iterator[Source]:
-    """The entries of a list; error messages give the line of each."""
+    """Programs of a list; error messages give its line."""
     try:
         text = read_file(file, MAX_SETTINGS_BYTES).decode()
     except UnicodeDecodeError:
-        raise ArgumentError(f"{file}: no list of programs: it is no text") from None
+        raise ArgumentError(f"{file}: not a list of programs: it is not text") from None
     lines = [(number, _COMMENT.sub("", line).strip()) for number, line in enumerate(text.splitlines(), 1)]
     if not any(entry for _, entry in lines):
-        raise ArgumentError(f"{file}: the list names no program")
+        raise ArgumentError(f"{file}: the list contains no program")
     for number, entry in lines:
         if entry.startswith("@"):
-            raise ArgumentError(f"{file}:{number}: {entry}: a list names no lists")
+            raise ArgumentError(f"{file}:{number}: {entry}: a list must not contain lists")
         try:
             yield from _each([str(file.parent / entry)] if entry else [], avoid)
         except ArgumentError as error:
@@ -83,7 +83,7 @@ def _listed(file: Path, avoid: Path) -> Iterator[Source]:
 
 
 def _matching(pattern: str, avoid: Path) -> Iterator[Source]:
-    root = os.path.dirname(re.split(r"[*?\[]", pattern, maxsplit=1)[0]) or "."  # what stands before the first wildcard
+    root = os.path.dirname(re.split(r"[*?\[]", pattern, maxsplit=1)[0]) or "."  # the part before the first wildcard
     found = False
     for file in sorted(glob.glob(pattern, recursive=True)):
         if os.path.isfile(file) and avoid not in Path(file).absolute().parents:
@@ -96,7 +96,7 @@ def _matching(pattern: str, avoid: Path) -> Iterator[Source]:
 def _in_folder(folder: Path, avoid: Path) -> Iterator[Source]:
     count = 0
     for where, folders, names in os.walk(folder):
-        if MANIFEST in names:  # the results of a batch
+        if MANIFEST in names:  # results of a batch
             folders.clear()
             continue
         folders[:] = sorted(
@@ -107,7 +107,7 @@ def _in_folder(folder: Path, avoid: Path) -> Iterator[Source]:
             if suffix in PROGRAM_SUFFIXES and (suffix or _NUMBERED.fullmatch(stem)):
                 path = os.path.join(where, name)
                 if os.path.exists(path) and not os.path.isfile(path):
-                    continue  # a pipe; of a link that leads nowhere its run will say so
+                    continue  # a pipe; a dead link is reported by its run
                 count += 1
                 yield Source(path, os.path.relpath(path, folder), _only_returns(path))
     if not count:
@@ -118,11 +118,11 @@ def _only_returns(path: str) -> bool:
     try:
         return is_subprogram(read_file(path))
     except OSError:
-        return False  # its run will say why
+        return False  # reported by its run
 
 
 def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterator[tuple[str, str]]:
-    """Files of programs that a program may call, and those that these may: any number behind a P of one that calls."""
+    """Files of programs that a program may call, recursively: any number after P in a program with calls."""
     beside = Path(path).parent
     folders = [beside, *(Path(base, Path(name).expanduser()) for name in machine.input.program_folders)]
     load = program_loader(folders, machine.controller.max_program_bytes)
@@ -143,20 +143,20 @@ def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterato
 
 
 def _mentioned(text: bytes, folders: Sequence[Path]) -> list[int]:
-    """Numbers of programs that a text may call."""
+    """Numbers of programs that a program may call."""
     if not _CALL.search(text):
         return []
     if _COMPUTED.search(text):
-        # Only running it would tell: all that are there.
+        # Known only when executed: take all existing ones.
         names = [file.stem for folder in folders if folder.is_dir() for file in folder.iterdir()]
         return [int(digits) for name in names if (digits := name.lstrip("Oo")).isdigit() and len(digits) <= 8]
     return [int(number) for number in _NUMBER.findall(text)]
 
 
 COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
-"""Commands of one program that can be run over many."""
+"""Commands for one program that can be run on many."""
 
-WRITES = ("convert", "feed")  # those that write a program
+WRITES = ("convert", "feed")  # commands that write a program
 _AMOUNT = frozenset({"-q", "--quiet", "-v", "--verbose"})
 _OF_ONE_RUN = (
     "-o", "--output", "-m", "--machine", "--json", "--html", "--html-script", "--csv", "--npz", "--plots",
@@ -165,7 +165,7 @@ _OF_ONE_RUN = (
 
 @dataclass(frozen=True)
 class _OnMachine:
-    """What the runs on one machine have in common: its name as given, in a run, and its folder below the results."""
+    """Common data of the runs on one machine: its name as given and in a run, and its folder in the results."""
 
     given: str
     word: str
@@ -176,22 +176,22 @@ class _OnMachine:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be done: a run is made when its turn comes, machine by machine."""
+    """The runs to be done, created on demand, machine by machine."""
 
     base: Base  # folder in which the batch was started
-    sources: Sequence[Source]  # the programs, in the order in which they were given
-    lines: tuple[_OnMachine, ...]  # one for each machine
-    command: str  # of `COMMANDS`
-    words: tuple[str, ...]  # further ones of each command line
-    output: str  # folder of the results, as a run sees it
-    html: str  # likewise of the pages; empty: none
-    shared: Mapping[str, bytes]  # content of the files that many of them read, by name
+    sources: Sequence[Source]  # the programs, in the given order
+    lines: tuple[_OnMachine, ...]  # one per machine
+    command: str  # one of `COMMANDS`
+    words: tuple[str, ...]  # further arguments of each command line
+    output: str  # folder of the results, as seen by a run
+    html: str  # likewise folder of the pages; empty: none
+    shared: Mapping[str, bytes]  # content of common files, by name
 
     def __len__(self) -> int:
         return len(self.sources) * len(self.lines)
 
     def job(self, rank: int) -> BatchJob:
-        """A run."""
+        """Make the run with a number."""
         line, source = self._of(rank)
         target = os.path.join(self.output, line.below, source.place)
         page = os.path.join(self.html, line.below, f"{source.place}.html") if self.html else ""
@@ -202,7 +202,7 @@ class Plan:
         return BatchJob(source.path, line.given, tuple(words), target)
 
     def files(self, rank: int) -> dict[str, bytes]:
-        """What a run reads."""
+        """Files that a run reads, by name."""
         line, source = self._of(rank)
         found = {self.base.name_of(source.path): read_file(source.path)}
         for called, path in called_files(source.path, line.machine, self.base.path_of(".")):
@@ -210,7 +210,7 @@ class Plan:
         return found | {key: content for key, content in self.shared.items() if key in line.files}
 
     def size_bytes(self, rank: int) -> int:
-        """How large the program of a run is."""
+        """Size of the program of a run, bytes."""
         try:
             return os.path.getsize(self._of(rank)[1].path)
         except OSError:
@@ -225,15 +225,15 @@ def plan(
     sources: Sequence[Source], machines: Sequence[str], output: str, command: str, options: Sequence[str],
     html: str | Path | None, base: Base,
 ) -> Plan:  # fmt: skip
-    """The runs of programs on machines."""
+    """Plan the runs of programs on machines."""
     if not machines:
-        raise ArgumentError("no machine: name one with -m")
+        raise ArgumentError("no machine: give one with -m")
     labels = [Path(machine).stem for machine in machines]
     if twice := {label for label in labels if labels.count(label) > 1}:
         raise ArgumentError(f"two machines would be written to {output}/{min(twice)}: rename one of the files")
     for word in options:
         if word.partition("=")[0] in _OF_ONE_RUN:
-            raise ArgumentError(f"{word} behind --: names a file of one run; a batch has -m, -o and --html itself")
+            raise ArgumentError(f"{word} after --: is a file of one run; use -m, -o and --html of the batch")
     words, given = _with_files(options, base)
     shared = {name: read_file(path) for name, path in given}
     lines: list[_OnMachine] = []
@@ -248,7 +248,7 @@ def plan(
 
 
 def _with_files(options: Sequence[str], base: Base) -> tuple[list[str], list[tuple[str, str]]]:
-    """The words as a run sees them, and the files among them, by name."""
+    """The arguments as seen by a run, and the files among them, by name."""
     words: list[str] = []
     files: list[tuple[str, str]] = []
     for word in options:

@@ -1,6 +1,6 @@
-"""Runs packed jobs, each in a process of its own with limits on time and memory, here or on a Dask worker.
+"""Run packed jobs, each in a separate process with limits of time and memory, locally or on a Dask worker.
 
-Each thread has a process that has loaded shapegcode (`shapegcode.cli.host`) and forks one for each job.
+Each thread has a fork server with shapegcode loaded (`shapegcode.cli.host`), which forks a process for each job.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
     from distributed import Client
 
 Ending = Literal["ended", "crashed", "killed", "out of time", "out of memory", "other version"]
-"""How a run ended: by itself with an exit code, or not."""
+"""End of a run: by itself with an exit code, or not."""
 
-FAILED_CODES = {97: "crashed", 98: "out of memory"}  # exit codes of a run that are no command's
+FAILED_CODES = {97: "crashed", 98: "out of memory"}  # exit codes of a run that no command uses
 
 
 @dataclass(frozen=True)
 class Base:
-    """The folder in which a batch was started: names are seen from there, also when it goes on from another folder."""
+    """The folder in which a batch was started: names are relative to it, also after resuming from another folder."""
 
     folder: str  # its absolute path
 
@@ -44,56 +44,56 @@ class Base:
         return os.path.relpath(path, self.folder)
 
     def path_of(self, name: str) -> str:
-        """The inverse of it."""
+        """Path of a name: the inverse of `name_of`."""
         return os.path.normpath(os.path.join(os.path.relpath(self.folder), name))
 
 
 @dataclass(frozen=True)
 class BatchJob:
-    """A run that is still to be executed."""
+    """A run to be executed."""
 
-    program: str  # what it is of, as it was given
+    program: str  # as given
     machine: str
-    words: tuple[str, ...]  # of the command line
-    output: str  # its main file, as a name in its folder: its key in the manifest; the JSON is beside it
+    words: tuple[str, ...]  # command line
+    output: str  # its main file, as a name in its folder: its key in the manifest; the JSON is in the same folder
 
     @property
     def report(self) -> str:
-        """Name of its JSON."""
+        """Name of its JSON file."""
         return f"{self.output}.json"
 
 
 @dataclass(frozen=True)
 class Packed:
-    """A run with all that it reads; nothing in it names a file of the machine that sends it."""
+    """A run with all files that it reads; independent of files on the sending computer."""
 
-    words: tuple[str, ...]  # of the command line
+    words: tuple[str, ...]  # command line
     files: Mapping[str, bytes]  # content by name in the folder of the run
-    version: str  # of shapegcode that it is meant for
-    fingerprint: str  # of all of this: equal ones give equal results
-    seconds: float = 0.0  # that it may take; 0: any time
-    memory_bytes: int = 0  # that it may need; 0: any
-    scratch: str = ""  # folder for the folder of the run; empty: where temporary files go
+    version: str  # required version of shapegcode
+    fingerprint: str  # hash of all of this: equal ones give equal results
+    seconds: float = 0.0  # time limit; 0: none
+    memory_bytes: int = 0  # memory limit; 0: none
+    scratch: str = ""  # parent of the folder of the run; empty: the folder of temporary files
 
 
 @dataclass(frozen=True)
 class JobOutcome:
-    """What a run returned."""
+    """Outcome of a run."""
 
-    ending: Ending  # how it ended
-    code: int  # exit code of the command; 0 where it did not end by itself
-    said: str  # what it wrote to standard output
-    complained: str  # what it wrote to standard error, or why it did not end by itself
-    files: Mapping[str, bytes]  # content of what it wrote, by name in its folder
-    wall_s: float = 0.0  # how long it took
+    ending: Ending  # end of the run
+    code: int  # exit code of the command; 0 if it did not end by itself
+    said: str  # its standard output
+    complained: str  # its standard error, or why it did not end by itself
+    files: Mapping[str, bytes]  # content of the files it wrote, by name in its folder
+    wall_s: float = 0.0  # elapsed time
     cpu_s: float = 0.0  # processor time
-    peak_bytes: int = 0  # most memory that it had at a time
+    peak_bytes: int = 0  # peak memory
 
 
 def pack(
     job: BatchJob, files: Mapping[str, bytes], *, seconds: float = 0.0, memory_bytes: int = 0, scratch: str = ""
 ) -> Packed:
-    """Pickle a run for another process."""
+    """Pack a run with its files for another process."""
     hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
     whole = json.dumps([this_version(), list(job.words), hashes], sort_keys=True)
     fingerprint = hashlib.sha256(whole.encode()).hexdigest()
@@ -101,9 +101,9 @@ def pack(
 
 
 _ENVIRONMENT = {
-    "OPENBLAS_NUM_THREADS": "1",  # other runs have the other cores
+    "OPENBLAS_NUM_THREADS": "1",  # the other cores are for other runs
     "LD_BIND_NOW": "1",  # functions are linked once, not in each run
-    # Memory that is returned comes back page by page: what glibc would find out in a long run stands from the start.
+    # Returned memory is fetched again page by page: set the thresholds that glibc would adapt in a long run.
     "MALLOC_ARENA_MAX": "1",
     "MALLOC_MMAP_THRESHOLD_": "33554432",
     "MALLOC_TRIM_THRESHOLD_": "67108864",
@@ -111,10 +111,10 @@ _ENVIRONMENT = {
 
 
 class _Host:
-    """A process that forks one for each job; `ask` may be called by one thread at a time."""
+    """A fork server for jobs; `ask` may be called by one thread at a time."""
 
     def __init__(self, command: str) -> None:
-        # Ctrl-C of a terminal is for the batch alone, which ends its hosts itself: they have a session of their own.
+        # Ctrl-C of a terminal must reach only the batch, which ends its hosts itself: they have a separate session.
         self._process = subprocess.Popen(
             [sys.executable, "-m", "shapegcode.cli.host", command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             env={**_ENVIRONMENT, **os.environ}, start_new_session=True,
@@ -122,7 +122,7 @@ class _Host:
         self._requests, self._answers = cast(IO[bytes], self._process.stdin), cast(IO[bytes], self._process.stdout)
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any] | None:
-        """The host's answer; None: it is gone."""
+        """The answer of the host; None if it has ended."""
         try:
             self._requests.write(json.dumps(request).encode() + b"\n")
             self._requests.flush()
@@ -132,8 +132,8 @@ class _Host:
         return json.loads(line) if line.endswith(b"\n") else None
 
     def end(self) -> None:
-        """End it, and the job that it runs."""
-        # It ends its job when its input ends.
+        """End the host and its running job."""
+        # The host ends its job when its input ends.
         with contextlib.suppress(OSError, ValueError):
             self._requests.close()
         try:
@@ -155,7 +155,7 @@ class Hosts:
         self._ended = False
 
     def run(self, packed: Packed) -> JobOutcome:
-        """Run a job in a process of its own, in a folder that is gone afterwards."""
+        """Run a job in a separate process, in a temporary folder."""
         if packed.version != (mine := this_version()):
             return JobOutcome("other version", 0, "", f"this worker has {mine}, the batch needs {packed.version}", {})
         where = packed.scratch or None
@@ -184,7 +184,7 @@ class Hosts:
 
     def _run_in(self, folder: Path, packed: Packed) -> JobOutcome:
         names = [*packed.files]
-        # Names may lead upwards: the run's folder lies so deep that they end within what is removed.
+        # Names may contain "..": the folder of the run is nested so deep that they stay within the temporary folder.
         depth = max(_ups(word) for word in (*names, *packed.words))
         cwd = folder.joinpath("files", *("d" for _ in range(depth)))
         cwd.mkdir(parents=True)
@@ -194,7 +194,7 @@ class Hosts:
             with named_errors(target):
                 target.write_bytes(content)
         for word in packed.words:
-            if os.sep in word and not os.path.isabs(word):  # folders of the batch exist also where a run writes
+            if os.sep in word and not os.path.isabs(word):  # create the folders of the batch for the files of a run
                 Path(os.path.normpath(cwd / word)).parent.mkdir(parents=True, exist_ok=True)
         host = self._host(packed.words[0])
         limits = {"seconds": packed.seconds, "memory_bytes": packed.memory_bytes}
@@ -224,18 +224,18 @@ def run_packed(packed: Packed) -> JobOutcome:
 
 
 def _ups(word: str) -> int:
-    """How many folders upwards a word leads that may be a path."""
+    """Number of ".." in an argument that may be a path."""
     return sum(part == ".." for part in Path(os.path.normpath(word)).parts) if ".." in word else 0
 
 
 def _ending(answer: Mapping[str, Any], packed: Packed, complained: str) -> tuple[Ending, str]:
-    """How it ended, and why or what it complained of."""
+    """End of a run, and the reason or its standard error."""
     if answer["out_of_time"]:
         return "out of time", f"stopped after {packed.seconds:g} s (--time-limit)"
     code = answer["code"]
     if code < 0:
         return "killed", f"killed by signal {-code}"
-    # A reader that knows beforehand what a program takes refuses it before the limit does.
+    # The reader may refuse a program whose memory it knows in advance.
     foreseen = packed.memory_bytes > 0 and code == 2 and MEMORY_NEEDED in complained
     if foreseen or FAILED_CODES.get(code) == "out of memory":
         return "out of memory", f"needs more than {packed.memory_bytes / 1e6:.0f} MB (--memory-limit)"
@@ -253,14 +253,14 @@ def _text(file: Path) -> str:
 
 
 def _written(root: Path, cwd: Path, read: list[str]) -> Iterator[tuple[str, bytes]]:
-    """What lies in the folder of a run and was not put there."""
+    """Files that a run wrote into its folder."""
     given = {os.path.normpath(cwd / name) for name in read}
     for file in sorted(root.rglob("*")):
         if file.is_file() and str(file) not in given:
             yield os.path.relpath(file, cwd), file.read_bytes()
 
 
-LOCAL = "local"  # word for a cluster of this machine
+LOCAL = "local"  # name for a cluster on this computer
 
 _RETRIES = 3
 _WAIT_S = 30
@@ -268,13 +268,13 @@ _WAIT_S = 30
 
 @dataclass(frozen=True)
 class Cluster:
-    """Where Dask runs the jobs.
+    """A Dask cluster for the jobs.
 
     Attributes:
         scheduler: its address, such as ``tcp://host:8786``, or "local" for a cluster on this machine.
-        tls_ca: file of the authority's certificate, as Dask takes it; empty: none; likewise the next two.
-        tls_cert: of this client.
-        tls_key: of this client.
+        tls_ca: file of the authority's certificate, as for Dask; empty: none; likewise the next two.
+        tls_cert: certificate of this client.
+        tls_key: key of this client.
     """
 
     scheduler: str
@@ -285,7 +285,7 @@ class Cluster:
 
 @contextlib.contextmanager
 def cluster_executor(cluster: Cluster, processes: int) -> Iterator[tuple[Executor, int]]:
-    """An executor of a Dask cluster, whose workers were found to have this version of shapegcode."""
+    """An executor of a Dask cluster, after checking that its workers have this version of shapegcode."""
     scheduler = cluster.scheduler
     try:
         from distributed import Client, LocalCluster
@@ -306,7 +306,7 @@ def cluster_executor(cluster: Cluster, processes: int) -> Iterator[tuple[Executo
         try:
             client = stack.enter_context(Client(where, security=security, timeout=_WAIT_S, set_as_default=False))  # type: ignore[no-untyped-call]
         except (OSError, ValueError, TypeError) as error:
-            raise ArgumentError(f"--scheduler {scheduler}: no scheduler answers there ({error})") from None
+            raise ArgumentError(f"--scheduler {scheduler}: no answer from a scheduler ({error})") from None
         slots = _checked_slots(client, scheduler)
         executor = client.get_executor(pure=False, retries=_RETRIES)
         try:
@@ -316,7 +316,7 @@ def cluster_executor(cluster: Cluster, processes: int) -> Iterator[tuple[Executo
 
 
 def _checked_slots(client: Client, scheduler: str) -> int:
-    """Check that all workers have this version, and count the jobs that they run at a time."""
+    """Check that all workers have this version, and count their parallel jobs."""
     try:
         versions = client.run(this_version)
     except ModuleNotFoundError as error:

@@ -1,4 +1,4 @@
-"""What a batch came to: a row for each run, sorted by gain and by trouble; the next step."""
+"""Result of a batch: a row for each run, sorted by gain and by problem; the next step."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 Ended = Literal["ok", "not ok", "refused", "failed"]
-"""Within tolerance; done, but not; the input is bad; it did not end by itself."""
+"""Within tolerance; done, but out of tolerance; bad input; did not end by itself."""
 
 _SHOWN = 20
 _LISTED = 2000
@@ -29,21 +29,21 @@ class BatchRow(OldNames):
     """One program on one machine.
 
     Attributes:
-        program: as it was given.
-        machine: likewise.
-        ended: how.
+        program: program as given.
+        machine: machine as given.
+        ended: end of the run.
         answer: the first line of the command, or why there is none.
-        residual_um: residual vibration of the worst axis; None: the command does not find it.
+        residual_um: residual vibration of the worst axis; None: the command does not compute it.
         contour_um: contour error, likewise.
-        cycle_time_s: likewise; of a command that writes no program both are the same.
-        alarms: of `check`.
+        cycle_time_s: likewise; both are equal for a command that writes no program.
+        alarms: number of alarms of `check`.
         output: the program that was written; empty: none.
         report: its JSON; empty: none.
         page: its page; empty: none.
-        earlier: done by an earlier batch, and nothing has changed since.
-        wall_s: how long it took.
+        earlier: done by an earlier batch, and unchanged since.
+        wall_s: elapsed time.
         cpu_s: processor time.
-        peak_bytes: most memory at a time.
+        peak_bytes: peak memory.
     """
 
     program: str
@@ -64,12 +64,12 @@ class BatchRow(OldNames):
 
     @property
     def gain_um(self) -> float:
-        """By how much the residual vibration falls."""
+        """Reduction of the residual vibration, µm."""
         return 0.0 if self.residual_um is None else self.residual_um.original - self.residual_um.emitted
 
     @property
     def longer_percent(self) -> float | None:
-        """By how much the program takes longer."""
+        """Increase of the cycle time, %."""
         pair = self.cycle_time_s
         if pair is None or pair.original <= 0.0 or pair.original == pair.emitted:
             return None
@@ -90,7 +90,7 @@ def figures_of(report: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _contour(report: Mapping[str, Any]) -> object:
-    """Of what the verdict judges: the table or the command."""
+    """Contour error of the target of the verdict: machine table or command."""
     tracks = report.get("contour_error_um")
     if not isinstance(tracks, Mapping):
         return tracks
@@ -115,7 +115,7 @@ def _number(value: object) -> float | None:
 
 
 def _both(name: str) -> Any:
-    """A figure before and after, or the one that there is."""
+    """Cell for a figure of original and emitted, or the only one known."""
 
     def cell(row: BatchRow) -> str:
         pair = getattr(row, name)
@@ -142,16 +142,16 @@ class Batch(Result):
     """A command over many programs and machines.
 
     Attributes:
-        command: that was run.
+        command: the command.
         output: folder of the results.
-        rows: one for each program on each machine, in the order in which they were given.
+        rows: one for each program on each machine, in the given order.
         summary: the table of all rows as a file.
-        not_done: runs that were not begun or not ended, because the batch was stopped.
-        stopped: why it was; empty: it was not.
+        not_done: runs not started or not finished because the batch was stopped.
+        stopped: reason for the stop; empty: not stopped.
         warnings: caution, before you run.
-        wall_s: of the batch.
-        processes: at a time.
-        html: folder of the pages; empty: there are none.
+        wall_s: elapsed time of the batch.
+        processes: number of parallel processes.
+        html: folder of the pages; empty: none.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "counts": dict[str, int]}
@@ -169,26 +169,26 @@ class Batch(Result):
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many runs ended how."""
+        """Number of runs by their end."""
         return {name: self._tally[name] for name in ("ok", "not ok", "refused", "failed")}
 
     @cached_property
     def _tally(self) -> Counter[str]:
-        """Of one look at the rows: how they ended, which were done earlier, and the machines."""
+        """Counts over the rows: ends, runs done earlier, and machines."""
         each = ((row.ended, f"on {row.machine}", *(["earlier"] if row.earlier else [])) for row in self.rows)
         return Counter(itertools.chain.from_iterable(each))
 
     @property
     def ok(self) -> bool:
-        """Every run was done, and is within tolerance."""
+        """True if every run is done and within tolerance."""
         return not self.not_done and self.counts["ok"] == len(self.rows)
 
     @property
     def answer(self) -> str:
-        """How many are done, how many are not, and how long it took."""
+        """Numbers of finished and other runs, and the elapsed time."""
         counts, whole = self.counts, len(self.rows) + self.not_done
         trouble = [f"{count} {name}" for name, count in counts.items() if count and name != "ok"]
-        trouble += [f"{self.not_done} not begun"] if self.not_done else []
+        trouble += [f"{self.not_done} not started"] if self.not_done else []
         earlier = self._tally["earlier"]
         before = f", {earlier} of them by an earlier batch" if earlier else ""
         tail = f"; {', '.join(trouble)}" if trouble else ""
@@ -196,12 +196,12 @@ class Batch(Result):
 
     @property
     def next_step(self) -> str:
-        """To the worst of what is left to do."""
+        """Next step for the worst remaining problem."""
         counts = self.counts
         if self.not_done or counts["failed"]:
             return "resolve the cause, then run the same command with --resume: finished runs are kept."
         if counts["refused"]:
-            return f"mend what was refused ({self.summary} has why), then say the same again with --resume."
+            return f"correct what was refused (reasons: {self.summary}), then repeat the command with --resume."
         if counts["not ok"]:
             return f"see the reports of runs that are not ok; {self.summary} lists them."
         if self.command == "convert":
@@ -209,18 +209,18 @@ class Batch(Result):
         return f"open {self.summary} in a spreadsheet."
 
     def to_json(self) -> dict[str, Any]:
-        """As `to_dict`, row by row."""
+        """Like `to_dict`, with streamed rows."""
         names = [each.name for each in fields(self) if each.name != "rows" and not each.metadata.get("hidden")]
         found: dict[str, Any] = plain({name: getattr(self, name) for name in (*names, *self.json_extra)})
         return found | {"rows": Streamed(self.rows)}
 
     def key_figures(self) -> tuple[Figure, ...]:
-        """How many runs ended how."""
+        """Number of runs by their end."""
         shown = {name: float(count) for name, count in self.counts.items() if count or name == "ok"}
         return tuple(Figure(name, "runs", None, count, 0, None, "", f"counts.{name}") for name, count in shown.items())
 
     def tables(self) -> list[Table]:
-        """What needs somebody, and what was gained; the first twenty of each, on an index of pages two thousand."""
+        """Runs with problems, and good runs by gain; the first twenty of each, on an index of pages two thousand."""
         worst, counts, shown = list(_RED), self.counts, _LISTED if self.html else _SHOWN
         others, fine = (row for row in self.rows if row.ended != "ok"), (row for row in self.rows if row.ended == "ok")
         bad = heapq.nsmallest(shown, others, key=lambda row: worst.index(row.ended))
@@ -233,13 +233,13 @@ class Batch(Result):
         tables = []
         if bad:
             left = len(self.rows) - counts["ok"] - shown
-            tables.append(self._table("what needs somebody", (*names, *why), bad, left, lambda row: _RED[row.ended]))
+            tables.append(self._table("needs attention", (*names, *why), bad, left, lambda row: _RED[row.ended]))
         if good:
-            tables.append(self._table("what is ok, by gain", (*names, *_FIGURES), good, counts["ok"] - shown))
+            tables.append(self._table("ok, by gain", (*names, *_FIGURES), good, counts["ok"] - shown))
         return tables
 
     def _link(self, row: BatchRow) -> str:
-        """From the index to the page of a run."""
+        """Link from the index to the page of a run."""
         return os.path.relpath(row.page, self.html) if row.page and self.html else ""
 
     def _table(

@@ -1,4 +1,4 @@
-"""The runs of one batch: handed out, collected, written down; Ctrl-C and a full disk stop them between two of them."""
+"""The runs of one batch: distributed, collected, recorded; Ctrl-C and a full disk stop them between two runs."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ _PREFIX = "shapegcode: "
 
 
 def row_of(job: BatchJob, outcome: JobOutcome) -> tuple[BatchRow, Mapping[str, bytes]]:
-    """The row of a run, and the files of it that count."""
+    """The row of a run, and its output files."""
     ended: Ended = _ENDED.get(outcome.code, "failed") if outcome.ending == "ended" else "failed"
     if ended == "refused" and any(os.strerror(code) in outcome.complained for code in (errno.ENOSPC, errno.EDQUOT)):
-        ended = "failed"  # not the program's fault
+        ended = "failed"  # not caused by the program
     written = {} if ended in ("failed", "refused") else outcome.files
     report = json.loads(written[job.report]) if job.report in written else {}
-    # Of a file with several programs (--program all) there is one of each: they have no figures in common.
+    # A multi-program file (--program all) has one report per program, without common figures.
     several = report if isinstance(report, list) else [report]
     output = next((str(each["output"]) for each in several if "output" in each), "")
     page = next((name for name in written if name.endswith(".html")), "")
@@ -55,7 +55,7 @@ def row_of(job: BatchJob, outcome: JobOutcome) -> tuple[BatchRow, Mapping[str, b
 
 
 def _answer(outcome: JobOutcome, ended: Ended) -> str:
-    """The answer, or what went wrong."""
+    """The answer, or the problem."""
     text = outcome.said if ended in ("ok", "not ok") else outcome.complained
     lines = [line for line in text.strip().splitlines() if line]
     first = next((line for line in lines if line.startswith(_PREFIX)), lines[0] if lines else outcome.ending)
@@ -63,7 +63,7 @@ def _answer(outcome: JobOutcome, ended: Ended) -> str:
 
 
 class KeptRows(Sequence[BatchRow]):
-    """Rows of a batch, which are read from its manifest when they are used."""
+    """Rows of a batch, read from its manifest on access."""
 
     def __init__(self, manifest: Path, planned: Plan, places: Sequence[int], earlier: Sequence[int]) -> None:
         self._stream = manifest.open("rb")
@@ -88,7 +88,7 @@ class KeptRows(Sequence[BatchRow]):
         return self._row(ranks) if isinstance(ranks, int) else [self._row(each) for each in ranks]
 
     def __reduce__(self) -> tuple[type, tuple[list[BatchRow]]]:
-        """Elsewhere there is no file."""
+        """Pickle the rows as a list: elsewhere there is no manifest."""
         return list, (list(self),)
 
     def _row(self, rank: int) -> BatchRow:
@@ -107,7 +107,7 @@ def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
     heads: list[str] = []
     for field in fields(BatchRow):
         heads += [f"{field.name}.original", f"{field.name}.emitted"] if field.name in _PAIRS else [field.name]
-    # A writer gives back what its stream's `write` does: the line.
+    # The writer returns the value of its stream's `write`: the line.
     writer = csv.DictWriter(SimpleNamespace(write=str), heads, extrasaction="ignore", lineterminator="\n")
     yield str(writer.writeheader())
     for row in map(plain, rows):
@@ -116,15 +116,15 @@ def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
 
 
 OnBatch = Callable[[float, str], None]
-"""Called with the ratio that is done, and the numbers of runs that are done, running and failed."""
+"""Called with the finished ratio, and a text with the numbers of finished, running and failed runs."""
 
-_AHEAD = 2  # runs that are ready for each process, so that none waits for files
+_AHEAD = 2  # runs prepared per process, so that none waits for files
 _TOLD_EVERY_S = 1.0
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class _CtrlC:
-    """Delays Ctrl-C while the files of one run are written, so that all of them exist or none."""
+    """Delays Ctrl-C while the files of one run are written, so that all or none of them exist."""
 
     def __init__(self) -> None:
         self._asked = self._busy = False
@@ -168,14 +168,14 @@ class Runs:
         self._whole_bytes = sum(map(planned.size_bytes, range(len(planned)))) or 1
         self._done = self._failed = self._done_bytes = 0
         self._told = 0.0
-        self._shared: dict[str, str] = {}  # scripts that many pages need are written once
+        self._shared: dict[str, str] = {}  # scripts shared by pages are written once
         self._ctrl_c = _CtrlC()
 
     def all(
         self, executor: Executor, slots: int, prepare: Callable[[BatchJob, Mapping[str, bytes]], Packed],
         run: Callable[[Packed], JobOutcome],
     ) -> str:  # fmt: skip
-        """Do them; gives why it stopped before the end, or nothing."""
+        """Do all runs; return the reason for an early stop, or an empty string."""
         waiting: dict[Future[JobOutcome], tuple[int, str]] = {}
         self._ctrl_c.begin()
         try:
@@ -206,7 +206,7 @@ class Runs:
         return ""
 
     def _collect(self, waiting: dict[Future[JobOutcome], tuple[int, str]], slots: int) -> None:
-        """Wait for at least one of them, and store what it returned."""
+        """Wait for at least one run, and store its outcome."""
         done: set[Future[JobOutcome]] = set()
         while not done:
             self._tell(min(slots, len(waiting)))
@@ -224,7 +224,7 @@ class Runs:
             self._keep(rank, fingerprint, outcome)
 
     def _is_done(self, rank: int, key: str, fingerprint: str) -> bool:
-        """An earlier batch did the same, and its files are there as it left them."""
+        """True if an earlier batch did the same, and its files are unchanged."""
         row = self._manifest.earlier(key) if self._resume else None
         if row is None or row.get("fingerprint") != fingerprint or row["ended"] == "failed":
             return False
@@ -236,14 +236,14 @@ class Runs:
         return True
 
     def _keep(self, rank: int, fingerprint: str, outcome: JobOutcome) -> None:
-        """Write what a run wrote, then its row; where its files cannot be written, a row that says so."""
+        """Write the files of a run, then its row; if the files cannot be written, a row with that reason."""
         job = self._planned.job(rank)
         row, written = row_of(job, outcome)
         if row.ended == "failed" and os.strerror(errno.ENOSPC) in outcome.complained:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), job.program)
         for name in written:
             if not self._is_allowed(name):
-                raise ArgumentError(f"{name}: a worker wants to write outside of the output folder")
+                raise ArgumentError(f"{name}: a worker wants to write outside the output folder")
         hashes = {name: hashlib.sha256(content).hexdigest() for name, content in written.items()}
         with self._ctrl_c.later():
             try:
@@ -266,14 +266,14 @@ class Runs:
             write_bytes(self._path_of(name), content)
             if is_shared(name):
                 self._shared[name] = hashes[name]
-        # What an earlier run wrote and this one did not: nobody may take it for a result of this one.
+        # Remove files of an earlier run that this run did not write.
         earlier = (self._manifest.earlier(job.output) or {}).get("files", {})
         self._remove(name for name in earlier if name not in written)
 
     def _remove(self, names: Iterable[str]) -> None:
         for name in names:
             if self._is_allowed(name) and not is_shared(name):
-                with contextlib.suppress(OSError):  # it may be gone, or never have been there
+                with contextlib.suppress(OSError):  # it may not exist
                     os.unlink(self._path_of(name))
 
     def _is_allowed(self, name: str) -> bool:

@@ -1,1 +1,1 @@
-"""What the control would refuse, or not run as programmed."""
+"""Check of programs: what the control would refuse, or not run as programmed."""

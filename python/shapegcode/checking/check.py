@@ -1,6 +1,6 @@
-"""What a controller would refuse in a program, by the reader, and where it would not run it as programmed.
+"""Find what a controller would refuse in a program, by the reader, and where it would not run it as programmed.
 
-The latter is worked out from the time of each block at its feed.
+The latter is computed from the time of each block at its feed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.reading import given_text, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, no_room
 
-MOST_FINDINGS = 1000  # findings of one code that are listed; the counts hold them all
+MOST_FINDINGS = 1000  # listed findings of one code; all are counted
 
 _SEVERITIES = ("alarm", "warning", "note")
 _MACRO_CONTROL = re.compile(r"(?<![A-Z])(IF|GOTO|WHILE)(?=\s*[\[#\d.])|(?<![A-Z])(DO|END)(?=\s*\d)")
@@ -29,12 +29,12 @@ _COMMENT = re.compile(r"\([^()\n]*\)?")
 _ALARM_WORDS = re.compile(r" \(alarm \d+\)")
 _MACRO_FROM_DNC = 123
 _NO_ROOM = 70
-_WORK_LIMIT = re.compile(r"controller\.max_(program|expansion)_")  # in the message of every limit of a reading
-# Of the reader's remarks those by which a control may do something else than the text seems to say.
+_WORK_LIMIT = re.compile(r"controller\.max_(program|expansion)_")  # in the message of every limit of the reader
+# Remarks of the reader on text that a control may execute differently than it seems.
 _NOT_AS_WRITTEN = re.compile(r"does not end with M30|^text behind the '%'|^G68 R|byte-order mark")
 _ROUNDING = 1e-9
-_LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
-# Of one reading (max_alarms in the core's reader).
+_LOST_S = 1e-3  # time lost by short blocks: less is not a reason to change the program
+# Largest number per reading (max_alarms in the core's reader).
 _MAX_ALARMS = 200
 _MEMORY_PER_LINE = 350  # bytes
 
@@ -45,16 +45,16 @@ def check(
     """Check a program: what the control would refuse, and what it would not run as programmed.
 
     Args:
-        program: the file, or what was read of one: a program with alarms can only be checked as a file or a text.
-        machine: whose controller would run it.
-        program_number: which program of a file that holds several: its O number, or an address as in
+        program: the file, or a program read from it: a program with alarms can only be checked as a file or a text.
+        machine: machine of the controller.
+        program_number: program of a multi-program file: its O number, or an address as in
             `shapegcode.program.reading`; None: the first.
 
     Returns:
-        The findings, and what short blocks and a serial line cost.
+        The findings, and the effect of short blocks and serial line.
 
     Raises:
-        ProgramError: not to be read at all, without a place to point to.
+        ProgramError: it cannot be read at all, without a position to report.
         OSError: the file cannot be read.
     """
     machine = Machine.of(machine)
@@ -78,25 +78,25 @@ def check_text(
     """Check a program text, as `check` does a file.
 
     Args:
-        text: of the program.
-        machine: whose controller would run it.
+        text: text of the program.
+        machine: machine of the controller.
         source: its name in findings.
-        program_number: which program of a text that holds several: its O number, or an address as in
+        program_number: program of a multi-program text: its O number, or an address as in
             `shapegcode.program.reading`; None: the first.
-        folder: where programs that it calls are looked for too.
+        folder: further folder to search for called programs.
 
     Returns:
-        The findings, and what short blocks and a serial line cost.
+        The findings, and the effect of short blocks and serial line.
 
     Raises:
-        ProgramError: not to be read at all, without a place to point to.
+        ProgramError: it cannot be read at all, without a position to report.
     """
     machine = Machine.of(machine)
     data = text.encode() if isinstance(text, str) else text
     require_memory_for_lines(data, source, _MEMORY_PER_LINE)
     own, lines_before = _own_text(data, program_number, source)
     found = list(_size_and_macros(own, lines_before, source, machine))
-    too_long = len(data) > machine.controller.max_program_bytes  # and no more of it may have been read
+    too_long = len(data) > machine.controller.max_program_bytes  # it may have been read only partly
     short: ShortBlocks | None = None
     dnc: SerialLine | None = None
     simulated: SimulatedPrograms | None = None
@@ -146,7 +146,7 @@ def check_text(
 
 
 def _finding(severity: str, code: str, alarm: int, file: str, line: int, column: int, message: str) -> Finding:
-    # The number has a field of its own.
+    # The number has its own field.
     return Finding(severity, code, alarm, file, line, column, _ALARM_WORDS.sub("", message))
 
 
@@ -168,17 +168,17 @@ def _listed(found: Iterable[Finding], source: str) -> tuple[Finding, ...]:
     return tuple(listed)
 
 
-# ---- the text, and what the reader says --------------------------------------------------------------------
+# ---- the text, and findings of the reader --------------------------------------------------------------------
 
 
 def _own_text(data: bytes, wanted: int | str | None, source: str) -> tuple[bytes, int]:
-    """The requested program of a file of several, and the number of lines before it; else the whole file."""
+    """The requested program of a multi-program file, and the number of lines before it; else the whole file."""
     try:
         index = None if wanted is None else index_of(data, wanted, source)
     except ProgramError as error:
         if error.line < 1:
             raise
-        return data, 0  # the reading says it
+        return data, 0  # reported by the reader
     if index is None:
         return data, 0
     place = programs_of(data)[index]
@@ -193,7 +193,7 @@ def _size_and_macros(data: bytes, lines_before: int, source: str, machine: Machi
         if fed:
             yield Finding("note", "program_memory", 0, source, 0, 0, f"{over}: it can only be drip fed")
         else:
-            # Only text that was shaped can be made smaller there.
+            # Only a shaped program can be made smaller.
             remedy = no_room(controller.program_memory_bytes) if STAMP_BEGIN in data else "drip feed it, or split it"
             message = f"{over}: the control cannot store it; {remedy}"
             yield Finding("warning", "program_memory", _NO_ROOM, source, 0, 0, message)
@@ -210,7 +210,7 @@ def _size_and_macros(data: bytes, lines_before: int, source: str, machine: Machi
 def _reader_findings(program: Program) -> Iterator[Finding]:
     for line, column, alarm, message, file in program.core.alarms:
         if _WORK_LIMIT.search(message):
-            # No control refuses it: it is more than is computed here.
+            # Not refused by controls: beyond the limits of this program.
             sentence = f"{message}: what follows is not checked"
             yield _finding("warning", "work_limit", 0, file or program.source, line, column, sentence)
         else:
@@ -226,14 +226,14 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
         yield _finding(severity, "reader", alarm, file or program.source, line, column, message)
 
 
-# ---- what an accepted program does -------------------------------------------------------------------------
+# ---- execution of an accepted program -------------------------------------------------------------------------
 
 
 def _feed_findings(program: Program, machine: Machine, table: BlockTable) -> Iterator[Finding]:
     for clamped in table.clamped_feeds:
         message = (
-            f"{clamped.feed_mm_per_min:.10g} mm/min are more than the axes allow in {clamped.blocks} "
-            f"block{'' if clamped.blocks == 1 else 's'} from here on: the control goes down to "
+            f"{clamped.feed_mm_per_min:.10g} mm/min exceed the axis limits in {clamped.blocks} "
+            f"block{'' if clamped.blocks == 1 else 's'} from here on: the control reduces it to "
             f"{clamped.least_mm_per_min:.0f} mm/min"
         )
         yield _at(program, "warning", "axis_feed", clamped.first_line, message)
@@ -318,16 +318,16 @@ def _dnc_findings(program: Program, line: SerialLine, runs: Iterable[CuttingRun]
                 "" if run.bytes > run.time_s * line.characters_per_s else "its section with the most blocks per second "
             )
             message = (
-                f"up to {_end(program, run)} the program asks for {run.needed_per_s:.0f} characters/s "
-                f"({run.blocks / run.time_s:.0f} blocks/s), the serial line carries {line.characters_per_s:.0f}: "
-                f"{where or 'it '}takes {factor:.2f} times as long, in jerks; "
-                f"{run.needed_per_s * line.bits_per_character:.0f} baud or more would do"
+                f"up to {_end(program, run)} the program needs {run.needed_per_s:.0f} characters/s "
+                f"({run.blocks / run.time_s:.0f} blocks/s), the serial line transmits {line.characters_per_s:.0f}: "
+                f"{where or 'it '}takes {factor:.2f} times as long, with stops; "
+                f"{run.needed_per_s * line.bits_per_character:.0f} baud or more are needed"
             )
             yield _at(program, "warning", "dnc_rate", run.first_line, message)
 
 
 def _end(program: Program, run: CuttingRun) -> str:
-    """The last line of a run, with its file if it is another one than that of the first line."""
+    """The last line of a run, with its file if it differs from that of the first line."""
     (number, file), (_, first_file) = program.core.origin(run.last_line), program.core.origin(run.first_line)
     return f"line {number}" if file == first_file else f"line {number} of {file or program.source}"
 

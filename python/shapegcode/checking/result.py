@@ -1,4 +1,4 @@
-"""What a control would refuse, and what it would not run as programmed: findings, figures, the next step."""
+"""Result of a check: findings, figures, the next step."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from shapegcode.results.page.model import Figure
 
 _SHOWN_ALIKE = 5
-_SHOWN_ALARMS = 20  # with one number
+_SHOWN_ALARMS = 20  # of one number
 _STYLES = {"alarm": "bold red", "warning": "yellow", "note": "dim"}
 
 
@@ -26,13 +26,13 @@ class Finding:
     """An alarm, warning or note about a line of a program.
 
     Attributes:
-        severity: "alarm": the control refuses it; "warning": it will not run as programmed; "note": worth knowing.
+        severity: "alarm": the control refuses it; "warning": it will not run as programmed; "note": information.
         code: short stable name of the kind of finding.
         alarm: the control's number; 0: none.
-        file: file of the place.
+        file: file of the position.
         line: from 1; 0: the file as a whole.
         column: from 1; 0: the line as a whole.
-        message: in words.
+        message: the text.
     """
 
     severity: str
@@ -45,88 +45,88 @@ class Finding:
 
     @property
     def place(self) -> str:
-        """``file:line:column`` as far as it is known; the file without its folder."""
+        """``file:line:column``, as far as known; the file without its folder."""
         line = f":{self.line}" if self.line > 0 else ""
         return f"{Path(self.file).name}{line}{f':{self.column}' if self.line * self.column else ''}"
 
 
 @dataclass(frozen=True)
 class FindingCounts:
-    """How many findings there are of each severity, listed or not."""
+    """Number of findings of each severity, listed or not."""
 
-    alarm: int  # what the control refuses
-    warning: int  # what it would not run as programmed
-    note: int  # what is worth knowing
+    alarm: int  # refused by the control
+    warning: int  # not run as programmed
+    note: int  # information
 
 
 @dataclass(frozen=True)
 class ShortRun:
-    """Cutting blocks with nothing between them, some of which are short."""
+    """A sequence of cutting blocks, some of which are short."""
 
     lines: tuple[int, int]  # first and last line of the source, from 1
-    count: int  # of short blocks
-    blocks: int  # of all that move
+    count: int  # number of short blocks
+    blocks: int  # number of all moving blocks
     shortest_s: float  # the shortest block
-    programmed_s: float  # all of them at their feed, without acceleration
-    taken_s: float  # the same if no block takes less than the block time
+    programmed_s: float  # time of all at their feed, without acceleration
+    taken_s: float  # the same if no block is shorter than the block time
 
 
 @dataclass(frozen=True)
 class ShortBlocks:
-    """Blocks that last less than the block time, and what they cost."""
+    """Blocks shorter than the block time, and the time lost by them."""
 
-    block_time_s: float  # what the control needs for a block
-    count: int  # of short blocks
-    blocks: int  # of all cutting blocks that move
-    share: float  # of the short among them
+    block_time_s: float  # shortest time of the control per block
+    count: int  # number of short blocks
+    blocks: int  # number of all moving cutting blocks
+    share: float  # ratio of short ones
     shortest_s: float | None  # the shortest block; None: none is short
-    programmed_s: float  # all of them at their feed, without acceleration
-    taken_s: float  # the same if no block takes less than the block time
+    programmed_s: float  # time of all at their feed, without acceleration
+    taken_s: float  # the same if no block is shorter than the block time
     first_places: tuple[str, ...]  # `file:line` of the first short blocks
-    region_count: int  # runs with short blocks, listed or not
-    regions: tuple[ShortRun, ...]  # these runs, at most `MOST_FINDINGS`
+    region_count: int  # number of sequences with short blocks, listed or not
+    regions: tuple[ShortRun, ...]  # these sequences, at most `MOST_FINDINGS`
 
 
 @dataclass(frozen=True)
 class StarvedRun:
-    """Cutting blocks that ask for more than the serial line carries."""
+    """A sequence of cutting blocks that needs more than the serial line transmits."""
 
     lines: tuple[int, int]  # first and last line of the source, from 1
-    bytes: int  # of these lines, line ends included
-    programmed_s: float  # all of them at their feed, without acceleration
-    blocks_per_s: float  # that the run asks for
-    needed_characters_per_s: float  # likewise; of shaped blocks in their busiest stretch
-    factor: float  # times as long as programmed that the run, or that stretch, takes
+    bytes: int  # bytes of these lines, line ends included
+    programmed_s: float  # time of all at their feed, without acceleration
+    blocks_per_s: float  # required by the sequence
+    needed_characters_per_s: float  # likewise; for shaped blocks in their busiest section
+    factor: float  # duration of the sequence, or of that section, relative to the programmed one
 
 
 @dataclass(frozen=True)
 class SerialLine:
-    """Characters per second of the serial line, and those that the program needs."""
+    """Characters per second of the serial line, and those required by the program."""
 
     baud: int  # bits per second
     bits_per_character: int  # start, stop and parity bits included
-    characters_per_s: float  # that it carries
-    needed_characters_per_s: float  # that the worst run asks for
-    factor: float  # their ratio; above 1 that run takes so many times as long
-    region_count: int  # runs that starve, listed or not
-    regions: tuple[StarvedRun, ...]  # these runs, at most `MOST_FINDINGS`
+    characters_per_s: float  # transmitted by the line
+    needed_characters_per_s: float  # required by the worst sequence
+    factor: float  # their ratio; above 1 that sequence takes longer by this factor
+    region_count: int  # number of sequences with underruns, listed or not
+    regions: tuple[StarvedRun, ...]  # these sequences, at most `MOST_FINDINGS`
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Check(Result):
-    """What was found in a program.
+    """Findings in a program.
 
     Attributes:
         program: name of the program.
         machine: name of the machine.
-        findings: sorted by place, at most `MOST_FINDINGS` of each code.
-        counts: of all findings by severity.
-        counts_by_code: of all findings by code.
-        size_bytes: of the program: of the whole file, unless one of several programs was asked for.
-        memory_bytes: of the control.
-        short_blocks: blocks that last less than the block time; None: the program was not read.
+        findings: sorted by position, at most `MOST_FINDINGS` of each code.
+        counts: number of findings by severity.
+        counts_by_code: number of findings by code.
+        size_bytes: size of the whole file, or of the requested program of a multi-program file.
+        memory_bytes: program memory of the control.
+        short_blocks: blocks shorter than the block time; None: the program was not read.
         dnc: the serial line; None: not drip fed, or not read.
-        simulated: the program, to simulate it for a page; None: the control refuses something in it.
+        simulated: the program, to simulate it for a page; None: the control refuses it.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "refused": bool}
@@ -144,26 +144,26 @@ class Check(Result):
 
     @property
     def refused(self) -> bool:
-        """The control refuses something."""
+        """True if the control refuses anything."""
         return self.counts.alarm > 0
 
     @property
     def ok(self) -> bool:
-        """Whether nothing is refused and everything would run as programmed."""
+        """True if nothing is refused and everything would run as programmed."""
         return not self.refused and self.counts.warning == 0
 
     @property
     def exit_code(self) -> int:
-        """0: nothing of both; 1: warnings; 2: at least one alarm."""
+        """0: neither alarms nor warnings; 1: warnings; 2: at least one alarm."""
         return 2 if self.refused else super().exit_code
 
     @property
     def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
-        """The listed findings that are warnings, each with its place."""
+        """The listed findings that are warnings, each with its position."""
         return tuple(f"{each.place}: {each.message}" for each in self.findings if each.severity == "warning")
 
     def key_figures(self) -> tuple[Figure, ...]:
-        """How many alarms, warnings and notes."""
+        """Numbers of alarms, warnings and notes."""
         from shapegcode.results.page.model import Figure
 
         return tuple(
@@ -173,7 +173,7 @@ class Check(Result):
 
     @property
     def answer(self) -> str:
-        """What was found, in one line."""
+        """Numbers of findings and size, in one line."""
         counted = ", ".join(f"{count} {name}{'' if count == 1 else 's'}" for name, count in vars(self.counts).items())
         memory = f"{self.size_bytes} of {self.memory_bytes} bytes of program memory"
         return f"{self.program} on {self.machine}: {counted}; {memory}"
@@ -184,12 +184,12 @@ class Check(Result):
         if self.refused:
             first = next(finding for finding in self.findings if finding.severity == "alarm")
             if "arc_centre" in self.counts_by_code:
-                return "set input.arc_centre as the note says, and check again."
-            return f"correct {first.place} first: alarms behind it may come from it."
+                return "set input.arc_centre as in the note, and check again."
+            return f"correct {first.place} first: later alarms may be its consequences."
         worst = {finding.code: finding for finding in reversed(self.findings) if finding.severity == "warning"}
         if "work_limit" in worst:
             place = worst["work_limit"].place
-            return f"correct {place} if it is a slip; else raise the key that it names with --set."
+            return f"correct {place} if it is an error; else increase the key in its message with --set."
         if "dnc_rate" in worst:
             return "raise the baud rate or lower the feed where the serial line is too slow (controller.dnc_baud)."
         if "program_memory" in worst:
@@ -203,11 +203,11 @@ class Check(Result):
         if "axis_feed" in worst:
             return "lower F to the limits of the axes: the control does so anyway."
         if worst:
-            return "move what stops the control out of the cut."
+            return "move the words that stop the control out of the cut."
         return "shapegcode time predicts its cycle time, shapegcode simulate its vibration."
 
     def tables(self) -> list[Table]:
-        """The findings in the order of their positions; of many equal ones the first, and the number of the others."""
+        """The findings in the order of their positions; the first ones of a kind, and the number of the others."""
         if not self.findings:
             return []
         columns = (
@@ -220,7 +220,7 @@ class Check(Result):
         for finding in self.findings:
             kind = (finding.severity, finding.code, finding.alarm)
             seen[kind] += 1
-            # What the control refuses is what the user came for.
+            # Alarms are always listed.
             if seen[kind] <= (_SHOWN_ALARMS if finding.severity == "alarm" else _SHOWN_ALIKE):
                 shown.append(finding)
         listed = Counter(finding.code for finding in shown)

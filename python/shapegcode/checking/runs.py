@@ -1,6 +1,6 @@
-"""Sequences of cutting blocks of a program as a table: duration of each block at its feed, and the stops between them.
+"""Sequences of cutting blocks of a program: duration of each block at its feed, and the stops between them.
 
-All lines here are those of `Program.core.text`; `Program.place` leads back to the source.
+All lines are those of `Program.core.text`; `Program.place` gives the source.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from shapegcode.program import Program
 
 _KIND = _core.BlockKind
 _CUTTING, _RAPID, _DWELL = (kind.value for kind in (_KIND.cutting, _KIND.rapid, _KIND.dwell))
-# The clock rounds the end of a run up to a period, and has no shorter one than this: so the program runs in slow
-# motion, which makes that a nanosecond.
+# The time model rounds the end of a run up to a period, which has a minimum: so the program is timed in slow
+# motion, which makes the period a nanosecond.
 _PERIOD_S = 1e-5
 _SLOW_MOTION = 1e-4
 _RESOLUTION_S = _PERIOD_S * _SLOW_MOTION
@@ -33,12 +33,12 @@ _ROUNDING = 1e-6
 _TICK_SLACK = 1e-5
 _FIRST_PLACES = 20
 
-# What a stop between two cutting moves does, worst first.
+# Effects of a stop between two cutting moves, worst first.
 _STOPS = "the control stops reading ahead, and the tool stops in the cut"
 _CANCELS = "it cancels the look-ahead mode for its block, and the tool stops in the cut"
 _ASKED = "the tool stops in the cut, as programmed"
 _STOPS_READING = "the control reads ahead only up to here"
-_MAY_CANCEL = "in a look-ahead mode the tool would stand in the cut"
+_MAY_CANCEL = "in a look-ahead mode the tool would stop in the cut"
 _EFFECTS = (_STOPS, _CANCELS, _ASKED, _STOPS_READING, _MAY_CANCEL)
 _CODED = re.compile(rb"[Gg] *0*(53|9|61)(?![\d.])")
 _COMMENT = re.compile(rb"\([^()\r\n]*\)?")
@@ -46,29 +46,29 @@ _COMMENT = re.compile(rb"\([^()\r\n]*\)?")
 
 @dataclass(frozen=True)
 class CuttingRun:
-    """Cutting blocks with nothing between them."""
+    """A sequence of cutting blocks."""
 
     first_line: int  # line of the first block
     last_line: int  # line of the last one
-    bytes: int  # of these lines, line ends included
-    # characters per second that they ask for: of shaped blocks in their busiest stretch as long as the shaper, of all
+    bytes: int  # bytes of these lines, line ends included
+    # required characters per second: for shaped blocks in the busiest window of the shaper duration, for all
     # others on average
     needed_per_s: float
-    blocks: int  # blocks that move
-    time_s: float  # at their feed, axis limits included, without acceleration
-    taken_s: float  # the same if no block takes less than the block time
-    short_blocks: int  # blocks below the block time
+    blocks: int  # number of moving blocks
+    time_s: float  # time at their feed, with axis limits, without acceleration
+    taken_s: float  # the same if no block is shorter than the block time
+    short_blocks: int  # number of blocks shorter than the block time
     shortest_s: float  # shortest block
     first_short_line: int  # line of the first short block, 0: none
 
 
 @dataclass(frozen=True)
 class ClampedFeed:
-    """An F that the axes cannot follow, all its blocks together."""
+    """An F beyond the axis limits, with all its blocks."""
 
     feed_mm_per_min: float  # as programmed
-    first_line: int  # line of its first block that is slowed
-    blocks: int  # how many are
+    first_line: int  # line of its first slowed block
+    blocks: int  # number of slowed blocks
     least_mm_per_min: float  # feed along the path in the slowest of them
 
 
@@ -86,17 +86,17 @@ class BlockTable:
 
 @dataclass(frozen=True)
 class Breaker:
-    """What stops the reading ahead between two cutting moves."""
+    """A word that stops the look-ahead between two cutting moves."""
 
-    line: int  # where it stands
-    message: str  # in words
-    unasked: bool  # the program does not say that it wants to stand still there
+    line: int  # its line
+    message: str  # the text
+    unasked: bool  # the program does not request a stop there
 
 
 def block_table(program: Program, machine: Machine) -> BlockTable:
-    """Time every block of a program at its feed; costs a few array operations per million blocks."""
+    """Time every block of a program at its feed, with a few array operations per million blocks."""
     limited = _timed(program, machine, with_limits=True)
-    # A move of rotary axes alone has no length here, and so no time that could be compared.
+    # A move of rotary axes only has no length here, and so no comparable time.
     cutting = np.flatnonzero((limited["kind"] == _CUTTING) & (limited["duration_s"] > 0.0))
     lines_of = {kind: limited["line"][limited["kind"] == kind].astype(np.int64) for kind in (_RAPID, _DWELL)}
     if cutting.size == 0:
@@ -105,7 +105,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     rows = limited[cutting]
     lines = rows["line"].astype(np.int64)
     # Several moves of one line (a corner word) are one block.
-    # Another region begins, or something stands between a move and the one before.
+    # A new region starts, or something is between a move and the previous one.
     run_starts: npt.NDArray[np.bool_] = np.diff(cuts_of_lines(program.regions, lines), prepend=-2) != 0
     run_starts |= np.diff(cutting, prepend=-2) != 1
     block_starts = np.flatnonzero(run_starts | (np.diff(lines, prepend=-1) != 0))
@@ -115,7 +115,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     feed = free["feed_mm_per_s"][block_starts] * (60.0 / _SLOW_MOTION)
     line = lines[block_starts]
 
-    # The control takes a shaped block for whole periods: its F is rounded up so that it ends just before the last one.
+    # The control executes a shaped block in whole periods: its F is rounded up so that it ends just before the last.
     period_s = machine.controller.interpolation_period_s
     whole = np.ceil(limited_s / period_s - _TICK_SLACK) * period_s
     shaped = cuts_of_lines([region for region in program.regions if region.shaped], line) >= 0
@@ -136,7 +136,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
         first_short = int(np.searchsorted(short_at, begin))
         shorts = int(np.searchsorted(short_at, end)) - first_short
         own_s = duration[begin:end]
-        # Characters between two blocks count with the block that follows.
+        # Characters between two blocks belong to the following block.
         amounts = np.diff(line_bytes[line[begin:end]], prepend=line_bytes[first - 1])
         runs.append(
             CuttingRun(
@@ -151,7 +151,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
 
 
 def _shaper_s(program: Program, machine: Machine) -> float:
-    """How long the shaper of a shaped program is, as its header says: no transition is shorter."""
+    """Duration of the shaper of a shaped program from its header, s: no transition is shorter."""
     least_s = machine.controller.block_time_s
     try:
         return max(float(program.stamp.shaper_ms) * 1e-3, least_s) if program.stamp else least_s
@@ -173,7 +173,7 @@ def _clamped_feeds(line: npt.NDArray[np.int64], feed: FloatArray, ratio: FloatAr
 
 
 def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDArray[Any]:
-    """One row per move in slow motion, without any acceleration: length over feed."""
+    """Time every move (length over feed, no acceleration), one row per move, in slow motion."""
     model = fanuc_model(machine, feed_override=_SLOW_MOTION, shaped=False)
     model.planner = _core.PlannerRules()
     model.motion = _core.MotionKind.after_interpolation
@@ -190,7 +190,7 @@ def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDAr
 
 
 def _line_offsets(program: Program) -> npt.NDArray[np.int64]:
-    """Bytes of the text up to the end of each line, from 0."""
+    """Byte offset of the end of each line, starting with 0."""
     text = np.frombuffer(program.core.text, dtype=np.uint8)
     ends = np.flatnonzero(text == ord(program.core.line_end[-1])) + 1
     padding = [text.size] * max(0, program.core.line_count + 2 - ends.size)
@@ -198,12 +198,12 @@ def _line_offsets(program: Program) -> npt.NDArray[np.int64]:
 
 
 def look_ahead_breakers(program: Program, machine: Machine, table: BlockTable) -> Iterator[Breaker]:
-    """What stops the reading ahead between two cutting moves without a rapid between them, once per gap."""
+    """Yield words that stop the look-ahead between two cutting moves without a rapid between them, once per gap."""
     gaps: dict[int, list[tuple[int, str, str]]] = {}
     cutting = table.cutting_lines
 
     def note(line: int, words: str, effect: str, *, behind: bool = False) -> None:
-        # A word in a cutting block counts for the joint before it, an exact stop for the one behind it.
+        # A word in a cutting block belongs to the junction before it, an exact stop to the one after it.
         after = int(np.searchsorted(cutting, line, side="right" if behind else "left"))
         if not 0 < after < cutting.size:
             return
@@ -238,7 +238,7 @@ def look_ahead_breakers(program: Program, machine: Machine, table: BlockTable) -
 
 
 def _coded_lines(program: Program) -> Iterator[tuple[int, str]]:
-    """Lines with G53, G09 or G61, and which."""
+    """Lines with G53, G09 or G61, and the code."""
     text = program.core.text
     if _CODED.search(text) is None:
         return
@@ -250,7 +250,7 @@ def _coded_lines(program: Program) -> Iterator[tuple[int, str]]:
 
 
 def _words(function: tuple[list[int], int, float], machine: Machine, *, look_ahead_mode: bool) -> tuple[str, str]:
-    """The words of a block, and what they do to the reading ahead on this machine."""
+    """The words of a block, and their effect on the look-ahead of this machine."""
     m_codes, tool, spindle = function
     words = [f"M{code:02d}" for code in m_codes]
     words += [f"S{spindle:g}"] if spindle >= 0 else []

@@ -1,5 +1,5 @@
-"""The ``shapegcode`` command: modules of this package hold the `Interface` of each command, and are imported only when
-it runs; a function that runs one gives the exit code and imports what is slow."""
+"""The ``shapegcode`` command: modules of this package contain the `Interface` of each command and are imported when it
+runs; its function returns the exit code and does slow imports."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from shapegcode.cli.arguments import CommandParser, Interface
 _DEBUG = "--debug"
 _MAX_STOP_S = 15.0  # after Ctrl-C
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_WITH_REST = "batch"  # behind -- it takes words for the command that it runs
+_WITH_REST = "batch"  # accepts options of its inner command after --
 
 
 class ExitCode:
@@ -30,7 +30,7 @@ class ExitCode:
     OUT_OF_TOLERANCE = 1  # done, but the result misses its tolerance
     BAD_INPUT = 2  # not done: wrong arguments, a bad program or machine file, a file that cannot be read or written
     INTERRUPTED = 130  # stopped by the user (Ctrl-C)
-    BROKEN_PIPE = 141  # the reader of standard output went away
+    BROKEN_PIPE = 141  # standard output was closed
 
 
 _HOMES = {
@@ -41,18 +41,18 @@ _HOMES = {
     "batch": ("batch", "study", "optimize"),
     "others": ("shaper", "report", "demo", "completion"),
 }
-"""Modules of several commands; else a command has its own."""
+"""Modules shared by several commands; the others have a module each."""
 
 
 @dataclass(frozen=True)
 class Command:
     """One sub-command."""
 
-    name: str  # what the user types; in capitals the name of its `Interface` in the module
+    name: str  # as typed; in capitals the name of its `Interface` in the module
     help: str  # one line for ``shapegcode --help``
 
     def interface(self) -> Interface:
-        """What it takes and does."""
+        """Import and return its options and function."""
         home = next((module for module, names in _HOMES.items() if self.name in names), self.name)
         found: Interface = getattr(importlib.import_module(f"{__name__}.{home}"), self.name.upper())
         return found
@@ -66,35 +66,33 @@ def command_in(words: Iterable[str]) -> str | None:
 COMMANDS: tuple[Command, ...] = (
     Command("convert", "convert a CNC program into an input-shaped FANUC program, and check the result"),
     Command("shaper", "compare input shapers for some vibration modes, and recommend one"),
-    Command("simulate", "simulate a program on the machine's model: cycle time, vibration, contour error"),
+    Command("simulate", "simulate a program on a model of the machine: cycle time, vibration, contour error"),
     Command("feed", "set the feeds of a program so that cutting force and deflection stay within the tool's limits"),
     Command("expand", "write the expanded program: calls, macros and coordinate modes resolved"),
-    Command("measure", "measure the part that programs would cut: contour, radius, walls, roughness, vibration"),
+    Command("measure", "measure the simulated part: contour, radius, walls, roughness, vibration"),
     Command("time", "predict the cycle time of a program and show where the time goes"),
     Command("check", "list what the controller would refuse in a program, or not run as programmed"),
     Command("compare", "prove that nothing else changed between two programs: path, rapids, tools, offsets, functions"),
     Command("setup", "make the first machine file by answering questions"),
     Command("machine", "write or explain a machine file, or import one from the control's parameters"),
     Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),
-    Command("identify", "find vibration modes in a tap test or decay, and put them into the machine file"),
-    Command("sweep", "write a program that shakes an axis, for modes without a hammer (identify --sweep)"),
+    Command("identify", "find vibration modes in a tap test or decay, and write them to the machine file"),
+    Command("sweep", "write a program that shakes an axis, to find modes without a hammer (identify --sweep)"),
     Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
     Command("batch", "run a command over many programs and machines, and resume where it stopped"),
-    Command(
-        "study", "simulate a program on sampled machines (Monte Carlo): how likely it stays within tolerance, and why"
-    ),
+    Command("study", "simulate a program on sampled machines (Monte Carlo): probability of staying within tolerance"),
     Command(
         "optimize", "choose settings for the shortest program that stays within tolerance on most sampled machines"
     ),
-    Command("report", "make pages of results that --json has written"),
-    Command("completion", "print the script that has bash, zsh or fish complete at TAB"),
-    Command("demo", "repeat the figures of a paper beside the published ones"),
+    Command("report", "make HTML pages from --json files"),
+    Command("completion", "print the shell completion script for bash, zsh or fish"),
+    Command("demo", "reproduce a paper's figures, compared with the published ones"),
 )
 """Every sub-command, in the order of the help text. A new one needs a row here and its interface in a module."""
 
 
 class _Version(argparse.Action):
-    """``--version``; looks the version up only when asked."""
+    """``--version``; determines the version only on request."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
         from shapegcode.results.json import this_version
@@ -104,7 +102,7 @@ class _Version(argparse.Action):
 
 
 def parser_of(selected: str | None) -> argparse.ArgumentParser:
-    """The parser with the arguments of the selected command; the others stay names with a help line."""
+    """The parser with the arguments of the selected command; the others have only a name and a help line."""
     parser = CommandParser(
         prog="shapegcode",
         description="Converts CNC programs into input-shaped FANUC programs that vibrate less.",
@@ -112,7 +110,7 @@ def parser_of(selected: str | None) -> argparse.ArgumentParser:
         "`shapegcode COMMAND --help` explains a command. NO_COLOR=1 turns colours off.",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
-    # Only for the help: main() takes it out, so that it may stand anywhere.
+    # Only for the help: main() removes it, so that it is allowed anywhere.
     parser.add_argument(_DEBUG, action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, title="commands")
     for command in COMMANDS:
@@ -125,7 +123,7 @@ def parser_of(selected: str | None) -> argparse.ArgumentParser:
 
 
 def _expected(error: Exception) -> bool:
-    """True for errors of the input or the file system, whose message is all that the user needs."""
+    """True for errors of the input or the file system, which need no traceback."""
     if isinstance(error, ModuleNotFoundError):
         return error.name == "matplotlib"
     # An error of shapegcode has loaded its class: nothing is imported to find out.
@@ -134,12 +132,12 @@ def _expected(error: Exception) -> bool:
 
 
 def _message(error: Exception) -> str:
-    """The error in words; for a file the path, the reason, and which folder is missing."""
+    """Message of an error; for a file the path, the reason, and a missing folder."""
     kind = type(error).__name__
     if isinstance(error, ModuleNotFoundError):
         return f"pictures need {error.name}, which is not installed"
     if not isinstance(error, OSError):
-        # One line per problem, each with the command's name, so that each can be read alone.
+        # One line per problem, each with the command's name, so that each is complete.
         return str(error).replace("\n", "\nshapegcode: ") or kind
     if error.filename is None:
         # Every file is written under its name.
@@ -167,12 +165,12 @@ def _run(argv: list[str]) -> int:
             run = importlib.import_module(f"{__name__}.several").run_all
         return int(run(args))
     finally:
-        # A full disk behind a redirected output shows only here.
+        # A full disk under a redirected output is noticed only here.
         sys.stdout.flush()
 
 
 class _Interrupts:
-    """Whether Ctrl-C came: a module that is being loaded may make another error of it."""
+    """Records Ctrl-C, since an import may turn the interrupt into another error."""
 
     def __init__(self, of_process: bool) -> None:
         self.came = self.reported = False
@@ -182,7 +180,7 @@ class _Interrupts:
 
     def _handle(self, _number: int, _frame: object) -> None:
         if not self.came and hasattr(signal, "setitimer"):
-            # It may fall between the steps of a lock, or into a long simulation: then nothing ends by itself.
+            # The interrupt may come inside a lock or a long simulation, which then would not end.
             signal.signal(signal.SIGALRM, self._stop_now)
             signal.setitimer(signal.ITIMER_REAL, _MAX_STOP_S)
         self.came = True
@@ -194,7 +192,7 @@ class _Interrupts:
         os._exit(ExitCode.INTERRUPTED)
 
     def end(self) -> None:
-        """The work is done: how this process ends is no longer to be changed."""
+        """Ignore Ctrl-C from now on: the work is done."""
         if self._mine:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 
@@ -203,9 +201,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code (see :class:`ExitCode`)."""
     words = list(sys.argv[1:] if argv is None else argv)
     if "numpy" not in sys.modules:
-        # Matrices of a command are small: further threads of OpenBLAS would only wait, and burn processor time.
+        # Matrices of a command are small: further threads of OpenBLAS would only cost processor time.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if "_ARGCOMPLETE" in os.environ:  # a shell asks at TAB
+    if "_ARGCOMPLETE" in os.environ:  # TAB completion in a shell
         importlib.import_module(f"{__name__}.others").complete()
     ctrl_c = _Interrupts(argv is None)
     try:
@@ -214,10 +212,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         # argparse ends the process itself: 0 after --help, 2 after a wrong argument.
         return stop.code if isinstance(stop.code, int) else ExitCode.BAD_INPUT
     except BrokenPipeError:
-        # Python flushes standard output once more when it ends: give it somewhere to go.
+        # Python flushes standard output again at exit: redirect it to the null device.
         _discard_output()
         return ExitCode.BROKEN_PIPE
-    except BaseException as error:  # a compiled module may make a panic of Ctrl-C, which is no Exception
+    except BaseException as error:  # a compiled module may turn Ctrl-C into a panic, which is not an Exception
         if ctrl_c.came or isinstance(error, KeyboardInterrupt):
             print("shapegcode: stopped", file=sys.stderr)
             ctrl_c.reported = True

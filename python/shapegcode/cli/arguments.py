@@ -1,4 +1,4 @@
-"""The parser of every command: options in groups, examples below them, and what is typed for an option as a value."""
+"""The parser of every command: options in groups, examples, and parsers of the values."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ def _refuse(text: str, must: str) -> NoReturn:
 
 
 def program_number(text: str) -> int:
-    """An O number with or without its letter."""
+    """Parse an O number with or without its letter."""
     match = re.fullmatch(r"[Oo]?0*([1-9][0-9]{0,7})", text)
     return int(match[1]) if match else _refuse(text, "a program number, O1 ... O99999999")
 
 
 def program_choice(text: str) -> int | str:
-    """Which program of a file: its O number, an address, or all of them."""
+    """Parse the choice of a program in a file: O number, address, or ``all``."""
     if text == "all" or re.fullmatch(r"#[1-9][0-9]{0,8}|(.*/)?<[^<>]+>|.*/[Oo]?[0-9]{1,8}", text):
         return text
     try:
@@ -39,7 +39,7 @@ def program_choice(text: str) -> int | str:
 
 
 def axes(text: str) -> str:
-    """Axes such as ``XZ``, ``x,z`` or ``"x z"``."""
+    """Parse axes such as ``XZ``, ``x,z`` or ``"x z"``."""
     letters = set(re.sub(r"[\s,]+", "", text.lower()))
     if not letters or letters - set("xyz"):
         _refuse(text, "axes, for example X or XZ")
@@ -47,14 +47,14 @@ def axes(text: str) -> str:
 
 
 def line_range(text: str) -> tuple[int, int]:
-    """Lines such as ``120-180`` or ``120``, first and last, from 1."""
+    """Parse lines such as ``120-180`` or ``120``: first and last, from 1."""
     match = re.fullmatch(r"0*([1-9][0-9]{0,9})(?:-0*([1-9][0-9]{0,9}))?", text)
     first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
     return (first, last) if first <= last else _refuse(text, "lines, first to last, for example 120-180")
 
 
 def line_ranges(text: str) -> tuple[tuple[int, int], ...]:
-    """Ranges of lines such as ``12-80,95-240``."""
+    """Parse ranges of lines such as ``12-80,95-240``."""
     return tuple(line_range(part.strip()) for part in text.split(","))
 
 
@@ -69,17 +69,17 @@ def _share(text: str) -> float:
 
 
 def ratio(text: str) -> float:
-    """A share such as ``60%`` or ``0.6``, above 0 and at most 1."""
+    """A ratio such as ``60%`` or ``0.6``, above 0 and at most 1."""
     return value if 0.0 < (value := _share(text)) <= 1.0 else _refuse(text, "above 0 and at most 100%")
 
 
 def share(text: str) -> float:
-    """A share such as ``3%`` or ``0.03``, at least 0 and below 1."""
+    """A ratio such as ``3%`` or ``0.03``, at least 0 and below 1."""
     return value if 0.0 <= (value := _share(text)) < 1.0 else _refuse(text, "at least 0 and below 100%")
 
 
 def override(text: str) -> float:
-    """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes)."""
+    """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (maximum of a control)."""
     most = _MAX_OVERRIDE
     return value if 0.0 < (value := _share(text)) <= most else _refuse(text, f"above 0 and at most {most:.0%}")
 
@@ -90,7 +90,7 @@ def seconds(text: str) -> float:
 
 
 def start_time(text: str) -> float:
-    """A time with its unit, or 0, which needs none."""
+    """A time with its unit, or 0 without unit."""
     return 0.0 if text in ("0", "0s", "0ms") else seconds(text)
 
 
@@ -109,7 +109,7 @@ def micrometres(text: str) -> float:
 
 
 def _with_unit(text: str, what: str, units: Mapping[str, float], example: str) -> float:
-    """A number above 0 with one of the units, times what the unit stands for."""
+    """A number above 0 with one of the units, converted by its factor."""
     match = re.fullmatch(rf"([-+.\d]+(?:[eE][-+]?\d+)?)\s*({'|'.join(units)})", text)
     try:
         value = float(match[1]) * units[match[2]] if match else 0.0
@@ -142,12 +142,12 @@ def number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
 
 
 @cache
 def examples() -> dict[str, list[str]]:
-    """By command and action: what a user could type. Each is read by that command's parser in a test."""
+    """Example command lines by command and action; a test parses each."""
     found: dict[str, list[str]] = {}
     below: list[str] = []
     text = (resources.files("shapegcode") / "data" / "examples.txt").read_text(encoding="utf-8")
@@ -202,7 +202,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "verbosity": ("quiet", "verbose", "cite"),
 }  # fmt: skip
-"""Group of an option by its destination, one table for all commands, so that every command lists it in the same
+"""Group of an option by its destination, one table for all commands, so that each lists it in the same
 group."""
 
 _GROUP_OF = {dest: title for title, dests in GROUPS.items() for dest in dests}
@@ -210,14 +210,14 @@ _EXIT_CODES = "0 done and within tolerance; 1 done, but out of tolerance; 2 not 
 
 
 class _Formatter(argparse.HelpFormatter):
-    """Wraps the description, and leaves lines of the epilog as they are."""
+    """Wraps the description, and keeps the line breaks of the epilog."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         if "\n" not in text:
             return super()._fill_text(text, width, indent)
         lines = []
         for line in text.split("\n"):
-            # A command has to stay whole, so that it can be copied.
+            # A command stays on one line, so that it can be copied.
             whole = line.startswith("  ")
             lines += [line] if whole else textwrap.wrap(line, width, break_long_words=False) or [""]
         return "\n".join(indent + line for line in lines)
@@ -231,13 +231,13 @@ class CommandParser(argparse.ArgumentParser):
         super().__init__(**({"formatter_class": _Formatter} | kwargs))
 
     def group(self, title: str) -> argparse._ArgumentGroup:
-        """The group of that title."""
+        """The group with that title, created on first use."""
         if title not in self._titled:
             self._titled[title] = self.add_argument_group(title)
         return self._titled[title]
 
     def add_argument(self, *names: str, **kwargs: Any) -> argparse.Action:
-        """Declare an argument, in its group."""
+        """Declare an argument in its group."""
         title = _GROUP_OF.get(kwargs.get("dest") or _dest(names))
         if title is None:
             return super().add_argument(*names, **kwargs)
@@ -246,7 +246,7 @@ class CommandParser(argparse.ArgumentParser):
     def format_help(self) -> str:
         """The help text, its groups in the order of `GROUPS`, with examples and exit codes below."""
         ranks = {title: rank for rank, title in enumerate(GROUPS, start=1)}
-        # First what argparse makes itself: options, actions.
+        # First the groups of argparse itself: options, actions.
         self._action_groups.sort(key=lambda group: ranks.get(group.title or "", 0))
         kept = self.epilog
         try:
@@ -261,25 +261,25 @@ class CommandParser(argparse.ArgumentParser):
         lines = examples().get(words[1] if len(words) > 1 else "")
         if not lines:
             return self.epilog
-        # What a command's exit codes mean stands in its description, where it is not the usual.
+        # Unusual exit codes are explained in the description of the command.
         description = (self.description or "").lower()
         codes = "" if "exit code 0" in description else f"\n\nexit codes: {_EXIT_CODES}."
         return "\n".join(["examples:", *lines]) + codes + (self.epilog or "")
 
 
-NEEDED = object()  # in place of a default: the option must be given
+NEEDED = object()  # instead of a default: the option is required
 
 Row = tuple[Any, ...]
-"""An option: names, metavar, type, help and, where it is not None, the default or `NEEDED`.
+"""An option: names, metavar, type, help and, if not None, the default or `NEEDED`.
 
-As type `bool` is a switch, a tuple one of its words, a list of one type that type, several times, and a dictionary
-what argparse takes.
+Types: `bool` is a switch, a tuple one of its words, a list with a type a repeatable option, and a dictionary holds
+arguments of argparse.
 """
 
 
 @dataclass(frozen=True)
 class OneOf:
-    """Options of which one alone can be given, in their group."""
+    """Mutually exclusive options, in their group."""
 
     title: str
     rows: tuple[Row, ...]
@@ -288,7 +288,7 @@ class OneOf:
 
 @dataclass(frozen=True)
 class OldName:
-    """The name that an option had before; no help shows it."""
+    """Former name of an option; not shown in the help."""
 
     old: str
     option: str
@@ -296,9 +296,9 @@ class OldName:
 
 @dataclass(frozen=True)
 class Interface:
-    """What a command, or an action of it, is for, what it takes, and what it does."""
+    """Description, options and function of a command or of one of its actions."""
 
-    description: str  # in the help; of a command without one its line in the list of commands
+    description: str  # for the help; if empty, the line in the list of commands
     options: tuple[Row | OneOf | OldName, ...] = ()
     run: Callable[[argparse.Namespace], int] | None = None
     # actions by name, each with its line in the list of actions
@@ -341,6 +341,6 @@ def _add_option(
 
 
 def _dest(names: tuple[str, ...]) -> str:
-    """The destination that argparse takes of the names."""
+    """The destination that argparse derives from the names."""
     long = next((name for name in names if name.startswith("--")), names[0] if names else "")
     return long.lstrip("-").replace("-", "_")

@@ -1,4 +1,4 @@
-"""Commands of many runs. ``shapegcode batch``: a command over many programs and machines; ``study``: a program on many
+"""Commands with many runs. ``shapegcode batch``: a command on many programs and machines; ``study``: a program on many
 sampled machines; ``optimize``: the shortest program that stays within tolerance with a given probability."""
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def _batch(args: argparse.Namespace) -> int:
     from shapegcode.batching.batch import batch
 
     options = list(getattr(args, "rest", ()))
-    # What the command does not understand is refused before anything is done; argparse says what.
+    # argparse refuses arguments unknown to the command before any run.
     target = ["-o", "out"] if args.batch_command in ("convert", "feed") else []
     parser_of(args.batch_command).parse_args([args.batch_command, "part.nc", "-m", "vx500", *target, *options])
     html, args.html = args.html, None
@@ -50,33 +50,33 @@ def _batch(args: argparse.Namespace) -> int:
     notes = []
     if result.stopped:
         words = [word for word in args.typed if word != "--resume"]
-        notes.append(f"go on with: {shlex.join(['shapegcode', 'batch', '--resume', *words[1:]])}")
+        notes.append(f"resume with: {shlex.join(['shapegcode', 'batch', '--resume', *words[1:]])}")
     code = runner.finish(result, args, tables=tables, notes=notes, wrote=[result.summary])
     return ExitCode.INTERRUPTED if result.stopped == "Ctrl-C" else code
 
 
 BATCH = Interface(
     "Runs a command over many programs and machines, each run in a separate process. Options of the command come "
-    "after --. Results, each complete or absent, go into the folder of -o, with batch.jsonl (what is done) "
+    "after --. Results, each complete or absent, go into the folder of -o, with batch.jsonl (finished runs) "
     "and summary.csv (all rows). Exit code 0 if all are within tolerance, 1 if some are not or were refused, 2 if "
     "none could be started.",
     (
         ("programs", "PROGRAMS", {"nargs": "+"},
-         "files, folders (with all below them), patterns in quotes ('parts/**/*.nc'), or @LIST: a file with one of "
+         "files, folders (with subfolders), patterns in quotes ('parts/**/*.nc'), or @LIST: a file with one of "
          "these per line"),
         ("-m --machine", "MACHINE", [None],
          "machine file or built-in machine; more than one -m: every program on each of them", NEEDED),
         ("-o --output", "DIR", None, "folder of the results", NEEDED),
         ("--command", None, {"dest": "batch_command", "choices": _COMMANDS},
-         "what is done with each program (default: convert)", "convert"),
-        ("--resume", None, bool, "do only what is missing, failed or changed since"),
-        ("--jobs", "N", count, "processes at a time (default: one per processor)", 0),
-        ("--time-limit", "TIME", seconds, "of each run (default: 3600s)", 3600.0),
+         "command to run on each program (default: convert)", "convert"),
+        ("--resume", None, bool, "run only what is missing, failed or changed"),
+        ("--jobs", "N", count, "parallel processes (default: one per processor)", 0),
+        ("--time-limit", "TIME", seconds, "time limit of each run (default: 3600s)", 3600.0),
         ("--memory-limit", "SIZE", size,
-         "of each run, such as 2G, beyond what is loaded (default: none; Linux only)", 0),
+         "memory limit of each run, such as 2G, beyond the loaded program (default: none; Linux only)", 0),
         *cluster("run"),
         ("--json", "FILE", None, "write all rows as JSON; - for standard output"),
-        ("--html", "DIR", None, "write a page for each run into this folder, and an index of them"),
+        ("--html", "DIR", None, "write a page for each run into this folder, with an index"),
         AMOUNT,
     ),
     _batch,
@@ -84,7 +84,7 @@ BATCH = Interface(
 
 
 def _study_options(what: str, draws: str) -> tuple[Row, ...]:
-    """Study file, machine and number of samples; `what` describes the file, `draws` the number."""
+    """Study file, machine and number of samples; *what* describes the file, *draws* the number."""
     number = ("-n --draws", "N", count, f"{draws} (default: the file's)")
     return ("input", "STUDY.toml", None, what), *MACHINE_OR_NONE, number
 
@@ -96,7 +96,7 @@ def _loaded(args: argparse.Namespace) -> tuple[StudyFile, Machine]:
     file = load_study(args.input)
     args.machine = args.machine or file.machine
     if args.machine is None:
-        raise ArgumentError(f"{args.input}: no machine: name one there, or with -m")
+        raise ArgumentError(f"{args.input}: no machine: give one there, or with -m")
     args.inputs = [file.program]
     machine = load_machine(args)
     runner.check_files(args)
@@ -120,13 +120,13 @@ def _study(args: argparse.Namespace) -> int:
 
 
 STUDY = Interface(
-    "Converts a program once and simulates it on machines sampled as the file says (Monte Carlo): how likely it stays "
-    "within tolerance, quantiles, and which value decides. Exit code 1 if that is less likely than at_least.",
+    "Converts a program once and simulates it on sampled machines (Monte Carlo): probability of staying "
+    "within tolerance, quantiles, most influential value. Exit code 1 if the probability is below at_least.",
     (
-        *_study_options("program, machine, and what is varied", "how many draws"),
-        ("--csv", "FILE", None, "write one line per draw; - for standard output"),
+        *_study_options("program, machine, varied parameters", "number of samples"),
+        ("--csv", "FILE", None, "write one line per sample; -: standard output"),
         *cluster("simulate"),
-        plots("write what decides, and the quantiles over it, as pictures (PNG and SVG) into this folder"),
+        plots("write pictures (PNG and SVG) of the influence of each value and of the quantiles into this folder"),
         *RESULT_OF_DRAWS,
     ),
     _study,
@@ -145,16 +145,16 @@ def _optimize(args: argparse.Namespace) -> int:
 
 
 OPTIMIZE = Interface(
-    "Chooses block period, shaper, tolerance that is aimed at and feed on arcs, or what [choose] of the file has, "
-    "for the shortest time at which the program stays within tolerance on enough of the sampled machines. "
-    "The file is that of `shapegcode study`. Exit code 1 if no choice is likely enough.",
+    "Chooses block period, shaper, planned tolerance and arc feed (or the keys under [choose]) for the shortest "
+    "cycle time that keeps the tolerance on enough sampled machines. Reads the same file as `shapegcode study`. "
+    "Exit code 1 if no combination reaches the probability.",
     (
         *_study_options(
-            "program, machine, what is varied, what can be chosen", "on how many sampled machines a choice is simulated"
+            "program, machine, varied parameters, settings to choose", "sampled machines per combination"
         ),
         ("--at-least", "RATIO", ratio,
          "probability of staying within tolerance, for example 99%% (default: the file's)"),
-        plots("write time and probability of the choices as a picture (PNG and SVG) into this folder"),
+        plots("write a picture of time and probability of the combinations (PNG and SVG) into this folder"),
         *RESULT_OF_DRAWS,
     ),
     _optimize,

@@ -1,6 +1,6 @@
-"""``shapegcode characterize``: measure what a controller does with blocks, and put it into the machine file.
+"""``shapegcode characterize``: measure how a controller executes blocks, and write it to the machine file.
 
-``shapegcode testcut``: test cuts as programs, and cutting-force parameters from their measured forces.
+``shapegcode testcut``: write test cuts as programs, and fit cutting-force parameters to their measured forces.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ def _characterize(args: argparse.Namespace) -> int:
 
 
 def _check_options(args: argparse.Namespace) -> None:
-    """Refuse options that do not go with what is asked for."""
+    """Refuse options that do not belong to the selected action."""
     for option, value in (("--axes", args.axes), ("--drive", args.drive or None)):
         if value is not None and args.servo is None:
-            raise ArgumentError(f"{option}: goes with --servo alone")
+            raise ArgumentError(f"{option}: only with --servo")
     if args.plots is not None and args.servo is None and args.runs is None:
-        raise ArgumentError("--plots: goes with --servo and --runs")
+        raise ArgumentError("--plots: only with --servo and --runs")
     if args.look_ahead is not None and args.runs is None:
-        raise ArgumentError("--look-ahead: goes with --runs alone")
+        raise ArgumentError("--look-ahead: only with --runs")
     if args.runs is not None and args.units is not None:
-        raise ArgumentError("--units: goes with --fit and --servo; of runs the file of runs states feed_unit")
+        raise ArgumentError("--units: only with --fit and --servo; for runs set feed_unit in the file of runs")
 
 
 def _runs(args: argparse.Namespace, machine: Machine) -> int:
@@ -51,7 +51,7 @@ def _runs(args: argparse.Namespace, machine: Machine) -> int:
     file = load_runs(args.runs)
     read = [str(path) for entry in file.entries for path in (entry.program, *entry.logs)]
     runner.check_files(args, also_read=read)
-    with runner.progress(f"learning from {args.runs}", args) as bar:
+    with runner.progress(f"calibrating with {args.runs}", args) as bar:
         found = calibrate_cycle_time(file, machine, families=args.look_ahead, on_progress=bar.update)
     return runner.finish(
         found, args, output=_machine_file(args, found), notes=[f"not determined: {each}" for each in found.undetermined]
@@ -73,7 +73,7 @@ def _write(args: argparse.Namespace, machine: Machine) -> int:
 
     for option, value in (("-o", args.output), ("--units", args.units)):
         if value is not None:
-            raise ArgumentError(f"{option} {value}: goes with --fit, not with --write")
+            raise ArgumentError(f"{option} {value}: only with --fit, not with --write")
     tests = write_characterization_tests(args.write, machine, args.box)
     return runner.finish(tests, args, wrote=[args.write])
 
@@ -88,39 +88,39 @@ def _fit(args: argparse.Namespace, machine: Machine) -> int:
 
 
 def _machine_file(args: argparse.Namespace, found: Any) -> tuple[str, bytes] | None:
-    """The machine file of ``-o``, with what is known."""
+    """The machine file of ``-o``, with the measured values."""
     return None if args.output is None else (args.output, found.to_toml().encode())
 
 
 CHARACTERIZE = Interface(
-    "Writes short test programs (air moves inside a stated box) with instructions, then fits the machine file to "
-    "stopwatch times or servo logs of them: interpolation period, block time, time constants, in-position times. "
+    "Writes short test programs (air moves inside a given box) with instructions, then fits the machine file to "
+    "their stopwatch times or servo logs: interpolation period, block time, time constants, in-position times. "
     "--servo takes any log of commands and actual positions: dead time, position gain, feed-forward, friction. "
-    "--runs learns the clock (look-ahead, tool changes, M codes, spindle) from programs and the logs of their "
-    "runs. Exit code 1 if results contradict each other, no axis tells its loop, or a run is not told within 2 %.",
+    "--runs calibrates the cycle-time model (look-ahead, tool changes, M codes, spindle) with programs and their "
+    "logs. Exit code 1 if results contradict, no axis changes its speed, or a run is not predicted within 2 %.",
     (
         OneOf("what to do", (
             ("--write", "DIR", None, "write the test programs, RESULTS.toml to fill in, and README.txt"),
-            ("--fit", "RESULTS", None, "fit a filled-in RESULTS.toml, a folder with it and logs, or one log beside it"),
+            ("--fit", "RESULTS", None, "fit a filled-in RESULTS.toml, a folder with it and logs, or one log"),
             ("--servo", "LOG", None,
              "fit the position loops to one half of a log and validate them with the other: a capture of a Sinumerik "
              "control (JSON, gzip, zip), or a CSV with columns of commands and actual positions"),
             ("--runs", "RUNS.toml", None,
              "calibrate the cycle-time model from programs and the logs of their runs (SHDR text, MTConnect streams, "
-             "Sinumerik Edge, CSV), which this file pairs"),
+             "Sinumerik Edge, CSV), listed in pairs in this file"),
         ), required=True),
         *MACHINE,
         ("--look-ahead", "KIND", [None],
-         'with --runs: kind of look-ahead that is tried, for example "speed difference"; may be repeated (default: '
+         'with --runs: kind of look-ahead to try, for example "speed difference"; may be repeated (default: '
          "all; the one that predicts left-out runs best is chosen)"),
-        ("-o --output", "FILE", None, "with --fit, --servo, --runs: machine file to write, with what is known"),
-        ("--axes", "X=1,Y=6,Z=2", None, "with --servo: axes of the log that are X, Y, Z (default: by their names)"),
+        ("-o --output", "FILE", None, "with --fit, --servo, --runs: machine file to write, with the measured values"),
+        ("--axes", "X=1,Y=6,Z=2", None, "with --servo: axes of the log used as X, Y, Z (default: by their names)"),
         ("--drive", None, bool, "with --servo: fit a drive with friction too, some ten seconds for each axis"),
         plots("with --servo, --runs: write the pictures (PNG and SVG) into this folder"),
         ("--units", "TIME,LENGTH", None,
-         "with --fit, --servo: of CSV logs, for example ms,um (default: from their headers)"),
+         "with --fit, --servo: units of CSV logs, for example ms,um (default: from their headers)"),
         ("--box", "X0:X1,Y0:Y1,Z0:Z1", None,
-         "where the tests may move, in mm from the point at which they are started (default: %(default)s); write "
+         "range of the tests, in mm from their start point (default: %(default)s); write "
          "--box=-50:0,... if it begins with a minus sign", "0:100,0:100,0:20"),
         *RESULT,
     ),
@@ -164,7 +164,7 @@ def _fit_cut(args: argparse.Namespace) -> int:
     cut = read_test_cut(args.cut)
     if args.output is not None:
         if cut.kind != "taper":
-            raise ArgumentError(f"{args.cut} describes a {cut.kind}: -o goes with a taper")
+            raise ArgumentError(f"{args.cut} describes a {cut.kind}: -o only with a taper")
         _refuse_whole_tool_file(args.output)
     records = _records(args.files)
     runner.check_files(args, also_read=list(records.values()))
@@ -177,32 +177,32 @@ def _fit_cut(args: argparse.Namespace) -> int:
 
 
 def _records(texts: list[str]) -> dict[int, str]:
-    """The files by the number of their pass: ``2=FILE`` names it, else their order does."""
+    """The files by the number of their pass: from ``2=FILE``, else by their order."""
     found: dict[int, str] = {}
     for place, text in enumerate(texts, start=1):
         head, sign, rest = text.partition("=")
         number, file = (int(head), rest) if sign and head.isdigit() else (place, text)
         if number in found:
-            raise ArgumentError(f"{text}: pass {number} is given twice: name the passes, for example 2={file}")
+            raise ArgumentError(f"{text}: pass {number} is given twice: number the passes, for example 2={file}")
         found[number] = file
     return found
 
 
 def _refuse_whole_tool_file(name: str) -> None:
-    """Refuse to write the table [cutting] over a file that holds more than that."""
+    """Refuse to write the table [cutting] over a file with other tables."""
     try:
         more = sorted(set(toml_tables(read_file(name, MAX_SETTINGS_BYTES).decode())) - {"cutting"})
-    except (OSError, ValueError):  # not there, or nothing of ours
+    except (OSError, ValueError):  # missing, or not a tool file
         return
     if more:
         raise ArgumentError(
-            f"-o {name}: holds more than [cutting] ({', '.join(more)}), which would be lost: name another file and "
-            "put its table into this one"
+            f"-o {name}: contains more than [cutting] ({', '.join(more)}), which would be lost: give another file and "
+            "copy its table into this one"
         )
 
 
 def _list(text: str) -> tuple[float, ...]:
-    """Numbers above 0, divided by commas."""
+    """Numbers above 0, separated by commas."""
     return tuple(positive(part.strip()) for part in text.split(","))
 
 
@@ -226,28 +226,28 @@ _END = (("--up", None, bool, "up milling, material on the left (default: down mi
 _SHAPE = (
     ("-F --feed", "F", positive, "feed in mm/min", NEEDED),
     ("--allowance", "MM", positive, "radial depth on the walls (default: 0.1 D)"),
-    ("--rough-radius", "MM", positive, "of the rough corner (default: D)"),
-    ("--finish-radius", "MM", positive, "of the finished corner (default: D)"),
+    ("--rough-radius", "MM", positive, "radius of the rough corner (default: D)"),
+    ("--finish-radius", "MM", positive, "radius of the finished corner (default: D)"),
 )
 _TAPER = (
-    ("-F --feeds", "F,F,...", _list, "in mm/min; one is passed at its half, once and double", NEEDED),
-    ("--radial-depth", "MM:MM", _pair, "at begin and end of the stock (default: 0.05 to 0.35 of the diameter)"),
-    ("--length", "MM", positive, "of the stock along X (default: %(default)s)", 60.0),
+    ("-F --feeds", "F,F,...", _list, "feeds in mm/min; a single one is used at half, full and double value", NEEDED),
+    ("--radial-depth", "MM:MM", _pair, "radial depth at begin and end of the stock (default: 0.05 to 0.35 D)"),
+    ("--length", "MM", positive, "length of the stock along X (default: %(default)s)", 60.0),
 )
-_CORNER = (("--interval", "MM", positive, "of a block (default: feed_control.interval_mm of the machine)", None),)
+_CORNER = (("--interval", "MM", positive, "length of a block (default: feed_control.interval_mm)", None),)
 _INTERVAL = (
     ("--intervals", "MM,MM,...", _list, "lengths of the blocks, one pass each (default: 0.2,0.4,0.6)", (0.2, 0.4, 0.6)),
-    ("--feeds", "F,F,...", _list, "of the blocks, the same for every pass (default: the corner's by equation 7)"),
+    ("--feeds", "F,F,...", _list, "feeds of the blocks, the same for every pass (default: the corner's by equation 7)"),
 )
 _FIT = (
     ("files", "CSV", {"nargs": "+"},
-     "record of a pass with a header, time_s or position_mm, fx_n, fy_n; 2=FILE names the pass"),
+     "record of a pass with a header, time_s or position_mm, fx_n, fy_n; 2=FILE sets the pass"),
     ("--cut", "OUT.json", None, "side file of the test cut", NEEDED),
     ("--forces-on", None, ("workpiece", "tool"),
-     "on what the measured forces act; a dynamometer below the work piece measures those on it (default: %(default)s)",
+     "body on which the measured forces act; a dynamometer measures those on the workpiece (default: %(default)s)",
      "workpiece"),
     ("--chip-thickness", None, ("mean", "local"),
-     "taper: to which chip thickness the power laws belong (default: %(default)s)", "mean"),
+     "taper: chip thickness used in the power laws (default: %(default)s)", "mean"),
     ("--edge-forces", None, bool, "taper: fit the forces of the edge, K_te and K_re, too"),
     ("-o --output", "FILE", None, "taper: write the table [cutting] (TOML)"),
     plots("write pictures (PNG and SVG) of measured and expected forces into this folder"),
@@ -256,35 +256,35 @@ _FIT = (
 
 TESTCUT = Interface(
     "Writes test cuts (paper 001) as programs with instructions in their heads and a side file (JSON) that "
-    "describes the cut; `fit` reads that and the measured forces. Exit code 0; 1: the fit is poor or the result "
-    "not as it should be; 2: bad input.",
+    "describes the cut; `fit` reads it and the measured forces. Exit code 0; 1: the fit is poor or the result "
+    "not as expected; 2: bad input.",
     actions={
         "taper": (
-            "growing radial depth: for the coefficients of the cutting force (figure 4)",
+            "increasing radial depth: for the coefficients of the cutting force (figure 4)",
             Interface(
                 "Mills a tapered edge, then passes along it with one feed each: for k1 and k2.",
                 (*_CUT, *_TAPER, *_END), _write_cut,
             ),
         ),
         "corner": (
-            "a corner unrolled on a straight line: constant feed, then modified (figure 7)",
+            "a corner mapped to a straight edge: constant feed, then modified (figure 7)",
             Interface(
-                "Mills an edge on which a straight pass meets the radial depth of a corner, and passes it with "
+                "Mills an edge on which a straight pass meets the radial depth of a corner, and cuts it with "
                 "constant feed, then with the feed of equation 7.", (*_CUT, *_SHAPE, *_CORNER, *_END), _write_cut,
             ),
         ),
         "interval": (
-            "feeds that change every 0.2, 0.4 and 0.6 mm: which the controller follows (figure 8)",
+            "feeds that change every 0.2, 0.4 and 0.6 mm: shortest interval that is followed (figure 8)",
             Interface(
-                "Passes of constant radial depth whose feed changes as in a corner, each at another interval.",
+                "Passes of constant radial depth whose feed changes as in a corner, each with another interval.",
                 (*_CUT, *_SHAPE, *_INTERVAL, *_END), _write_cut,
             ),
         ),
         "fit": (
             "evaluate the measured forces of a test cut",
             Interface(
-                "Reads the side file of a test cut and the records of its passes, in their order: of a taper the "
-                "coefficients with 95 % intervals, of a corner measured against expected resultant, of an interval "
+                "Reads the side file of a test cut and the records of its passes, in their order: for a taper the "
+                "coefficients with 95 % intervals, for a corner measured and expected resultant, for an interval "
                 "test the shortest interval that the controller follows.", _FIT, _fit_cut,
             ),
         ),

@@ -1,4 +1,4 @@
-"""``shapegcode convert``: shape a program, write it, and judge what was written."""
+"""``shapegcode convert``: shape a program, write it, and give the verdict of the emitted program."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MACHINE_KEYS = {
     "--compensation": "input.compensation",
     "--dialect": "emission.dialect",
 }
-"""Options that stand for a key of the machine file."""
+"""Options that override a key of the machine file."""
 
 
 def _convert(args: argparse.Namespace) -> int:
@@ -64,13 +64,13 @@ def _convert(args: argparse.Namespace) -> int:
     if result.proof is not None:
         notes.append(f"{'nothing else changed' if not result.proof.refused else 'CHANGED'}: {result.proof.answer}")
     if target == failed and output.exists():
-        notes.append(f"{output} is of an earlier run and was left alone")
+        notes.append(f"{output} is from an earlier run and was not changed")
     if (tested := result.unverified_parameters_tested) and not result.parameter_sensitivity:
         notes.append(f"{tested} unverified parameters were changed one at a time: none matters for the verdict")
     needed = () if hasattr(args, "several") else program.kept_calls
     if needed:
         names = ", ".join(place.address for place in needed)
-        notes.append(f"calls of {names} were kept: as they are in {args.input}, they stand behind the program")
+        notes.append(f"calls of {names} were kept: these programs of {args.input} are appended unchanged")
     view = result.emitted.view() if result.written is None else memoryview(result.written)
     content = alone_with(view, program.text, needed)
     tables = result.tables(every_cut=args.verbose)
@@ -78,7 +78,7 @@ def _convert(args: argparse.Namespace) -> int:
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
-    """What `convert` and `convert_scheduled` both take."""
+    """Arguments common to `convert` and `convert_scheduled`."""
     from shapegcode.conversion.budget import Budget
 
     limits = (args.max_bytes, args.baud, args.max_blocks_per_second)
@@ -91,7 +91,7 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
 
 @contextmanager
 def _loading(module: str) -> Iterator[None]:
-    """Load a module beside what is done within: the core reads a long program without Python."""
+    """Import a module in parallel: the core reads a long program without the interpreter lock."""
     thread = Thread(target=import_module, args=(module,))
     thread.start()
     try:
@@ -101,7 +101,7 @@ def _loading(module: str) -> Iterator[None]:
 
 
 def _give_memory_back() -> None:
-    """Let glibc give large pieces of memory back as soon as they are free, though a later one may take them again."""
+    """Have glibc return large blocks of memory to the system at once."""
     if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
         libc.mallopt(_MMAP_THRESHOLD, _LARGE_BYTES)
 
@@ -109,7 +109,7 @@ def _give_memory_back() -> None:
 def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:
     from shapegcode.conversion.convert import convert
 
-    # Where each stage begins, and how much of the bar it takes; shaping again does not take it back.
+    # Start and length of each stage on the bar; it does not move back when a program is shaped again.
     spans = {"shaping": (0.0, 0.4), "shaping again, slower": (0.0, 0.4), "round trip": (0.4, 0.4)}
     spans["sensitivity to unverified parameters"] = (0.8, 0.2)
     reached = 0.0
@@ -127,7 +127,7 @@ def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar
 
 
 def _scheduled(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:
-    """Feeds and shaping in one go."""
+    """Schedule the feeds, then shape."""
     from shapegcode.conversion.scheduled import convert_scheduled
 
     return convert_scheduled(program, machine, **options.read_cutting(args), **_options(args), on_progress=bar.update)
@@ -144,21 +144,21 @@ CONVERT = Interface(
         ("--arc-feed", "RATIO", ratio, "feed on arcs relative to the programmed feed, for example 60%%"),
         *options.override_options(MACHINE_KEYS),
         ("--shape-all", None, bool,
-         "shape every cut within the price: also where that gains less than shaping.least_gain_um or becomes worse, "
-         "and where the original is within its tolerance; without it such a cut is left unchanged"),
+         "shape every cut that the price allows: also if the gain is below shaping.least_gain_um, the result is worse, "
+         "or the original is within tolerance; by default such cuts are left unchanged"),
         ("--only", "A-B,...", line_ranges, "shape nothing but the cuts in these lines of IN, for example 12-80,95-240"),
         ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines of IN unchanged", ()),
         ("--tolerance-curve", None, {"action": argparse.BooleanOptionalAction},
-         "work out what other contour tolerances would cost in time (default: %(default)s)", True),
+         "compute the cycle time at other contour tolerances (default: %(default)s)", True),
         ("--block-period", "TIME", seconds,
          "duration of the shortest block, for example 5ms (default: chosen for the modes)"),
         ("--max-bytes", "N[k|M]", size,
-         "largest size of the emitted program, for example 256k (1k = 1024): what gains least is left unchanged"),
+         "largest size of the emitted program, for example 256k: the cuts that gain least are left unchanged"),
         ("--baud", "N", positive,
-         "speed of the serial line that feeds the program: longer block periods, then cuts left unchanged"),
-        ("--max-blocks-per-second", "N", positive, "blocks that the control reads per second; as --baud"),
+         "speed of the serial line: block periods get longer, then cuts are left unchanged"),
+        ("--max-blocks-per-second", "N", positive, "blocks per second that the control can read; effect as --baud"),
         ("--feed-schedule", None, bool,
-         "first set the feeds so that the cut of the shaped program keeps the tool's limits, as `shapegcode feed`; "
+         "first set the feeds so that the shaped program keeps the tool's limits, as `shapegcode feed`; "
          "needs --tool and --stock"),
         *options.cutting(required=False),
         options.PROGRAM,

@@ -1,6 +1,6 @@
-"""A process that has everything loaded and forks one for each command line that `shapegcode.batching` tells it.
+"""Fork server: has all modules loaded and forks a process for each command line from `shapegcode.batching`.
 
-It reads and answers one JSON object per line, ends when its input does, and takes a running command with it.
+It reads and answers one JSON object per line; when its input ends, it ends with its running command.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _OF_COMMAND = {
     "feed": ("shapegcode.feed.schedule",), "measure": ("shapegcode.metrology.measure",),
     "simulate": ("shapegcode.simulation.simulate",),
 }  # fmt: skip
-"""Modules that a run imports only when it needs them; loaded here, so that no run has to."""
+"""Modules that a run imports on demand; loaded here, so that no run has to."""
 _CODES = {name: code for code, name in FAILED_CODES.items()}
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl
 
@@ -46,11 +46,11 @@ def main() -> int:
         for name in (*_LOADED, *_OF_COMMAND[command]):
             importlib.import_module(name)
         parser_of(command)
-    this_version()  # looked up once
-    os.environ["SHAPEGCODE_THREADS"] = "1"  # other runs have the other cores
+    this_version()  # determined once
+    os.environ["SHAPEGCODE_THREADS"] = "1"  # the other cores are for other runs
     write_in_passing()
     gc.collect()
-    gc.freeze()  # what is loaded stays shared: a collection in a run would copy it
+    gc.freeze()  # keep loaded objects shared: a garbage collection in a run would copy them
     answers = os.dup(1)
     while line := sys.stdin.buffer.readline():
         reply = _run(json.loads(line))
@@ -61,9 +61,9 @@ def main() -> int:
 
 
 def _run(job: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Fork, wait, and tell; None: nobody waits for the answer any more."""
+    """Fork, wait, and return the outcome; None if the input has ended."""
     begin = time.monotonic()
-    ended, held = os.pipe()  # the far end closes when the process ends, however it does
+    ended, held = os.pipe()  # the other end closes at any end of the process
     parent = os.getpid()
     pid = os.fork()
     if pid == 0:
@@ -89,7 +89,7 @@ def _run(job: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def _be_the_command(job: Mapping[str, Any], parent: int) -> None:
-    """Within the new process: never returns."""
+    """Run the command in the new process; never returns."""
     code = _CODES["crashed"]
     try:
         _follow(parent)
@@ -115,7 +115,7 @@ def _be_the_command(job: Mapping[str, Any], parent: int) -> None:
 
 
 def _follow(parent: int) -> None:
-    """End when the server ends, without a signal."""
+    """Have the process killed when the server ends."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)
     if os.getppid() != parent:
@@ -123,9 +123,9 @@ def _follow(parent: int) -> None:
 
 
 def _limit_memory(more_bytes: int) -> None:
-    """So much memory more than the host had loaded already."""
+    """Limit memory to that of the host plus *more_bytes*."""
     if sys.platform != "linux":
-        return  # no other system counts what is used instead of what is reserved
+        return  # only Linux limits used instead of reserved memory
     import resource
 
     pages = int(Path("/proc/self/statm").read_text().split()[5])

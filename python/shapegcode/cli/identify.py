@@ -1,6 +1,6 @@
-"""``shapegcode identify``: vibration modes from a tap test or a decay, and into the machine file with them.
+"""``shapegcode identify``: find vibration modes from a tap test or a decay, and write them to the machine file.
 
-``shapegcode sweep``: a program that shakes an axis, for modes without a hammer.
+``shapegcode sweep``: write a program that shakes an axis, to find modes without a hammer.
 """
 
 from __future__ import annotations
@@ -17,20 +17,21 @@ from shapegcode.io.data_file import write_text
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-# What the user says of a file, over what it says itself; each stands for a field of ReadOptions.
+# Options that override the contents of a file; each is a field of ReadOptions.
 _OF_FILES = (
-    ("--time-column", "NAME", None, "header or number (from 1) of the time"),
-    ("--force-column", "NAME", None, "of the force"),
-    ("--response-column", "NAME", {"dest": "response_columns", "action": "append"}, "of a response; repeatable"),
+    ("--time-column", "NAME", None, "header or number (from 1) of the time column"),
+    ("--force-column", "NAME", None, "header or number of the force column"),
+    ("--response-column", "NAME", {"dest": "response_columns", "action": "append"},
+     "header or number of a response column; repeatable"),
     ("--time-unit", "UNIT", None, "s, ms or us"),
     ("--force-unit", "UNIT", None, "N, kN, kgf or lbf"),
     ("--response-unit", "UNIT", None, "for example m/s^2, g, mm/s or um"),
-    ("--sample-period", "TIME", {"dest": "period_s", "type": arguments.seconds}, "between samples, such as 0.1ms"),
-    ("--quantity", None, ("acceleration", "velocity", "displacement"), "what the sensor measured"),
-    ("--force-scale", "N", arguments.nonzero, "N for 1 in the file (integer WAV: full scale)"),
-    ("--response-scale", "X", arguments.nonzero, "m/s^2, m/s or m for 1 in the file (integer WAV: full scale)"),
-    ("--force-sensitivity", "mV/N", None, "of the hammer, where the force is in volts: 2.25mV/N"),
-    ("--response-sensitivity", "mV/g", None, "of the sensor, where the response is in volts: 100mV/g"),
+    ("--sample-period", "TIME", {"dest": "period_s", "type": arguments.seconds}, "time between samples, such as 0.1ms"),
+    ("--quantity", None, ("acceleration", "velocity", "displacement"), "measured quantity of the sensor"),
+    ("--force-scale", "N", arguments.nonzero, "N per unit in the file (integer WAV: N at full scale)"),
+    ("--response-scale", "X", arguments.nonzero, "m/s^2, m/s or m per unit in the file (integer WAV: at full scale)"),
+    ("--force-sensitivity", "mV/N", None, "sensitivity of the hammer if the force is in volts: 2.25mV/N"),
+    ("--response-sensitivity", "mV/g", None, "sensitivity of the sensor if the response is in volts: 100mV/g"),
     ("--exponential-window", "TIME", {"dest": "exponential_window_s", "type": arguments.seconds},
      "time constant of an exponential window that the analyser applied to the response, such as 50ms"),
     ("--response-first", None, bool, "in a WAV file the response is the first channel, not the force"),
@@ -39,7 +40,7 @@ _OF_FILES = (
 
 def _identify(args: argparse.Namespace) -> int:
     if args.tap_plan and args.files:
-        raise ArgumentError("--tap-plan says how to do the test and reads no file: leave one of both out")
+        raise ArgumentError("--tap-plan prints instructions and reads no file: omit one of both")
     runner.check_files(args, also_read=[*(args.across or ()), *([] if args.sweep is None else [args.sweep])])
     if args.tap_plan:
         from shapegcode.identification.plan import tap_plan
@@ -47,11 +48,9 @@ def _identify(args: argparse.Namespace) -> int:
         plan = tap_plan(options.load_machine(args) if args.machine is not None else None)
         return runner.finish(plan, args, notes=["", plan.instructions])
     if not args.files:
-        raise ArgumentError("name the file of a tap test or decay, or ask how to do the test: identify --tap-plan")
+        raise ArgumentError("give the file of a tap test or decay; instructions for the test: identify --tap-plan")
     if args.sweep is None and (args.machine is not None or args.set):
-        raise ArgumentError(
-            "-m and --set go with --tap-plan and --sweep; --update names the machine file that takes the modes"
-        )
+        raise ArgumentError("-m and --set belong to --tap-plan and --sweep; --update gives the machine file to update")
     if args.sweep is not None and args.machine is None:
         raise ArgumentError("--sweep needs -m, the machine file of the control that ran the program")
     return _fit(args)
@@ -90,7 +89,7 @@ def _fit(args: argparse.Namespace) -> int:
 
 
 def _said_again(args: argparse.Namespace) -> tuple[str, ...]:
-    """The options on which it depends which modes are found."""
+    """The options that determine which modes are found."""
     said = ["--decay"] * args.ignore_force + ["--stops"] * args.stops
     said += ["--frequencies {:g}:{:g}".format(*args.frequencies)] if args.frequencies is not None else []
     said += [f"--modes {args.modes}"] if args.modes is not None else []
@@ -113,29 +112,29 @@ IDENTIFY = arguments.Interface(
     "Exit code 0: all modes that exceed the noise are supported; 1: some are not; 2: none is, or bad input.",
     (
         ("files", "FILE", {"nargs": "*"},
-         "CSV, UFF (dataset 58), WAV, .frf, .mat, auto servo tuning (XML), capture of command and encoder; several of "
-         "one point together"),
-        ("--sweep", "PROGRAM", None, "program that ran beside the sensor (shapegcode sweep), on the control of -m"),
+         "CSV, UFF (dataset 58), WAV, .frf, .mat, auto servo tuning (XML), capture of command and encoder; several "
+          "files of the same point are fitted together"),
+        ("--sweep", "PROGRAM", None, "program that ran during the record (shapegcode sweep), on the control of -m"),
         ("--axis", None, ("x", "y", "z"),
-         "use the response along this axis; where the file names none, it is this one"),
+         "use the response along this axis; if the file names no axis, its response is taken as this axis"),
         ("--across", "FILE", {"nargs": "*"},
-         "find what each mode moves along the other axes too, for a tool that rocks: by a sensor of three axes, or by "
-         "these files of taps at the same point with the sensor turned"),
-        ("--update", "MACHINE.toml", None, "put the supported modes into this machine file"),
+         "also find the mode shape along the other axes (for a rocking tool), from a triaxial sensor or from these "
+          "files: impacts at the same point, sensor turned"),
+        ("--update", "MACHINE.toml", None, "write the supported modes to this machine file"),
         *options.MODES,
-        ("--tap-plan", None, bool, "say how to do the test (for the modes of -m MACHINE), nothing else"),
+        ("--tap-plan", None, bool, "print instructions for the test (for the modes of -m MACHINE), and exit"),
         *options.MACHINE_OR_NONE,
-        ("--modes", "N", arguments.count, "how many (default: chosen by evidence)"),
+        ("--modes", "N", arguments.count, "number of modes (default: by information criterion)"),
         ("--max-modes --most-modes", "N", {"dest": "max_modes", "type": arguments.count},
          "largest number of modes (default: 40 over frequency, 8 over time)"),
-        ("--force", None, bool, "write modes with --update even if the answer is not to use them"),
-        ("--frequencies", "LOW:HIGH", arguments.frequency_band, "look for modes between these frequencies, Hz"),
+        ("--force", None, bool, "write modes with --update even if the verdict is 'do not use'"),
+        ("--frequencies", "LOW:HIGH", arguments.frequency_band, "find modes between these frequencies, Hz"),
         ("--decay --ignore-force", None, {"dest": "ignore_force", "action": "store_true"},
-         "take it as a free decay: do not use the force, even if there is one"),
+         "treat the record as a free decay: ignore a force channel"),
         ("--stops", None, bool,
-         "the record is of an ordinary run: use every stop in it behind which the machine rests"),
+         "the record is of an ordinary run: use every stop in it after which the machine rests"),
         ("--start", "TIME", arguments.start_time,
-         "where the decay begins in the file, for example 250ms (default: found by itself)"),
+         "start of the decay in the file, for example 250ms (default: found automatically)"),
         *_OF_FILES,
         options.plots("write pictures (PNG and SVG) of records, fit and stabilisation into this folder"),
         *options.RESULT,
@@ -149,7 +148,7 @@ def _sweep(args: argparse.Namespace) -> int:
 
     machine = options.load_machine(args, writes_program=True)
     runner.check_files(args)
-    with runner.progress("planning the strokes", args):
+    with runner.progress("planning the moves", args):
         found, text = plan_sweep(
             args.output, machine, args.axis, band_hz=args.frequencies, travel_mm=args.travel,
             acceleration_share=args.acceleration, seconds=args.seconds, number=args.program,
@@ -160,17 +159,17 @@ def _sweep(args: argparse.Namespace) -> int:
 SWEEP = arguments.Interface(
     "Writes a program that shakes one axis: moves back and forth whose frequency rises and falls, band by band, "
     "with pauses. Reports the band that the control can reach and the acceleration of each part, simulated from "
-    "the written program. Any logger records accelerations while it runs; `identify --sweep` finds the "
+    "the emitted program. Any logger records accelerations while it runs; `identify --sweep` finds the "
     "modes. Exit code 0; 2: bad input, or a band that the control does not reach.",
     (
         *options.MACHINE,
-        ("--axis", None, ("x", "y", "z"), "that is shaken (default: %(default)s)", "x"),
+        ("--axis", None, ("x", "y", "z"), "axis to shake (default: %(default)s)", "x"),
         ("--frequencies", "LOW:HIGH", arguments.frequency_band,
-         "of the moves back and forth, Hz (default: from 8 Hz up to what the control reaches, at most 200 Hz)"),
+         "frequency range of the moves, Hz (default: from 8 Hz up to what the control reaches, at most 200 Hz)"),
         ("--travel", "MM", arguments.positive,
          "longest move, in the positive direction from the start point (default: 5)", 5.0),
-        ("--acceleration", "SHARE", arguments.ratio,
-         "amplitude, of the largest acceleration of the axis: a drive tolerates some 30%% for the whole sweep "
+        ("--acceleration", "RATIO", arguments.ratio,
+         "acceleration amplitude relative to the axis' maximum; a drive tolerates about 30%% over a whole sweep "
          "(default: 30%%)", 0.3),
         ("--seconds", "S", arguments.positive, "approximate duration of all moves together (default: 60)", 60.0),
         ("-o --output", "OUT.NC", None, "program", arguments.NEEDED),

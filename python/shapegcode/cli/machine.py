@@ -1,4 +1,4 @@
-"""``shapegcode machine``: write a machine file to start from, import one, or explain the values of one; ``setup``: make
+"""``shapegcode machine``: write a first machine file, import one, or explain its values; ``setup``: make
 one by answering questions."""
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ def _init(args: argparse.Namespace) -> int:
         sys.stdout.write(text)
         return 0
     write_new(args, text)
-    print(f"wrote {args.output}, the values of {args.name}: inherited or assumed, until you put in your own")
+    print(f"wrote {args.output}, the values of {args.name}: inherited or assumed, until you enter your own")
     if not args.quiet:
-        print(f"next: put in your machine's limits and vibration modes, then: shapegcode machine show {args.output}")
+        print(f"next: enter your machine's limits and vibration modes, then: shapegcode machine show {args.output}")
     return 0
 
 
@@ -48,7 +48,7 @@ def _import(args: argparse.Namespace) -> int:
     runner.check_files(args)
     dump, tables = _sorted(args.dump)
     base = Machine.load(args.base) if args.base else None
-    keep, rigid = decided_modes(args, _modes_of(base), "no dump holds modes, and")
+    keep, rigid = decided_modes(args, _modes_of(base), "a dump contains no modes, and")
     found = import_parameters(dump, base, tables=tables, name=args.name, keep_modes=keep, rigid=rigid)
     if found.ok:
         write_new(args, found.to_toml())
@@ -57,7 +57,7 @@ def _import(args: argparse.Namespace) -> int:
 
 
 def _modes_of(machine: Machine | None) -> dict[str, str]:
-    """Per axis the modes that a machine has, in words."""
+    """Modes of a machine per axis, as text."""
     if machine is None:
         return {}
     axes = zip("xyz", machine.axes.as_tuple(), strict=True)
@@ -66,7 +66,7 @@ def _modes_of(machine: Machine | None) -> dict[str, str]:
 
 
 def _sorted(files: list[str]) -> tuple[str, list[str]]:
-    """The parameter dump among some files, and the tables."""
+    """Split files into the parameter dump and the tables."""
     from shapegcode.machine.fanuc_dump import is_table
 
     if len(files) == 1:
@@ -75,7 +75,7 @@ def _sorted(files: list[str]) -> tuple[str, list[str]]:
     dumps = [file for file in files if file not in tables]
     if len(dumps) != 1:
         note = f"more than one: {', '.join(dumps)}" if dumps else "none: tables of offsets do not make a machine"
-        raise ArgumentError(f"one parameter dump (CNC-PARA.TXT) is needed, and there is {note}")
+        raise ArgumentError(f"one parameter dump (CNC-PARA.TXT) is needed; found: {note}")
     return dumps[0], tables
 
 
@@ -93,7 +93,7 @@ def _show(args: argparse.Namespace) -> int:
 
 
 def _write_origins(name: str) -> None:
-    """Write where the values of a machine file come from as a table into it; everything else stays."""
+    """Write the provenance of the values of a machine file into it as a table; leave everything else unchanged."""
     from shapegcode.identification.update import check_updatable
     from shapegcode.machine import Machine
     from shapegcode.settings.edit import with_origin_table
@@ -107,7 +107,7 @@ def _write_origins(name: str) -> None:
 
 
 def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescription:
-    """With the values that were not measured, by what they do to a program."""
+    """Add the unverified values, ranked by their effect on a program."""
     from shapegcode.conversion.convert import convert
     from shapegcode.conversion.tables import rank_unknown_axes
     from shapegcode.machine import Machine
@@ -117,18 +117,18 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
     machine, note = Machine.load(args.machine), ""
     with runner.progress(f"converting {args.input}", args):
         if any(axis.modes for axis in machine.axes.as_tuple()):
-            # What matters is asked of a shaped program, whether or not shaping it is worth its price.
+            # The ranking is for the shaped program, even if shaping is not worth its price.
             conversion = convert(args.input, machine.with_values(ANY_PRICE), shape_all=True, tolerance_curve=False)
             rows = conversion.parameter_sensitivity
             if conversion.worst_case is None:
-                note = f"{args.input}: nothing in it was shaped, so nothing is ranked"
+                note = f"{args.input}: nothing was shaped, so nothing is ranked"
         else:
             rows = rank_unknown_axes(args.input, machine)
             note = (
                 "no axis has a vibration mode, so there is nothing to shape for: each that may have one was given a "
-                "usual one, and simulated the program as it is"
+                "usual one, and the unchanged program was simulated"
                 if rows
-                else "every axis is said to be rigid, so there is nothing to shape for"
+                else "every axis is declared rigid, so there is nothing to shape for"
             )
     matters = []
     for row in rows:
@@ -168,7 +168,7 @@ def _schema(args: argparse.Namespace) -> int:
         write_text(args.output, file_schema(args.kind))
         print(f"wrote {args.output}")
         if not args.quiet:
-            print(f"next: put `#:schema {args.output}` into the first line of a {args.kind} file")
+            print(f"next: write `#:schema {args.output}` into the first line of a {args.kind} file")
     return 0
 
 
@@ -179,23 +179,23 @@ _INIT_ACTION = Interface(
     (
         ("name", "NAME", {"nargs": "?"}, "built-in machine to start from (default: %(default)s)", "vx500"),
         ("-o --output", "FILE", None, "file to write (default: %(default)s); - for standard output", _DEFAULT_FILE),
-        ("--full", None, bool, "every key with its meaning (600 lines), not only what differs from a default"),
+        ("--full", None, bool, "every key with its meaning (600 lines), not only values that differ from a default"),
         _FORCE,
         QUIET,
     ),
     _init,
 )
 _IMPORT_ACTION = Interface(
-    "Make a machine file from a FANUC parameter dump, and say what was read, assumed and missing. "
+    "Make a machine file from a FANUC parameter dump, and list what was read, assumed and missing. "
     "Exit code 1 if nothing was read.",
     (
         ("dump", "DUMP", {"nargs": "+"},
-         "parameter dump as the controller punches it; with it, if wanted, its tables of tool offsets, work offsets "
+         "parameter dump as punched by the controller; optionally with its tables of tool offsets, work offsets "
          "and variables (TOOLOFST.TXT, EXT_WKZ.TXT, MACRO.TXT)"),
         ("-o --output", "FILE", None, "file to write (default: %(default)s)", _DEFAULT_FILE),
-        ("--from", "MACHINE", {"dest": "base"}, "machine for what the dump does not say, such as the modes"),
+        ("--from", "MACHINE", {"dest": "base"}, "machine for values that are not in the dump, such as the modes"),
         *MODES,
-        ("--name", "NAME", None, "name of the machine (default: that of the dump's file)"),
+        ("--name", "NAME", None, "name of the machine (default: name of the dump file)"),
         _FORCE,
         *RESULT,
     ),
@@ -203,21 +203,21 @@ _IMPORT_ACTION = Interface(
 )  # fmt: skip
 _SHOW_ACTION = Interface(
     "Print every value with its unit, meaning and origin: measured, from the control's dump, inherited "
-    "from another machine, assumed, a choice, stated in the file, or a default.",
+    "from another machine, assumed, a choice, set in the file, or a default.",
     (
         ("machine", "FILE_OR_NAME", None, "machine file, or name of a built-in machine"),
         ("--for", "PROGRAM", {"dest": "input"},
-         "convert this program, and rank the unverified parameters by how far each changes its verdict"),
+         "convert this program, and rank the unverified parameters by their effect on its verdict"),
         ("--write-origins", None, bool,
-         "write where the values come from as a table [origin] into the file: of an older one, whose comments say it, "
-         "or of values with an origin beside them"),
+         "write the origins of the values into the file as a table [origin]: for a file with origins in comments, "
+         "or for values with an origin next to them"),
         *RESULT,
     ),
     _show,
 )  # fmt: skip
 _DIFF_ACTION = Interface(
     "List the values in which two machines differ, defaults included. Exit code 0 if they have the "
-    "same values, 1 if not; where a value comes from does not count.",
+    "same values, 1 if not; origins are not compared.",
     (("files", "MACHINE", {"nargs": 2}, "machine file, or name of a built-in machine"), *RESULT),
     _diff,
 )
@@ -235,7 +235,7 @@ _SCHEMA_ACTION = Interface(
 MACHINE = Interface(
     "",
     actions={
-        "init": ("write a commented machine file to start from", _INIT_ACTION),
+        "init": ("write a commented machine file as a start", _INIT_ACTION),
         "import": ("make a machine file from a controller's parameter dump (CNC-PARA.TXT)", _IMPORT_ACTION),
         "show": ("print every value with its unit, origin and meaning", _SHOW_ACTION),
         "diff": ("list the values in which two machines differ", _DIFF_ACTION),
@@ -250,29 +250,29 @@ def _set_up(args: argparse.Namespace) -> int:
 
     runner.check_files(args, also_read=[args.answers] if args.answers else [])
     if Path(args.output).exists() and not args.force:
-        raise file_exists(args.output)  # before anybody has answered a dozen questions
+        raise file_exists(args.output)  # before the questions are answered
     if args.answers is not None:
         answers = read_answers(args.answers)
     elif sys.stdin.isatty() and sys.stdout.isatty():
-        from shapegcode.setup.ask import ask_all  # with all that asks
+        from shapegcode.setup.ask import ask_all  # imports the dialogue modules
 
         answers = ask_all()
     else:
-        raise ArgumentError("setup asks at a terminal, and there is none: --answers FILE answers in place of it")
+        raise ArgumentError("setup needs a terminal for its questions; without one use --answers FILE")
     found = set_up(answers)
     write_new(args, found.text)
     return runner.finish(replace(found, file=args.output), args, notes=found.notes, wrote=[args.output])
 
 
 SETUP = Interface(
-    "Asks what a shop knows about its machine, explains what each answer changes, reads the control's parameter "
+    "Asks for the machine data of a shop, explains what each answer changes, reads the control's parameter "
     "file and tap tests if there are any, and writes a short machine file with the answers and their provenance; "
     "everything else is a default. Enter means `not known yet` at every question, and < goes back to the one "
     "before. Another machine's modes are never used.",
     (
         ("-o --output", "FILE", None, "machine file to write (default: %(default)s)", _DEFAULT_FILE),
         ("--answers", "FILE", None,
-         "answers from a file (TOML, or JSON) in place of questions; the keys are in docs/howto/setup.md"),
+         "answers from a file (TOML or JSON) instead of questions; the keys are in docs/howto/setup.md"),
         _FORCE,
         *RESULT,
     ),

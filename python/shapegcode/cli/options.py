@@ -22,31 +22,31 @@ if TYPE_CHECKING:
 _MACHINE_HELP = "machine file (TOML), or name of a built-in machine such as vx500"
 _SET: Row = (
     "--set", "KEY=VALUE", [None],
-    "use another value for one key of the machine file, for example --set input.arc_centre=absolute; may be repeated",
+    "override one key of the machine file, for example --set input.arc_centre=absolute; may be repeated",
     [],
 )  # fmt: skip
 MACHINE = (("-m --machine", "MACHINE", None, _MACHINE_HELP, NEEDED), _SET)
 MACHINE_OR_NONE = (("-m --machine", "MACHINE", None, _MACHINE_HELP), _SET)
 PROGRAM = (
     "--program", "O1234", program_choice,
-    "program to read of a file that holds several (default: the first): its number, /FOLDER/O1234 where folders of a "
-    "memory punch hold the same one, <NAME>, #3 for the third one; all: each that no other one calls",
+    "program of a multi-program file (default: the first): O1234; /FOLDER/O1234 if several folders hold it; <NAME>; "
+    "#3: the third; all: every program that no other program calls",
 )  # fmt: skip
-"""``all`` is taken up by `shapegcode.cli.several`."""
+"""``all`` is handled in `shapegcode.cli.several`."""
 
-JSON = ("--json", "FILE", None, "write the result as JSON to FILE; - for standard output and nothing else there")
+JSON = ("--json", "FILE", None, "write the result as JSON to FILE; -: to standard output, without other output")
 SCRIPT = (
     "--html-script", None, ("inline", "beside"),
-    "the page's script in its file (default), or in one beside it, which other pages share", "inline",
+    "script inside the page (default), or in a separate file, shared by the pages of the folder", "inline",
 )  # fmt: skip
 QUIET = ("-q --quiet", None, bool, "only the answer, warnings and errors")
 AMOUNT = OneOf("verbosity", (
     QUIET, ("-v --verbose", None, bool, "every table with every column and row, however wide"),
 ))  # fmt: skip
-_PAGE = ("--html", "FILE", None, "write the result as a page: one file that any browser opens, without a network")
-_CITE = ("--cite", None, bool, "also say which papers are behind the methods of this run, as BibTeX")
-RESULT = (JSON, _PAGE, SCRIPT, _CITE, AMOUNT)  # what every command with a result has
-RESULT_OF_DRAWS = (JSON, _PAGE, SCRIPT, AMOUNT)  # without --cite: each draw is a run of `convert`, which cites
+_PAGE = ("--html", "FILE", None, "write the result as a page: one HTML file, readable offline")
+_CITE = ("--cite", None, bool, "also list the papers on which the methods are based, as BibTeX")
+RESULT = (JSON, _PAGE, SCRIPT, _CITE, AMOUNT)  # of every command with a result
+RESULT_OF_DRAWS = (JSON, _PAGE, SCRIPT, AMOUNT)  # without --cite: each sample is a run of `convert`, which cites
 
 
 def program_input(metavar: str = "IN") -> tuple[Row, ...]:
@@ -55,12 +55,12 @@ def program_input(metavar: str = "IN") -> tuple[Row, ...]:
 
 
 def plots(what: str = "write pictures (PNG and SVG) of the region that vibrates most into this folder") -> Row:
-    """``--plots DIR``; *what* is its help."""
+    """``--plots DIR`` with the help *what*."""
     return "--plots", "DIR", None, what
 
 
 def cluster(what: str) -> tuple[Row, ...]:
-    """``--scheduler`` and its certificates; `what` names the work that runs there."""
+    """``--scheduler`` and its certificates; *what*: the work that runs there."""
     certificates = {"ca": "the authority's certificate", "cert": "own certificate", "key": "own key"}
     return (
         ("--scheduler", "ADDRESS", None,
@@ -70,7 +70,7 @@ def cluster(what: str) -> tuple[Row, ...]:
 
 
 def cluster_of(args: argparse.Namespace) -> Cluster | None:
-    """What `cluster` declared."""
+    """Cluster given by the options of `cluster`; None without them."""
     from shapegcode.batching.process import Cluster
 
     return None if args.scheduler is None else Cluster(args.scheduler, args.tls_ca, args.tls_cert, args.tls_key)
@@ -78,28 +78,28 @@ def cluster_of(args: argparse.Namespace) -> Cluster | None:
 
 MODES = (
     ("--keep-modes", "AXES", axes,
-     "keep the modes of these axes, for example XY, though they were not measured here: it is the same machine"),
-    ("--rigid", "AXES", axes, "these axes have no vibration mode that counts, for example Z"),
+     "keep the modes of these axes, for example XY, though not measured: the file is of the same machine"),
+    ("--rigid", "AXES", axes, "these axes have no significant vibration mode, for example Z"),
 )  # fmt: skip
-"""What decides over modes that were not measured on this machine."""
+"""Options for modes that were not measured on this machine."""
 
 
 def cutting(*, required: bool) -> tuple[Row, ...]:
-    """What a feed schedule needs beside program and machine: tool, stock, margin, resolution."""
+    """Options of a feed schedule: tool, stock, margin, resolution."""
     return (
         ("--tool", "T.toml", {"action": "append", "required": required},
          "tool file: end mill, cutting force, limits (docs/reference/tool_files.md); repeated, each file needs its T "
          "number"),
         ("--stock", "S.toml", {"required": required},
          "stock file: shape of the workpiece before the first block (docs/reference/tool_files.md)"),
-        ("--margin", "RATIO", share, "share of each limit that is left free, for example 3%% (default: 1.5%%)"),
+        ("--margin", "RATIO", share, "safety margin kept to each limit, for example 3%% (default: 1.5%%)"),
         ("--resolution", "LENGTH", micrometres,
          "grid of the material, for example 50um (default: a hundredth of the tool's diameter)"),
     )  # fmt: skip
 
 
 def read_cutting(args: argparse.Namespace) -> dict[str, Any]:
-    """What `cutting` declared, as `schedule_feed` and `convert_scheduled` take it."""
+    """Arguments of `schedule_feed` and `convert_scheduled` from the options of `cutting`."""
     from shapegcode.cutting.stock import Stock
     from shapegcode.cutting.tool import Tool
     from shapegcode.feed.schedule import MARGIN
@@ -113,7 +113,7 @@ def read_cutting(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def load_machine(args: argparse.Namespace, *, writes_program: bool = False) -> Machine:
-    """The machine of ``-m`` with the values of ``--set``; refused where a program cannot be written in its words."""
+    """The machine of ``-m`` with the values of ``--set``; refused if programs cannot be written for its dialect."""
     from shapegcode.machine import Machine
 
     machine = Machine.load(args.machine)
@@ -160,7 +160,7 @@ def file_exists(name: str) -> ArgumentError:
 
 
 def write_new(args: argparse.Namespace, text: str) -> None:
-    """Write the file of ``-o``; an existing file is replaced only with ``--force``."""
+    """Write the file of ``-o``; replace an existing one only with ``--force``."""
     try:
         write_text(args.output, text, overwrite=args.force)
     except FileExistsError:
@@ -168,7 +168,7 @@ def write_new(args: argparse.Namespace, text: str) -> None:
 
 
 def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
-    """Refuse to write a file that is read, or written otherwise, in the same run."""
+    """Refuse to write a file that the same run also reads or writes."""
     others = list(others)
     for target in targets:
         for other in others:
@@ -179,7 +179,7 @@ def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
                 )
 
 
-# How a value of a unit is typed on the command line: what is shown for it, what reads it, an example.
+# Values with a unit on the command line: metavar, parser, example.
 _TYPED: dict[str, dict[str, Any]] = {
     "µm": {"metavar": "LENGTH", "type": micrometres, "example": "5um"},
     "s": {"metavar": "TIME", "type": seconds, "example": "5ms"},
@@ -189,7 +189,7 @@ _MAX_CHOICES_SHOWN = 4
 
 
 def override_options(keys: Mapping[str, str]) -> tuple[Row, ...]:
-    """An option for each key, without a default: what is not typed is the machine's own."""
+    """One option per key, without a default: the machine's value applies."""
     rows = []
     for option, key in keys.items():
         meaning, unit, kind = _facts(key)
@@ -210,7 +210,7 @@ def override_options(keys: Mapping[str, str]) -> tuple[Row, ...]:
 
 
 def overridden(machine: Machine, args: argparse.Namespace, keys: Mapping[str, str]) -> Machine:
-    """The machine with the values that were typed."""
+    """The machine with the values of these options."""
     typed = {key: getattr(args, option.removeprefix("--").replace("-", "_")) for option, key in keys.items()}
     stated = {key: value for key, value in typed.items() if value is not None}
     return machine.with_values(stated, source="options") if stated else machine
@@ -231,7 +231,7 @@ def _facts(key: str) -> tuple[str, str, Any]:
 
 
 def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], introduction: str) -> tuple[str, str]:
-    """What the options say, and at a terminal the answers to a question for each axis that they leave open."""
+    """Axes to keep and rigid axes, from the options; at a terminal also from a question for each undecided axis."""
     keep, rigid = args.keep_modes or "", args.rigid or ""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return keep, rigid

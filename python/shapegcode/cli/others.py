@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from shapegcode.results.page.model import Page
 
 
-# The registry's, whose solvers take too long to load for a help text.
+# As in the registry of families, whose solvers would load too slowly for a help text.
 _FAMILIES = (
     "zv", "zvd", "zvdd", "mzv", "ei", "ei2", "ei3", "si", "negative-zv", "simultaneous", "minimal", "polynomial",
     "non-negative", "robust", "mirrored", "smooth-zv", "smooth-mzv", "smooth-ei", "smooth-ei2", "smooth-si",
@@ -35,7 +35,7 @@ def _shaper(args: argparse.Namespace) -> int:
         runner.output_console(args.json).print(families_table())
         return 0
     if bool(args.mode) == (args.machine is not None):
-        raise ArgumentError("the modes come from --mode 46:0.02 ... or from -m MACHINE: give one of both")
+        raise ArgumentError("the modes come from --mode 46:0.02 ... or from -m MACHINE: give one of them")
     machine = None if args.machine is None else load_machine(args)
     runner.check_files(args)
     with runner.progress("comparing shapers", args) as bar:
@@ -52,7 +52,7 @@ def _shaper(args: argparse.Namespace) -> int:
 
 SHAPER = Interface(
     "Designs every family of input shapers for some vibration modes and compares them: duration, residual "
-    "vibration if the frequencies are off, contour cost, negative impulses; and recommends one. "
+    "vibration at other frequencies, contour cost, negative impulses; and recommends one. "
     "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input.",
     (
         ("--mode", "HZ[:DAMPING][±BAND]", [None],
@@ -60,27 +60,27 @@ SHAPER = Interface(
          "mode", []),
         *MACHINE_OR_NONE,
         ("--uncertainty", "RATIO", share,
-         "how far the frequency of a mode that states no band may be off, for example 5%% (default: 0)", 0.0),
+         "uncertainty of the frequency of modes given without a band, for example 5%% (default: 0)", 0.0),
         ("--block-period", "TIME", [seconds],
          "block period on which the impulses must lie, such as 5ms; may be repeated (default: the machine's, or the "
          "best few)", []),
         ("--continuous", None, bool,
-         "designs at continuous times, with --block-period beside those on its grid (default: without a machine)"),
+         "also design in continuous time, not only on the grid of --block-period (default: if no machine is given)"),
         ("--family", "NAME", {"action": "extend", "nargs": "+"},
          f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"),
-        ("--list-families", None, bool, "say what each family is and where it comes from, and nothing else"),
+        ("--list-families", None, bool, "list the families with meaning and source, and exit"),
         ("--max-duration", "TIME", seconds,
          "longest shaper, for example 50ms (default: three periods of the slowest mode; the machine's limit if that is "
          "not enough)"),
         ("--max-abs-sum", "N", positive, "largest sum of the impulses' magnitudes (default: %(default)g)", 10.0),
         ("--vibration-limit", "RATIO", ratio,
-         "largest share of the vibration that may be left anywhere in the bands (default: the machine's "
-         "shaping.vibration_limit, else 5%%)"),
+         "maximum residual ratio within the bands (default: the machine's "
+          "shaping.vibration_limit, else 5%%)"),
         ("--objective", None, ("shortest", "contour", "robust"),
-         "what the recommended design minimizes, within the limit: duration, contour cost, or residual vibration "
+         "quantity that the recommended design minimizes: duration, contour cost, or residual vibration "
          "(default: %(default)s)", "shortest"),
         ("--negative", None, bool, "a design with negative impulses may be recommended"),
-        ("--taps", "TIME:A,...", None, 'compare a shaper of your own: "0:.5,10.9ms:.5"'),
+        ("--taps", "TIME:A,...", None, 'compare your own shaper (impulses): "0:.5,10.9ms:.5"'),
         ("--speed", "MM/S", positive, "speed at which the contour cost is shown (default: %(default)g)", 200.0),
         ("--radius", "MM", positive, "radius of the arc on which it is shown (default: %(default)g)", 20.0),
         plots("write pictures of the comparison (PNG and SVG) into this folder"),
@@ -115,14 +115,14 @@ def _report(args: argparse.Namespace) -> int:
 
 
 def _target(source: Path, report: Mapping[str, Any]) -> Path:
-    """The page beside the JSON; one of several programs has its address in the name."""
+    """Path of the page, in the folder of the JSON; for one of several programs with its address."""
     address = str(report.get("program_address", ""))
     label = "".join(letter if letter.isalnum() else "-" for letter in address).strip("-")
     return source.with_name(f"{source.stem}{'-' + label if label else ''}.html")
 
 
 def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[float], None]) -> tuple[Page, str]:
-    """The page of a result, and the result's class; empty: this version cannot read it."""
+    """The page of a result, and the result's class; empty if this version cannot read it."""
     from shapegcode.cli.replay import changes, simulated_again
     from shapegcode.results.json import this_version
     from shapegcode.results.outcome import NotKeptError
@@ -151,12 +151,12 @@ def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[flo
 
 
 REPORT = Interface(
-    "Makes the page that --html writes later, from the JSON: figures from the JSON, and where the programs and the "
-    "machine file are still as they were, their motion too. Changed files are reported on the page and here (exit "
+    "Makes the page of --html later: figures from the JSON, and, if the programs and the "
+    "machine file are unchanged, also their motion. Changed files are reported on the page and here (exit "
     "code 1). Files are searched at their original paths, and in the folder of the JSON.",
     (
-        ("inputs", "RESULT.json", {"nargs": "+"}, "what --json has written"),
-        ("-o --output", "PAGE.html", None, "page to write (default: RESULT.html beside the JSON)"),
+        ("inputs", "RESULT.json", {"nargs": "+"}, "file written by --json"),
+        ("-o --output", "PAGE.html", None, "page to write (default: RESULT.html in the same folder)"),
         SCRIPT,
         JSON,
         AMOUNT,
@@ -169,14 +169,14 @@ _PAGES = {
     "metrology": "paper000", "corner": "paper001", "shaper": "paper002", "tap": "paper003", "cycle-time": "paper004",
     "evidence": "evidence",
 }  # fmt: skip
-"""Pages of the book that repeat what the command of that name did up to version 0.1.0."""
+"""Pages of the documentation that replace the demo of that name of version 0.1.0."""
 
 
 def _name(word: str) -> str:
     if word in _PAGES:
         page = f"docs/evidence/{_PAGES[word]}.md"
         raise argparse.ArgumentTypeError(
-            f"{word} is a page of the book now, which says what repeats its figures: {page}"
+            f"{word} is now a page of the documentation, which says how to reproduce its figures: {page}"
         )
     return word
 
@@ -191,18 +191,18 @@ def _demo(args: argparse.Namespace) -> int:
 
 
 DEMO = Interface(
-    "Repeats the figures of a paper with this program's models, and shows both. Other papers are pages of the "
-    "book: docs/evidence/figures.md. Exit code 1 if a statement of the paper differs and why is not known.",
+    "Reproduces the figures of a paper with this program's models, and shows both. Other papers are pages of the "
+    "documentation: docs/evidence/figures.md. Exit code 1 if a statement of the paper differs for an unknown reason.",
     (
         ("name", "NAME", {"type": _name, "choices": ("path",)},
          "path: line, arc, line at both feeds and reductions: Ko, Lim and Hong, 2023 (paper 000)"),
-        plots("folder for the pictures, where there are some (PNG and SVG)"),
+        plots("folder for the pictures, if there are any (PNG and SVG)"),
         *RESULT,
     ),
     _demo,
 )  # fmt: skip
 
-# The shell asks the command itself at each TAB: what is offered is what the parser of this version takes.
+# At each TAB the shell calls the command itself, so that completions match the parser of this version.
 
 
 def _completion(args: argparse.Namespace) -> int:
@@ -213,15 +213,15 @@ def _completion(args: argparse.Namespace) -> int:
 
 
 def complete() -> None:
-    """Print the completions for a shell, and end the process."""
+    """Print the completions for a shell, and exit."""
     import argcomplete
 
     argcomplete.autocomplete(parser_of(command_in(os.environ.get("COMP_LINE", "").split()[1:])))
 
 
 COMPLETION = Interface(
-    "Prints the script that has a shell complete commands, options, their values and files at TAB. Put into "
-    '~/.bashrc or ~/.zshrc:\n\n  eval "$(shapegcode completion bash)"\n\nor zsh in place of bash; into '
+    "Prints the shell completion script for commands, options, their values and files. Put into "
+    '~/.bashrc or ~/.zshrc:\n\n  eval "$(shapegcode completion bash)"\n\nor zsh instead of bash; into '
     "~/.config/fish/config.fish:\n\n  shapegcode completion fish | source",
     (("shell", None, ("bash", "zsh", "fish"), "your shell"),),
     _completion,

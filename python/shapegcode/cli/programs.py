@@ -10,7 +10,7 @@ from shapegcode.cli.arguments import NEEDED, Interface, OldName, count, line_ran
 from shapegcode.cli.options import RESULT, load_machine
 from shapegcode.io.data_file import write_lines
 
-# Of the progress bar, for the regions; the rest is the motion in time, which takes most of it.
+# Ratio of the progress bar for the regions; the motion in time takes the rest.
 _REGIONS_SHARE = 0.1
 
 
@@ -40,8 +40,8 @@ def _simulate(args: argparse.Namespace) -> int:
 
 
 SIMULATE = Interface(
-    "Simulates a program: the controller's model, then the machine's plant. Of each cut: time, "
-    "residual and peak vibration, settling time, contour error of command and response. Of the whole program with "
+    "Simulates a program: the controller's model, then the machine's plant. For each cut: time, "
+    "residual and peak vibration, settling time, contour error of command and response. For the whole program with "
     "its rapids, dwells and waits: the motion of the axes in time, as table, files and pictures.",
     (
         *options.program_input(),
@@ -49,16 +49,16 @@ SIMULATE = Interface(
          "simulate every cut as shaped blocks: at their feed, without look-ahead; needed only if the header of a "
          "shaped program, which marks its shaped cuts, is missing"),
         ("--against", "ORIGINAL", None,
-         "measure the contour error against the path of this program, such as the original of a shaped one; without it "
-         "against IN's own path"),
+         "measure the contour error against the path of this program, such as the original of a shaped one (default: "
+         "IN's own path)"),
         ("--plant", None, ("modal", "feed-drive"),
-         "modal: vibration modes behind an ideal servo; feed-drive: motor, ball screw, table, friction and servo loops "
-         "of [axes.x.drive] (default: %(default)s)", "modal"),
+         "modal: ideal servo followed by vibration modes; feed-drive: motor, ball screw, table, friction and servo "
+         "loops of [axes.x.drive] (default: %(default)s)", "modal"),
         ("--csv", "FILE", None, "write the motion in time, one line per period; - for standard output"),
         ("--npz", "FILE", None, "write the same columns as a NumPy archive"),
         ("--every", "N", count, "write every N-th sample only (default: %(default)d)", 1),
         ("--lines", "A-B", line_range,
-         "motion in time of these lines alone, as `shapegcode expand` numbers them; the program is simulated from its "
+         "motion in time of these lines only, numbered as by `shapegcode expand`; the program is simulated from its "
          "start in any case"),
         options.plots(
             "write pictures (PNG and SVG) into this folder: the motion in time, and path, feed and vibration of the "
@@ -85,9 +85,9 @@ def _feed(args: argparse.Namespace) -> int:
 
 
 FEED = Interface(
-    "Sweeps the tool through the stock, computes the cutting force of the feed that the machine really runs, and "
-    "writes the program with the highest feeds that keep the tool's limits. Blocks are divided where the load "
-    "changes within them; everything else stays as it is. Exit code 0: every limit is kept; 1: written, but "
+    "Sweeps the tool through the stock, computes the cutting force at the feed that the machine really reaches, and "
+    "writes the program with the highest feeds that keep the tool's limits. Blocks are split where the load "
+    "changes within them; everything else is unchanged. Exit code 0: every limit is kept; 1: written, but "
     "somewhere a limit is not kept (the report says where and why); 2: bad input.",
     (
         *options.program_input(),
@@ -114,14 +114,14 @@ def _expand(args: argparse.Namespace) -> int:
 
 
 EXPAND = Interface(
-    "Writes a program with its subprogram calls, custom macros, coordinate modes (G16, G51, G51.1, G68), corner "
-    "words and cutter compensation worked out: plain blocks that any control runs, also from DNC. Nothing is "
+    "Writes a program with subprogram calls, custom macros, coordinate modes (G16, G51, G51.1, G68), corner words "
+    "and cutter compensation expanded into plain blocks that any control runs, also from DNC. Nothing is "
     "shaped. The input is never overwritten.",
     (
         *options.program_input(),
         ("-o --output", "OUT", None, "program to write; - for standard output", NEEDED),
         ("--compensation", None, ("expand", "keep"),
-         "G41/G42 as plain moves of the tool centre, or as they stand (default: %(default)s)", "expand"),
+         "G41/G42 as plain moves of the tool centre, or unchanged (default: %(default)s)", "expand"),
         *RESULT,
     ),
     _expand,
@@ -148,28 +148,28 @@ def _measure(args: argparse.Namespace) -> int:
 
 
 MEASURE = Interface(
-    "Simulates programs on the machine's model and measures the response like a part: per section of the path "
+    "Simulates programs on the machine's model and measures the response like a part: for each section of the path "
     "vibration and settling time, contour error, fitted radius, the walls that the tool leaves, their roughness "
-    "and waviness. Programs written by shapegcode are measured against the first one if that is not. "
+    "and waviness. Programs written by shapegcode are measured against the first one if that was not. "
     "Exit code 0; 1: the response of a program leaves the path by more than tolerance.contour_um (of shaped "
-    "programs beside their original the shaped ones count alone); 2: bad input.",
+    "programs with their original only the shaped ones count); 2: bad input.",
     (
-        ("inputs", "PROGRAM", {"nargs": "+"}, "CNC program; several stand side by side"),
+        ("inputs", "PROGRAM", {"nargs": "+"}, "CNC program; several are compared side by side"),
         *options.MACHINE,
         options.PROGRAM,
-        ("--tool-diameter", "LENGTH", micrometres, "of the tool, for example 3mm", NEEDED),
+        ("--tool-diameter", "LENGTH", micrometres, "tool diameter, for example 3mm", NEEDED),
         ("--plant", None, ("modal", "feed-drive"),
-         "modal: vibration modes behind an ideal servo; feed-drive: [axes.x.drive] (default: %(default)s)", "modal"),
+         "modal: ideal servo followed by vibration modes; feed-drive: [axes.x.drive] (default: %(default)s)", "modal"),
         ("--against", "ORIGINAL", None,
          "measure against the path of this program (default: the first one if shapegcode wrote the others, else each "
          "program's own path)"),
         ("--lines", "A-B", [line_range],
          "measure the cut of these lines as one section; may be repeated (default: every line and arc)"),
-        ("--settling-band", "LENGTH", micrometres, "settled is what stays within it (default: 1um)", 1.0),
-        ("--station", "LENGTH", micrometres, "distance of the places at which walls are measured (default: 0.05mm)",
+        ("--settling-band", "LENGTH", micrometres, "vibration within it counts as settled (default: 1um)", 1.0),
+        ("--station", "LENGTH", micrometres, "distance of the stations at which walls are measured (default: 0.05mm)",
          50.0),
         ("--cutoff", "LENGTH", micrometres,
-         "cut-off of the roughness (default: 0.8mm, less on sections shorter than 5.6 mm)"),
+         "cut-off of the roughness (default: 0.8mm, less for sections shorter than 5.6 mm)"),
         ("--lambda-s", "LENGTH", micrometres, "short-wave cut-off (default: none)", 0.0),
         options.plots("write pictures of part, walls and width (PNG and SVG) into this folder"),
         *RESULT,
@@ -179,7 +179,7 @@ MEASURE = Interface(
 )  # fmt: skip
 
 
-# A table of more blocks is built only where it is written.
+# A larger table of blocks is built only if it is written.
 _MAX_BLOCKS_SHOWN = 100_000
 
 
@@ -209,7 +209,7 @@ def _time(args: argparse.Namespace) -> int:
     ):
         percent = getattr(machine.times, key)
         if given is None and percent != 100.0:
-            notes.append(f"{what} at {percent:g} %, as this shop usually runs (times.{key})")
+            notes.append(f"{what} at {percent:g} %, the usual setting in this shop (times.{key})")
     notes += [shaped] if (shaped := shaped_note(program)) else []
     if free:
         part = f"{free} of {len(events)} " if free < len(events) else ""
@@ -219,9 +219,9 @@ def _time(args: argparse.Namespace) -> int:
 
 
 TIME = Interface(
-    "Predicts the cycle time of a program as it is, in closed form, and checks it by giving every set-point: "
+    "Predicts the cycle time of an unchanged program in closed form, and checks it by computing every set-point: "
     "cutting, rapids, in-position, dwells, acceleration, tool changes; by tool; the slowest regions and blocks. "
-    "A machine that was calibrated with run logs gives the 95 % interval too, and what would narrow it. "
+    "For a machine calibrated with run logs also the 95 % interval, and which log would narrow it. "
     "Exit code 1 if closed form and full interpolation differ by more than 0.5 %.",
     (
         *options.program_input("PROGRAM"),
@@ -229,14 +229,14 @@ TIME = Interface(
          "feed override, for example 80%% (at most 254%%; default: times.feed_override_percent)"),
         ("--rapid-override", "RATIO", ratio,
          "rapid override, for example 25%% (at most 100%%; default: times.rapid_override_percent); the acceleration of "
-         "rapids stays what it is"),
+         "rapids is unchanged"),
         ("--log-next", "PROGRAM", [None],
-         "a program that could be run with a log next: how narrow the interval would be then; several times for "
-         "several, the best comes first"),
+         "a program that could be logged next: the interval that would result; repeatable, "
+         "the best comes first"),
         ("--no-full", None, bool, "closed form only, no full interpolation"),
-        ("--blocks", None, bool, "put every block into the JSON"),
+        ("--blocks", None, bool, "write every block into the JSON"),
         ("--csv", "FILE", None, "write one line per block; - for standard output"),
-        options.plots("write the picture of where the time goes (PNG and SVG) into this folder"),
+        options.plots("write a picture of the time components (PNG and SVG) into this folder"),
         *RESULT,
     ),
     _time,
@@ -250,12 +250,12 @@ def _check(args: argparse.Namespace) -> int:
     runner.check_files(args)
     with runner.progress(f"checking {args.input}", args):
         result = check(args.input, machine, program_number=args.program)
-    # The table says the warnings.
+    # The table contains the warnings.
     return runner.finish(result, args, warnings=())
 
 
 CHECK = Interface(
-    "Lists what the control would refuse, several alarms in one run, each with number and position; and what it "
+    "Lists what the control would refuse, several alarms in one run, each with number and position; and those that it "
     "would not run as programmed: stops inside of cuts, blocks shorter than the block time, feeds above the "
     "limits of the axes, program memory, speed of the serial line. Exit code 0: no alarms and no warnings; 1: "
     "warnings; 2: at least one alarm.",
@@ -267,7 +267,7 @@ CHECK = Interface(
 def _compare(args: argparse.Namespace) -> int:
     from shapegcode.program.comparison import compare
 
-    notes = [] if args.machine else ["read as the built-in machine vx500 reads programs: -m MACHINE names another one"]
+    notes = [] if args.machine else ["read for the built-in machine vx500; -m MACHINE selects another one"]
     args.machine = args.machine or "vx500"
     machine = load_machine(args)
     runner.check_files(args)
@@ -281,11 +281,11 @@ COMPARE = Interface(
     "spindle, coolant, offsets, modal state, calls, feeds, other functions, dwells and stops. Every difference is "
     "listed with its lines. Exit code 1 if there is one that --allow does not cover.",
     (
-        ("input", "A", None, "the one program, for example the original"),
-        ("against", "B", None, "the other one, for example what convert made of it"),
+        ("input", "A", None, "first program, for example the original"),
+        ("against", "B", None, "second program, such as the output of convert"),
         *options.MACHINE_OR_NONE,
         ("--allow", "WORDS", None,
-         "differences that are allowed, for example feeds,blocks,path=20um,calls; a wrong word lists them all", ""),
+         "differences that are allowed, for example feeds,blocks,path=20um,calls; an unknown word lists all", ""),
         *RESULT,
     ),
     _compare,

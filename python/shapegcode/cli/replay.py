@@ -1,4 +1,4 @@
-"""Programs of an earlier run, found again, compared with what they were, and read again."""
+"""Find the programs of an earlier run, check that they are unchanged, and read them again."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _WITH_MOTION = ("Check", "Conversion", "CycleTime", "FeedSchedule", "Measurement
 
 
 def changes(provenance: Provenance, folder: Path) -> tuple[dict[tuple[str, str], Path], list[str]]:
-    """Look for the files of a run where they were, and in a folder."""
+    """Search for the files of a run at their former paths and in a folder; return them and the problems found."""
     asked = [file for file in provenance.files if file.role not in ("wrote", "output of all")]
     looked_up = [(file, *_looked_up(file, folder)) for file in asked]
     found = {(file.role, file.name): place for file, place, _ in looked_up if place is not None}
@@ -35,11 +35,11 @@ def changes(provenance: Provenance, folder: Path) -> tuple[dict[tuple[str, str],
 def _looked_up(file: ProvenanceFile, folder: Path) -> tuple[Path | None, str]:
     if file.role in MACHINES and file.name in Machine.builtin_names() and not Path(file.name).exists():
         now = ProvenanceFile.of(file.role, file.name, Machine.builtin_text(file.name).encode()).sha256
-        changed = f"the built-in machine {file.name} is another one in this version: motion is not shown"
+        changed = f"the built-in machine {file.name} differs in this version: motion is not shown"
         return Path(file.name), "" if now == file.sha256 else changed
     places = [place for place in (Path(file.name), folder / Path(file.name).name) if place.is_file()]
     if not places:
-        return None, f"{file.role} {file.name} is not where it was: motion is not shown"
+        return None, f"{file.role} {file.name} was not found: motion is not shown"
     hashes = []
     for place in places:
         with contextlib.suppress(OSError):
@@ -49,14 +49,14 @@ def _looked_up(file: ProvenanceFile, folder: Path) -> tuple[Path | None, str]:
     now = hashes[0][:12] if hashes else "not readable"
     return None, (
         f"{file.role} {file.name} was changed since: SHA-256 {now}…, it was {file.sha256[:12]}…; the figures are of "
-        "the file as it was, motion is not shown"
+        "the former file, motion is not shown"
     )
 
 
 def simulated_again(
     provenance: Provenance, found: Mapping[tuple[str, str], Path], report: Mapping[str, Any]
 ) -> tuple[SimulatedPrograms | None, str]:
-    """Read the programs and the machine of a run again, with the options that it was run with."""
+    """Read the programs and the machine of a run again, with the options of that run."""
     if provenance.result not in _WITH_MOTION or not provenance.command or "program_address" in report:
         return None, ""
     args = _typed(provenance.command)
@@ -69,7 +69,7 @@ def simulated_again(
 
 
 def _typed(command: str) -> argparse.Namespace | None:
-    """The options of a command as it was typed; None where it cannot be read."""
+    """Parse a command line; None if it cannot be parsed."""
     try:
         words = shlex.split(command)[1:]
     except ValueError:
@@ -77,7 +77,7 @@ def _typed(command: str) -> argparse.Namespace | None:
     selected = command_in(words)
     if selected is None:
         return None
-    # argparse says what it does not know on standard error, and ends the process.
+    # argparse reports unknown arguments on standard error and exits.
     with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
         try:
             return parser_of(selected).parse_args(words)

@@ -1,4 +1,4 @@
-"""What every command does around its one call: files, progress, answer, tables, pictures, next step, exit code."""
+"""Common parts of all commands: files, progress, answer, tables, pictures, next step, exit code."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from shapegcode.results.result import Result
     from shapegcode.results.table import Table
 
-Output = tuple[str | Path, bytes | memoryview]  # the program of a command: its file, and what goes into it
+Output = tuple[str | Path, bytes | memoryview]  # the program of a command: its file and content
 
 _PIPE_WIDTH = 120
 _PIECES = 4096
@@ -37,11 +37,11 @@ _PROGRESS_DELAY_S = 1.0
 
 
 def output_console(json_target: str | None = None, *, file: TextIO | None = None, least: int = 0) -> Console:
-    """Console for tables and text on standard output; silent where the JSON goes there (``--json -``)."""
+    """Console for tables and text on standard output; silent if the JSON goes there (``--json -``)."""
     from rich.console import Console
 
     stream = file or sys.stdout
-    # A pipe has no width: rich would take 80 characters and break the tables.
+    # A pipe has no width: rich would assume 80 characters and break the tables.
     width = None if stream.isatty() or "COLUMNS" in os.environ else _PIPE_WIDTH
     # rich would still print in bold.
     colours: Literal["auto"] | None = None if os.environ.get("NO_COLOR") else "auto"
@@ -54,7 +54,7 @@ def output_console(json_target: str | None = None, *, file: TextIO | None = None
 
 
 def wrapped(text: str) -> str:
-    """Text in lines between words on a terminal; elsewhere, where a line is searched for, as it is."""
+    """Wrap text between words on a terminal; elsewhere keep its lines, for searching."""
     if not sys.stdout.isatty():
         return text
     width = shutil.get_terminal_size().columns
@@ -66,24 +66,24 @@ def write_json(data: object, target: str | Path) -> None:
     """Write *data* as stable JSON: sorted keys, two spaces, one newline at the end; ``-`` is standard output."""
     encoder = json.JSONEncoder(sort_keys=True, indent=2, allow_nan=False, ensure_ascii=False)
     pieces = itertools.chain(encoder.iterencode(data), ["\n"])
-    # Not word by word, nor all at once: there may be millions.
+    # In chunks: there may be millions of pieces.
     write_lines(str(target), iter(lambda: "".join(itertools.islice(pieces, _PIECES)), ""))
 
 
 class ProgressBar:
-    """A bar on standard error; until it is opened nothing is shown."""
+    """A bar on standard error, shown only after `open`."""
 
     def __init__(self, description: str) -> None:
         self._description = description
         self.bar: Progress | None = None
 
     def update(self, fraction: float) -> None:
-        """Report the ratio of work that is done, 0 to 1; cheap enough for every step of a loop."""
+        """Show the finished ratio of the work, 0 to 1; cheap enough for every step of a loop."""
         if self.bar is not None:
             self.bar.update(self.bar.task_ids[0], completed=min(max(fraction, 0.0), 1.0), total=1.0)
 
     def say(self, text: str) -> None:
-        """Say what is being done in other words."""
+        """Replace the description of the progress bar."""
         self._description = text
         if self.bar is not None:
             self.bar.update(self.bar.task_ids[0], description=text)
@@ -101,7 +101,7 @@ class ProgressBar:
         self.bar = bar
 
 
-# Options that name a file which a command writes.
+# Options for files that a command writes.
 _WRITTEN = ("output", "json", "csv", "npz", "html")
 _NEVER_PIPED = {"npz": "an archive", "html": "a page"}
 
@@ -109,14 +109,14 @@ _NEVER_PIPED = {"npz": "an archive", "html": "a page"}
 def check_files(
     args: argparse.Namespace, *, also_written: Sequence[str | Path] = (), also_read: Sequence[str | Path] = ()
 ) -> None:
-    """Refuse to write a file that the same run reads, or writes twice; only one of them can have standard output."""
+    """Refuse to write a file that the run also reads or writes twice; only one may go to standard output."""
     given = {name: value for name in _WRITTEN if (value := getattr(args, name, None)) is not None}
     piped = ["-o -" if name == "output" else f"--{name} -" for name, value in given.items() if value == "-"]
     if len(piped) > 1:
         raise ArgumentError(f"{' and '.join(piped)}: only one of them can have standard output")
     for name, what in _NEVER_PIPED.items():
         if given.get(name) == "-":
-            raise ArgumentError(f"--{name} -: {what} cannot go to standard output, name a file")
+            raise ArgumentError(f"--{name} -: {what} cannot go to standard output, give a file")
     targets = [Path(value) for value in (*given.values(), *also_written) if value != "-"]
     read = [Path(name) for _, name in given_files(args)]
     refuse_same_file(targets, [*read, *map(Path, also_read)])
@@ -125,13 +125,13 @@ def check_files(
 
 
 def standard_output(args: argparse.Namespace) -> str | None:
-    """ "-" where a file goes to standard output, which then holds nothing else; else None."""
+    """ "-" if a file goes to standard output, which then contains nothing else; else None."""
     return "-" if "-" in [getattr(args, name, None) for name in _WRITTEN] else None
 
 
 @contextlib.contextmanager
 def progress(description: str, args: argparse.Namespace) -> Iterator[ProgressBar]:
-    """A bar for the block from its first second on; none without a terminal or where a file goes to standard output."""
+    """Show a bar after the first second of the block; none without a terminal or if a file goes to standard output."""
     bar = ProgressBar(description)
     later = threading.Timer(_PROGRESS_DELAY_S, bar.open)
     later.daemon = True
@@ -143,7 +143,7 @@ def progress(description: str, args: argparse.Namespace) -> Iterator[ProgressBar
     finally:
         if shown:
             later.cancel()
-            later.join()  # it may be opening just now
+            later.join()  # it may just be opening
         if bar.bar is not None:
             bar.bar.stop()
 
@@ -153,7 +153,7 @@ def write_results(report: object, json: str | None, output: Output | None) -> No
     if json not in (None, "-"):
         write_json(report, str(json))
     if output is not None:
-        # Last of all, so that no program stands there when something else could not be written.
+        # Last, so that no program exists if another file could not be written.
         if str(output[0]) == "-":
             sys.stdout.buffer.write(output[1])
         else:
@@ -168,7 +168,7 @@ def _write_page(
     """Write provenance into the JSON, and the page of --html; return the files."""
     html = getattr(args, "html", None)
     if html is None and getattr(args, "json", None) is None:
-        return []  # nobody looks at the hashes
+        return []  # the hashes are not used
 
     from shapegcode.results.json import plain
 
@@ -193,12 +193,12 @@ def finish(
     wrote: Sequence[str | Path] = (),
     output: Output | None = None,
 ) -> int:
-    """Write --json, --html, --plots and the program, and say it: answer, tables, warnings, notes, files, next step."""
+    """Write --json, --html, --plots and the program, and print answer, tables, warnings, notes, files, next step."""
     report = result.to_json()
     last = []
     if (plots := getattr(args, "plots", None)) is not None:
         pictures = report["plots"] = result.save_plots(plots)
-        last.append(f"pictures: {', '.join(pictures[::2]) or 'there are none of this result'}")
+        last.append(f"pictures: {', '.join(pictures[::2]) or 'this result has none'}")
     written = [*wrote, *([] if output is None else [output[0]])]
     if output is not None:
         report["output"] = str(output[0])
@@ -209,7 +209,7 @@ def finish(
         several.add(report, output)
     else:
         write_results(report, getattr(args, "json", None), output)
-    # Programs of one file are written together, behind the last of them.
+    # Programs of one file are written together, after the last of them.
     there = [*wrote, *pages, *([output[0]] if output is not None and several is None else [])]
     tables = result.tables() if tables is None else tables
     warnings = result.warnings if warnings is None else warnings
@@ -221,7 +221,7 @@ def _say(
     result: Result, args: argparse.Namespace, tables: Sequence[Table], warnings: Sequence[str], notes: Sequence[str],
     last: Sequence[str],
 ) -> None:  # fmt: skip
-    """Say it on standard output: first of all the answer; with --quiet nothing but that and the warnings."""
+    """Print on standard output, the answer first; with --quiet only answer and warnings."""
     from shapegcode.results.table import warning_table
 
     quiet, verbose = getattr(args, "quiet", False), getattr(args, "verbose", False)
@@ -248,17 +248,17 @@ def _say(
     for note in notes:
         say(note)
     for line in last:
-        # Paths and commands stay whole, so that they can be copied.
+        # Paths and commands stay on one line, so that they can be copied.
         console.print(line, markup=False, soft_wrap=True)
 
 
-# Options that name a file which a command reads; those of them that may name a built-in machine.
+# Options for files that a command reads; those that may be a built-in machine.
 _READ = ("input", "inputs", "files", "machine", "tool", "stock", "against", "cut", "update", "dump", "base")
 MACHINES = ("machine", "base", "files")
 
 
 def given_files(args: argparse.Namespace) -> Iterator[tuple[str, str]]:
-    """The values of all options that name files to read."""
+    """Yield role and value of all options for files to read."""
     for role in _READ:
         value = getattr(args, role, None)
         for entry in value if isinstance(value, list | tuple) else [value]:
@@ -288,7 +288,7 @@ def _read(role: str, name: str) -> ProvenanceFile:
 
 
 def _command(args: argparse.Namespace) -> str:
-    """As it was typed; of several programs of a file the one that is done."""
+    """The command line as typed; with ``--program all`` for the current program."""
     words = list(getattr(args, "typed", ()))
     if getattr(args, "several", None) is not None:
         at = next((rank for rank, word in enumerate(words) if word.startswith("--program")), None)

@@ -1,7 +1,7 @@
-"""``--program all``: a command over every program of a file that no other one calls, each as if it stood alone.
+"""``--program all``: a command over every program of a file that no other one calls, each as if it were alone.
 
-Programs that are written go into one file again; all else stands there as it was, but for subprograms whose moves
-the shaped programs have taken in.
+Emitted programs are written into one file; everything else in it is unchanged, except for subprograms whose moves
+the shaped programs now contain.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ def run_all(args: argparse.Namespace) -> int:
     """Run a command for every program of its file that no other one calls."""
     for name in _TABLES:
         if getattr(args, name, None) == "-":
-            raise ArgumentError(f"--{name} - with --program all: each program needs a file of its own, name one")
+            raise ArgumentError(f"--{name} - with --program all: each program needs a file, give one")
     machine = load_machine(args)
     check_files(args)
     source = args.input if hasattr(args, "input") else args.inputs[0]
     text = program_bytes(source, machine.controller.max_program_bytes)
     if (dialect := input_dialect(text, machine, str(source))[0]) != "fanuc":
-        raise ArgumentError(f"--program all: a file for {CONTROLS[dialect]} is one program; leave --program out")
+        raise ArgumentError(f"--program all: a file for {CONTROLS[dialect]} is one program; omit --program")
     try:
         several = Gathered(str(source), text, programs_of(text))
     except ProgramError as error:
@@ -50,7 +50,7 @@ def run_all(args: argparse.Namespace) -> int:
 
 
 def _called(several: Gathered, machine: Machine) -> set[int]:
-    """Places of programs that another one of the file calls: they are done there."""
+    """Indices of programs that another one in the file calls: they are expanded there."""
     called: set[int] = set()
     folder = Path(several.source).parent
     for place in several.places:
@@ -59,14 +59,14 @@ def _called(several: Gathered, machine: Machine) -> set[int]:
                 several.text, machine, program_number=f"#{place.index + 1}", collect_alarms=True, folder=folder
             )
         except ProgramError:
-            continue  # its own run says why
+            continue  # its own run reports the error
         called |= {*program.core.called, *(each.index for each in program.kept_calls)} - {place.index}
-    # Programs that call each other in a ring are done nevertheless.
+    # Programs that call each other in a cycle are run nevertheless.
     return called if len(called) < len(several.places) else set()
 
 
 def _left_over(several: Gathered) -> set[int]:
-    """Places of subprograms beside shaped programs, whose text has taken in what they called."""
+    """Indices of subprograms that are no longer called, because shaped programs contain their moves."""
     if STAMP_BEGIN not in several.text:
         return set()
     texts = [several.text[place.text_begin : place.text_end] for place in several.places]
@@ -95,9 +95,9 @@ def _run_one(args: argparse.Namespace, several: Gathered) -> int:
 
 
 def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left: set[int]) -> None:
-    """Write the one JSON and the one program, and say it."""
+    """Write the common JSON and program, and print the outcome."""
     outputs = {str(output) for output, _ in several.written.values()}
-    # Where one of the programs misses its tolerance, the file as a whole goes beside the one that was asked for.
+    # If one program misses its tolerance, the whole file gets the suffix of failed programs.
     asked = getattr(args, "output", None)
     output = next((name for name in sorted(outputs) if name != str(asked)), str(asked)) if outputs else None
     for report in several.reports:
@@ -107,8 +107,8 @@ def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left:
     write_results(several.reports, getattr(args, "json", None), program)
     console = output_console(standard_output(args))
     for reason, indices in (
-        ("called by others and done there", called),
-        ("subprograms that nothing calls any more, as the shaped programs hold their moves", left),
+        ("called by others and expanded there", called),
+        ("subprograms no longer called, since the shaped programs contain their moves", left),
     ):
         if indices:
             names = ", ".join(several.places[index].address for index in sorted(indices))
@@ -119,29 +119,29 @@ def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left:
 
 @dataclass
 class Gathered:
-    """What the runs of one command over a file came to."""
+    """Results of the runs of one command over a file."""
 
     source: str  # the file
     text: bytes
     places: tuple[ProgramPlace, ...]  # its programs
-    reports: list[dict[str, Any]] = field(default_factory=list)  # what --json writes of each
-    # by place, the file that a command wants to write and the program in it
+    reports: list[dict[str, Any]] = field(default_factory=list)  # the report of each for --json
+    # by index, the file of a command and its program
     written: dict[int, tuple[Path | str, bytes]] = field(default_factory=dict)
-    at: int = 0  # the place that is being done
+    at: int = 0  # index of the current program
 
     @property
     def address(self) -> str:
-        """Of the program that is being done."""
+        """Address of the current program."""
         return self.places[self.at].address
 
     def add(self, report: dict[str, Any], output: tuple[Path | str, bytes | memoryview] | None) -> None:
-        """Keep what a run wants written."""
+        """Collect the output of a run."""
         self.reports.append({**report, "program_address": self.address})
         if output is not None:
             self.written[self.at] = output[0], bytes(output[1])
 
     def joined(self) -> bytes:
-        """The file with every program that was written in its place; all else to the letter."""
+        """The file with every emitted program in its place; everything else unchanged."""
         parts, position = [], 0
         for place in self.places:
             parts.append(self.text[position : place.text_begin])
@@ -152,10 +152,10 @@ class Gathered:
 
 
 def _unframed(text: bytes) -> bytes:
-    """A program that stands alone without its '%' lines."""
+    """Remove the '%' lines of a single program."""
     begin = text.find(b"\n") + 1 if text.startswith(b"%") else 0
     end = text.rfind(b"%")
-    # The line end of the first mark may be LF CR CR: what is left of it belongs to it.
+    # The line end of the first mark may be LF CR CR: its remaining characters belong to it.
     while text[begin : begin + 1] == b"\r":
         begin += 1
     return text[begin : end if end > begin else len(text)]

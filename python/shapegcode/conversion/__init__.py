@@ -1,1 +1,1 @@
-"""From a program to its shaped program, judged."""
+"""Conversion of a program to its shaped program, with verdict."""

@@ -1,4 +1,4 @@
-"""Budgets of a conversion: size of the text, speed of the serial line, blocks per second."""
+"""Budgets of a conversion: size of the program, speed of the serial line, blocks per second."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _ROUNDING = 1e-9  # relative; rates are quotients
 
 @dataclass(frozen=True)
 class Budget:
-    """What the emitted program may need; None: no limit.
+    """Limits of the emitted program; None: no limit.
 
     Attributes:
-        max_bytes: size of the whole text.
+        max_bytes: size of the whole program.
         baud: speed of the serial line, bit/s; a character takes `controller.dnc_bits_per_character`.
         max_blocks_per_second: blocks that the control reads per second.
 
@@ -44,28 +44,28 @@ class Budget:
 
     @property
     def limits_rate(self) -> bool:
-        """Whether blocks may come too fast for it."""
+        """True if it limits the rate of blocks or characters."""
         return self.baud is not None or self.max_blocks_per_second is not None
 
     def excess(self, load: TransferLoad) -> float:
-        """How many times as fast as allowed a region's blocks come.
+        """Ratio of a region's rate to the permitted one.
 
         Args:
-            load: of the region.
+            load: load of the region.
 
         Returns:
-            1 or less: not too fast; 0 where no rate is limited.
+            1 or less: within the limit; 0 if no rate is limited.
         """
         return max((value / limit for _, value, limit in self._rates(load)), default=0.0)
 
     def too_fast(self, load: TransferLoad) -> str:
-        """What of a region comes too fast.
+        """Describe the rate of a region that exceeds a limit.
 
         Args:
-            load: of the region.
+            load: load of the region.
 
         Returns:
-            In words; empty if nothing does.
+            The text; empty if none does.
         """
         for unit, value, limit in self._rates(load):
             if value > limit * (1.0 + _ROUNDING):
@@ -83,19 +83,19 @@ class TextNeeds:
     """Memory, data rate and block rate that a whole program needs."""
 
     bytes: int  # its size
-    baud: float  # what its section with the most blocks per second needs of the line, bit/s
-    blocks_per_second: float  # blocks in its busiest stretch
-    block_period_s: float  # on which it is written
+    baud: float  # required line speed in its section with the most blocks per second, bit/s
+    blocks_per_second: float  # in its busiest section
+    block_period_s: float  # block period of the program
 
 
 @dataclass(frozen=True)
 class GivenUp:
     """A region that is left unchanged."""
 
-    lines: tuple[int, int]  # of the original, first and last
-    reason: str  # in words
-    residual_um: Xyz[float]  # residual vibration that stays
-    bytes: int  # that it would need more
+    lines: tuple[int, int]  # first and last line in the original
+    reason: str  # as text
+    residual_um: Xyz[float]  # remaining residual vibration
+    bytes: int  # additional size if shaped
 
 
 @dataclass(frozen=True)
@@ -106,22 +106,22 @@ class BudgetOutcome(OldNames):
     # of the program with everything shaped; if the block period was made longer: with the shorter one, before any
     # region is slowed for the contour tolerance
     before: TextNeeds
-    after: TextNeeds  # of the text as it is
-    block_period_s: float  # on which it is written
-    left_unchanged: tuple[GivenUp, ...]  # regions that are left unchanged
+    after: TextNeeds  # of the emitted program
+    block_period_s: float  # block period of the program
+    left_unchanged: tuple[GivenUp, ...]  # regions left unchanged
 
 
-# A stretch of a longer period may hold fewer blocks than one of a shorter period, but hardly less than this share.
+# A section on a longer period may have fewer blocks than on a shorter one, but hardly below this ratio.
 _LEAST_FILLED = 0.5
-_LINES_NAMED = 5  # lines of regions in the one sentence
+_LINES_NAMED = 5  # regions listed in the warning
 
 
 class Spending:
-    """The choice under a budget, and the record of what was given up."""
+    """Choices under a budget, and the record of regions left unchanged."""
 
     def __init__(self, budget: Budget, program: Program, machine: Machine) -> None:
         self.budget = budget
-        self.left_unchanged: dict[int, GivenUp] = {}  # regions that are left unchanged, per index
+        self.left_unchanged: dict[int, GivenUp] = {}  # regions left unchanged, by index
         self._program = program
         self._tick_s = machine.controller.interpolation_period_s
         self._most_ticks = math.floor(machine.shaping.max_duration_s / self._tick_s + _ROUNDING)
@@ -138,7 +138,7 @@ class Spending:
         design: Callable[[float], Grid],
         write: Callable[[Grid], Written],
     ) -> Grid:
-        """The block period on which the most that is worth shaping is not too fast; of equals the shortest shaper."""
+        """Choose the block period with the largest gain within the rate limits; of equals the shortest shaper."""
         weights = [residual * 1e3 / unit for unit, residual in zip(self._unit_um, residuals_mm, strict=True)]
         written = write(grid)
         loads = written.loads
@@ -147,7 +147,7 @@ class Spending:
         ticks = measured = round(grid.block_period_s / self._tick_s)
         best, best_loads = grid, loads
         while self._factors(best_loads) or ticks * self._tick_s < best.shaper.duration_s:
-            # A shaper lasts a period at least: where nothing is too fast any more, a shorter one is still looked for.
+            # A shaper has at least one period; after the first period without excess, shorter shapers are still tried.
             factors = self._factors(loads)
             ticks = max(ticks + 1, math.floor(measured * min(factors, default=1.0) * _LEAST_FILLED))
             if ticks > self._most_ticks:
@@ -157,18 +157,18 @@ class Spending:
                 if not self._factors(best_loads) and longer.shaper.duration_s >= best.shaper.duration_s:
                     continue
                 loads = write(longer).loads
-            except (_core.DesignError, _core.ProgramError):  # no shaper on this grid, or no region on it
+            except (_core.DesignError, _core.ProgramError):  # no shaper or no region on this grid
                 continue
             measured = ticks
             if self._worth(longer, loads, weights) > self._worth(best, best_loads, weights):
                 best, best_loads = longer, loads
         self._longer = best is not grid
-        if self._longer:  # else noted from the text as it is judged
+        if self._longer:  # else noted from the program that is judged
             self._before = _needs(grid, written)
         return best
 
     def give_up(self, grid: Grid, written: Written, verdicts: Sequence[RegionVerdict]) -> bool:
-        """Choose regions that must be left unchanged; False if the text fits."""
+        """Choose regions to leave unchanged; False if the program fits."""
         self._before = self._before or _needs(grid, written)
         loads = written.loads
         simulated = dict(zip(loads, verdicts, strict=True))
@@ -194,13 +194,13 @@ class Spending:
         return bool(chosen)
 
     def outcome(self, grid: Grid, written: Written) -> BudgetOutcome:
-        """What the budget did, once the text fits."""
+        """Effect of the budget, once the program fits."""
         after = _needs(grid, written)
         left_unchanged = tuple(self.left_unchanged[index] for index in sorted(self.left_unchanged))
         return BudgetOutcome(self.budget, self._before or after, after, grid.block_period_s, left_unchanged)
 
     def warning(self, grid: Grid) -> str:
-        """One sentence on what was given up; empty if nothing was."""
+        """One sentence on the effects of the budget; empty without any."""
         parts = []
         if self._longer and self._before is not None:
             was, now = self._before.block_period_s * 1e3, grid.block_period_s * 1e3
@@ -236,13 +236,13 @@ class Spending:
             raise self._too_large_error(original)
         if not loads or size <= limit:
             return {}
-        # Residual vibration that shaping a region removes, of its worst axis, in units of the tolerance.
+        # Residual vibration removed by shaping a region, worst axis, in units of the tolerance.
         gain = {
             index: (max(both.original) - max(both.emitted)) / self._unit_um[index]
             for index, both in ((index, simulated[index].residual_vibration_um) for index in loads)
         }
         costly = [index for index, load in loads.items() if load.extra_bytes > 0 and self._keepable[index]]
-        # Where the gain is negative, more of it per byte would be less: such regions go first, the worst before all.
+        # Regions with a negative gain come first, the worst of all first; per byte they would be sorted wrongly.
         order = sorted(costly, key=lambda k: (gain[k] / (loads[k].extra_bytes if gain[k] > 0.0 else 1.0), k))
         kept: list[int] = []
         for index in order:
@@ -251,13 +251,13 @@ class Spending:
             kept.append(index)
             size -= loads[index].extra_bytes
         if size > limit or len(kept) == len(loads):
-            # Without a shaped region there is no header comment either.
+            # Without a shaped region there is no header either.
             if not all(self._keepable[index] for index in loads):
                 raise self._too_large_error(size, "; arcs with absolute centres cannot be left unchanged")
             if original > limit:
                 raise self._too_large_error(min(size, original))
             kept = list(loads)
-        else:  # what was given up for the sake of a large one may fit beside the rest
+        else:  # a region given up before a large one may still fit
             for index in reversed(kept.copy()):
                 if gain[index] > 0.0 and size + loads[index].extra_bytes <= limit:
                     kept.remove(index)

@@ -1,4 +1,4 @@
-"""The converter, as its picture in ARCHITECTURE.md: one function for each box, in their order."""
+"""The converter: one function for each box of the figure in ARCHITECTURE.md, in the same order."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from shapegcode.program.computer import cores
 from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN
 from shapegcode.shaping.grid import Grid
 
-_ATTEMPTS = 10  # each for cuts that left their tolerance, ran too fast or cost too much; few need more than two
+_ATTEMPTS = 10  # for cuts beyond tolerance, feed or price; few need more than two
 _PRICE_ROUNDS = 6
 
 
@@ -49,43 +49,43 @@ def convert(
     tolerance_curve: bool = True,
     on_progress: Progress = lambda _stage, _done, _total: None,
 ) -> Conversion:
-    """Shape the cuts of a program, and judge the whole emitted program by simulating it.
+    """Shape the cuts of a program, and simulate the whole emitted program for its verdict.
 
-    What is None here is as the machine file has it; a value is checked as one of a machine file.
+    None: value of the machine file; other values are checked as in a machine file.
 
     Args:
-        program: what to convert, or its file.
+        program: the program to convert, or its file.
         machine: controller, modes, tolerances.
-        contour: what is brought back to the programmed path, "response", "command" or "off": `shaping.contour`.
-        contour_tolerance_um: largest deviation of it from the path, µm: `tolerance.contour_um`.
+        contour: target of contour compensation, "response", "command" or "off": `shaping.contour`.
+        contour_tolerance_um: largest deviation of the target from the path, µm: `tolerance.contour_um`.
         shaper: family of the shaper, such as "zvd": `shaping.family`.
-        per_axis: a shaper for each axis: `shaping.per_axis`.
+        per_axis: one shaper per axis: `shaping.per_axis`.
         planner: planner of a cut before it is shaped, "look-ahead", "optimal" or "auto": `shaping.planner`.
-        dialect: control in whose words the program is written, such as "linuxcnc": `emission.dialect`.
-        rapids: rapids become shaped moves where that saves time: `shaping.rapids`.
-        budget: what the emitted text may need; None: no limit.
+        dialect: control for which the program is written, such as "linuxcnc": `emission.dialect`.
+        rapids: write rapids as shaped moves where that saves time: `shaping.rapids`.
+        budget: limits of the emitted program; None: no limit.
         arc_feed_ratio: feed on arcs relative to the programmed one, reached before the arc: `shaping.arc_feed_ratio`.
-        block_period_s: duration of a short block, s: `emission.block_period_s`; None there too: see `choose_grid`.
+        block_period_s: duration of a short block, s: `emission.block_period_s`; None in both: see `choose_grid`.
         max_time_increase_percent: largest increase of the program's time: `price.program_time_percent`.
         max_cut_time_increase_percent: likewise of one cut: `price.cut_time_percent`.
         only: shape nothing but the cuts in these lines of the original, each first and last; None: all.
         leave: leave the cuts in these lines unchanged.
-        shape_all: shape every cut within the price, also one that gains less than `shaping.least_gain_um`, becomes
-            worse, or of a program that is within its tolerance already. False: such a cut is left unchanged.
-        tolerance_curve: work out what other contour tolerances would cost in time.
-        on_progress: called with stage, and how many of its parts are done and there are.
+        shape_all: shape every cut that the price allows, even if it gains less than `shaping.least_gain_um`, becomes
+            worse, or the original is within tolerance. False: such cuts are left unchanged.
+        tolerance_curve: compute the cycle time at other contour tolerances.
+        on_progress: called with stage, number of finished parts and number of parts.
 
     Returns:
-        The emitted program with its verdict. It is not written anywhere: `conversion.text` is what a file would hold.
+        The emitted program with its verdict. No file is written: `conversion.text` is the content of one.
 
     Raises:
-        ProgramError: the program cannot be read, or a region not be written.
+        ProgramError: the program cannot be read, or a region cannot be written.
         OSError: its file cannot be read.
-        MachineError: a value that a machine file could not have.
+        MachineError: a value that is invalid in a machine file.
         DesignError: no shaper exists on this grid.
-        ArgumentError: the program was read with other settings than the machine has; a block period that the
+        ArgumentError: the program was read with settings that differ from the machine's; a block period that the
             controller cannot run, a budget without a choice, lines without a cut.
-        RoundTripError: the emitted text would not be equivalent: a defect of shapegcode.
+        RoundTripError: the emitted program would not be equivalent: a defect of shapegcode.
     """
     stated = {
         "shaping.contour": contour,
@@ -101,7 +101,7 @@ def convert(
     }
     program, machine = read(program, machine, stated)
     if is_foreign := machine.emission.dialect != "fanuc":
-        # A thousand lines that a program for FANUC does not need.
+        # A large module that FANUC programs do not need.
         from shapegcode.conversion.translate import require_dialect, with_dialect
 
         require_dialect(program, machine, budget)
@@ -124,25 +124,25 @@ def convert(
 def read(
     program: Program | str | Path, machine: Machine | str | Path, stated: Mapping[str, object]
 ) -> tuple[Program, Machine]:
-    """The program as it can be shaped, and the machine with the options that were given."""
+    """Read the program for shaping, and apply the options to the machine."""
     machine = Machine.of(machine)
     if given := {key: value for key, value in stated.items() if value is not None}:
         machine = machine.with_values(given, source="options of convert")
     program = program_for_conversion(program, machine)
     program.refuse_shaped("convert the original")
-    # A comment of an original that the emitted program would say of its own blocks.
+    # Refuse comments of the original that mark shaped blocks in an emitted program.
     for mark in (REGION_MARK.encode(), RAPID_MARK.encode(), STAMP_BEGIN):
         if (at := program.core.find(mark)) >= 0:
             line = program.core.slice(0, at).count(b"\n") + 1
             raise _core.ProgramError(
-                f"{program.place(line)}:1: the comment {mark.decode()} is how a shaped program marks its own blocks: "
-                "give it other words"
+                f"{program.place(line)}:1: the comment {mark.decode()} marks shaped blocks in an emitted program: "
+                "change it"
             )
     return program, machine
 
 
 def choose_block_period(plan: ConversionPlan) -> None:
-    """Another grid where a budget limits the rate of the line."""
+    """Choose another grid if a budget limits the rate."""
     spending = plan.spending
     if spending is not None and spending.budget.limits_rate and not plan.fixed_period:
         weights = [float(original.result().residual_mm.max()) for original in plan.originals]
@@ -150,7 +150,7 @@ def choose_block_period(plan: ConversionPlan) -> None:
 
 
 def settle(plan: ConversionPlan) -> Shaped:
-    """Write, read back and simulate; again where a cut left its tolerance, ran too fast or took too long."""
+    """Write, read back and simulate; repeat while a cut exceeds its tolerance, feed or price."""
     for attempt in range(_ATTEMPTS):
         written = write(plan, plan.grid, "shaping" if attempt == 0 else "shaping again, slower")
         shaped = simulate(plan, written, read_back(plan, written), prefetch=attempt == 0)
@@ -162,7 +162,7 @@ def settle(plan: ConversionPlan) -> Shaped:
         changed = aims.keep_cut_price(written, plan.is_keepable, _ATTEMPTS - 1 - attempt) or changed
         if not changed:
             return shaped
-        shaped.trackers.clear()  # nobody asks for them any more: they take room beside the next text
+        shaped.trackers.clear()  # free memory before the next program is written
         for run in shaped.started.values():
             run.cancel()
     written = write(plan, plan.grid)
@@ -170,9 +170,9 @@ def settle(plan: ConversionPlan) -> Shaped:
 
 
 def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
-    """Shape the chosen cuts on a grid, and write the whole text."""
+    """Shape the chosen cuts on a grid, and write the whole program."""
     plan.use_grid(grid)
-    # Of what was given up for a budget, or is left unchanged by choice, the table of cuts speaks.
+    # Cuts left unchanged for a budget or by choice are listed in the table of cuts.
     left_unchanged = {} if plan.spending is None else plan.spending.left_unchanged
     unreported = {*left_unchanged, *plan.left, *plan.aims.emitted_s}
     on_progress = partial(plan.on_progress, stage) if stage else lambda _done, _total: None
@@ -183,12 +183,12 @@ def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
     return written
 
 
-# The text read, and trackers of the cuts that were not in the text before, by the rank of the cut.
+# The program read back, and trackers of its new cuts, by index of the cut.
 ReadBack = tuple[Program, dict[int, _core.ContourTracker]]
 
 
 def read_back(plan: ConversionPlan, written: Written) -> ReadBack:
-    """Read the text, and hold its end points and modal state against the original."""
+    """Read the program back, and compare its end points and modal state with the original."""
     following = {
         rank: plan.pool.submit(_core.ContourTracker, place.region.path)
         for rank, (place, (text, _)) in enumerate(zip(written.placed, written.texts, strict=True))
@@ -199,9 +199,9 @@ def read_back(plan: ConversionPlan, written: Written) -> ReadBack:
 
 
 def simulate(plan: ConversionPlan, written: Written, text: ReadBack, *, prefetch: bool = False) -> Shaped:
-    """Simulate every shaped cut under the operating conditions; one whose text is as before is not simulated again.
+    """Simulate every shaped cut in the operating conditions, except those whose text is unchanged.
 
-    `prefetch`: its sensitivity to unverified parameters too, where which cut decides is known already.
+    `prefetch`: also start the sensitivity analysis if the deciding cut is known already.
     """
     placed, (emitted, trackers) = written.placed, text
     indices = [plan.aims.index(place.region) for place in placed]
@@ -221,7 +221,7 @@ def simulate(plan: ConversionPlan, written: Written, text: ReadBack, *, prefetch
 
 
 def keep_what_pays(plan: ConversionPlan, shaped: Shaped) -> Shaped:
-    """The same with cuts loosened or left unchanged for the budget, for what they gain, and for the program's price."""
+    """Loosen cuts or leave them unchanged because of the budget, small gain, or the program's price."""
     while plan.spending is not None and plan.spending.give_up(plan.grid, shaped.written, plan.verdicts(shaped)):
         for index, left_unchanged in plan.spending.left_unchanged.items():
             plan.reasons[index] = left_unchanged.reason
@@ -241,7 +241,7 @@ def keep_what_pays(plan: ConversionPlan, shaped: Shaped) -> Shaped:
 
 
 def _without_what_gains_nothing(plan: ConversionPlan, shaped: Shaped) -> Shaped:
-    """The same without the cuts that gained too little or became worse: these are left unchanged."""
+    """Leave cuts unchanged that gained too little or became worse."""
     least = plan.machine.shaping.least_gain_um
     chosen = plan.chosen
     for index, figures, verdict in zip(chosen, shaped.figures, plan.verdicts(shaped), strict=True):
@@ -253,7 +253,7 @@ def _without_what_gains_nothing(plan: ConversionPlan, shaped: Shaped) -> Shaped:
 
 
 def _rewritten(plan: ConversionPlan, shaped: Shaped, before: Sequence[int]) -> Shaped:
-    """Some cuts are left unchanged now; what stays shaped is as before: neither shaped nor simulated again."""
+    """Write again with some cuts left unchanged; the others are neither shaped nor simulated again."""
     stay = [not plan.reasons[index] for index in before]
     if all(stay):
         return shaped
@@ -263,9 +263,9 @@ def _rewritten(plan: ConversionPlan, shaped: Shaped, before: Sequence[int]) -> S
 
 
 def _as_it_was(plan: ConversionPlan, shaped: Shaped) -> Shaped:
-    """Where nothing was shaped the file as it was given, if it was one program: not what it was expanded into."""
+    """If nothing was shaped, return the input file instead of its expansion, if it was a single program."""
     rapids_shaped = shaped.rapids is not None and shaped.rapids.outcome.shaped > 0
-    # A foreign one was given in another control's words than those that are written.
+    # A foreign program was given in another dialect than the emitted one.
     is_other = plan.program.number is not None or plan.program.foreign is not None
     if shaped.written.placed or rapids_shaped or is_other:
         return shaped
@@ -273,7 +273,7 @@ def _as_it_was(plan: ConversionPlan, shaped: Shaped) -> Shaped:
 
 
 def shape_rapids(plan: ConversionPlan, shaped: Shaped) -> Shaped:
-    """Rapids as shaped moves where that saves time; none where the program would take more time than its price."""
+    """Replace rapids by shaped moves where that saves time; none if the program would exceed its price."""
     from shapegcode.conversion.rapids import shape
 
     found = shape.shape_rapids(shaped.emitted, shaped.written.placed, plan.model, plan.grid, plan.pool, plan.budget)
@@ -287,7 +287,7 @@ def shape_rapids(plan: ConversionPlan, shaped: Shaped) -> Shaped:
         return replace(shaped, written=written, emitted=found.emitted, rapids=found)
     left = {**outcome.left_unchanged, "the price of the program": count}
     outcome = replace(outcome, shaped=0, left_unchanged=left, time_saved_s=0.0, blocks=0, slowed_blocks=0, moves=())
-    why = f"{count} rapids stay rapids: with them as cutting moves the program would take {added_s:.2f} s more"
+    why = f"{count} rapids are left unchanged: as cutting moves they would add {added_s:.2f} s"
     warning = f"{why}, price {price_s:.2f} s (price.program_time_percent)"
     written = replace(shaped.written, size=shaped.emitted.size)
     found = replace(

@@ -25,19 +25,19 @@ from shapegcode.verdict.figures import Placed, ProgramFigures
 
 _NAMED_LINES = 4
 _SHOWN_POINTS = 12
-_SINGLE_BLOCKS = 200  # simulated: the fastest ones
+_SINGLE_BLOCKS = 200  # so many of the fastest blocks are simulated
 _PRESSES_PER_S = 2.0
-_FAST_RATIO, _FAST_BLOCKS = 0.5, 4000  # of the highest feed; of those so many, evenly spread, are looked at
+_FAST_RATIO, _FAST_BLOCKS = 0.5, 4000  # ratio to the highest feed; largest number of them, evenly spread
 _CHUNK = 1 << 16  # bytes
 _TAPE_CHARACTERS_PER_M = 1000.0 / 2.54  # a row of holes every tenth of an inch
 
 
 @dataclass(frozen=True)
 class ControlNote:
-    """One thing to know at the control."""
+    """A caution for the operator."""
 
-    topic: str  # in a word or two
-    text: str  # in words, with its figures
+    topic: str  # short heading
+    text: str  # with its figures
 
 
 def at_the_control(
@@ -52,8 +52,11 @@ def at_the_control(
     turned = [case for case in figures.cases if case.override != 1.0 and case.mode is None]
     elsewhere = []
     if turned and machine.emission.override != "lock":
-        worst = max(turned, key=lambda each: max(each.residual_um))
-        elsewhere = [f"at {worst.override * 100:.0f} % up to {max(worst.residual_um):.1f} µm of residual vibration"]
+        worst = max(turned, key=lambda each: math.inf if each.share_of_limit is None else each.share_of_limit)
+        elsewhere = [
+            f"at {worst.override * 100:.0f} % the {worst.figure} is {worst.value_um:.1f} µm, limit "
+            f"{worst.limit_um:.1f} µm"
+        ]
     size, room = emitted.size, machine.controller.program_memory_bytes
     fits = "on this machine: " + ("fits" if size <= room else f"does not fit: {no_room(room)}")
     return (
@@ -78,7 +81,7 @@ def control_table(notes: Sequence[ControlNote]) -> Table:
 
 
 def restart_table(points: Sequence[RestartPoint]) -> Table:
-    """Restart points inside of cuts, with what must be in force before the start."""
+    """Restart points inside of cuts, with the modal state required before the start."""
     columns = (
         Column("restart", value=lambda point: f"N{point.number}", left=True, priority=0),
         Column("line", value="line", priority=0),
@@ -104,7 +107,7 @@ def _line(loads: Mapping[int, TransferLoad], machine: Machine) -> str:
     if line > 0:
         enough = "enough" if baud <= line else "buffer underrun (--baud fits the program to the line)"
         here = f", the line of this machine has {line}: {enough}"
-    return f"{baud:.0f} baud or more, where the cuts have the most blocks per second{here}"
+    return f"needs {baud:.0f} baud, in the cut with the most blocks per second{here}"
 
 
 def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_period_s: float) -> str:
@@ -116,25 +119,25 @@ def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_perio
         return f"{needs}{before}; {own.control}: {own.facts['look-ahead'].text}"
     if machine.emission.leaves_look_ahead:
         on = " ".join(machine.emission.epilogue)
-        again = f", {on} after it on again" if on else ""
+        again = f", {on} after it switches it on again" if on else ""
         return f"{needs}; {prologue} before each shaped cut switches the look-ahead mode off{again}"
     if prologue:
         return f"{needs}; {prologue} before each shaped cut must select the control's mode for shaped cuts"
-    return f"{needs}; the program switches no mode: contour control with look-ahead (G05.1Q1, G08P1) must be off"
+    return f"{needs}; no look-ahead code in the program: contour control with look-ahead (G05.1Q1, G08P1) must be off"
 
 
 def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFigures, model: MachineModel) -> str:
-    """Effect of single block on the cut that vibrates most: its blocks simulated one by one, each from rest to rest."""
+    """Effect of single block on the cut that vibrates most, each block simulated from rest to rest."""
     index = max(range(len(placed)), key=lambda each: max(figures.regions[each].residual_vibration_um.original))
     place, region = placed[index], figures.regions[index]
     blocks = place.blocks(emitted)
     feeds = blocks.segment_feeds_mm_per_s
     if len(feeds) == 0:
-        return "here the shaped cuts are shorter than an increment"
+        return "the shaped cuts are shorter than an increment"
     fast = np.flatnonzero(feeds >= _FAST_RATIO * feeds.max())
     fast = fast[:: math.ceil(len(fast) / _FAST_BLOCKS)]
     slowest = np.array(slowest_excited_hz(model.machine))
-    # The speed that each puts into the modes, all at once; the softest axis counts most.
+    # Speed step that each block applies to the modes; the softest axis has the largest weight.
     chords = np.array([blocks[int(one)].end_mm - blocks[int(one)].start_mm for one in fast])
     steps = chords / np.maximum(np.linalg.norm(chords, axis=1), 1e-9)[:, None] * feeds[fast, None]
     fastest = fast[np.argsort(-np.linalg.norm(steps / slowest, axis=1), kind="stable")[:_SINGLE_BLOCKS]]
@@ -146,9 +149,10 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFi
         mark_um = max(mark_um, float(np.max([simulated.peak_mm, simulated.residual_mm])) * 1e3)
     time_s = region.time_s.emitted + len(blocks) * (1.0 / _PRESSES_PER_S + model.shaped_filter.duration_s)
     lines = "{} to {}".format(*region.emitted_lines)
+    marks = f", marks of up to {mark_um:.0f} µm" if mark_um >= 1.0 else ""
     return (
         f"single block in lines {lines}: {_duration(time_s)} instead of {_duration(region.time_s.emitted)} "
-        f"({len(blocks)} stops, two presses of cycle start a second), marks of up to {mark_um:.0f} µm"
+        f"({len(blocks)} stops, two presses of cycle start a second){marks}"
     )
 
 
@@ -171,14 +175,14 @@ def _restarts(emitted: Program, written: Written, machine: Machine) -> Iterator[
         shakes_um = max(mark.vibration_um for each in restarts for mark in each.marks)
         switched = f", by MDI {' '.join(before)}" if before else ""
         yield (
-            f"{count} restart point{'' if count == 1 else 's'} inside of long cuts, where the command is nearly at "
+            f"{count} restart point{'' if count == 1 else 's'} inside long cuts, where the command is nearly at "
             f"rest: spindle on, tool, H and coordinate system of the list in force{switched}, go to its position from "
-            f"above, then search the N number; a start there makes the table vibrate once, by up to {shakes_um:.0f} µm"
+            f"above, then search the N number; a start there excites one vibration of up to {shakes_um:.0f} µm"
         )
     if stops := sum(each.stops for each in restarts):
         cost_s = sum(each.stops_s for each in restarts)
         yield (
-            f"{stops} of them {'is a stop that was' if stops == 1 else 'are stops that were'} put in "
+            f"{stops} of them {'is a stop that was' if stops == 1 else 'are stops that were'} added "
             f"(emission.restart_stops): {cost_s:.1f} s more, and a dwell mark where the tool stops in the cut"
         )
     long = [
@@ -202,7 +206,7 @@ def _restart_lines(emitted: Program, placed: Sequence[Placed]) -> str:
         rows = range(place.first_line, place.last_line + 1)
         lines = zip(rows, _lines_from(emitted, place.first_line), strict=False)
         first = next(lines)
-        # Behind the comment: lines that lock the override or switch a mode belong to the cut.
+        # After the comment: lines that lock the override or switch a mode belong to the cut.
         at, line = next((each for each in chain([first], lines) if not each[1].lstrip().startswith(b"(")), first)
         number = re.match(rb"N\d+", line.strip())
         named.append(f"{number[0].decode()} (line {at})" if number else f"line {at}")
@@ -211,7 +215,7 @@ def _restart_lines(emitted: Program, placed: Sequence[Placed]) -> str:
 
 
 def _lines_from(emitted: Program, number: int) -> Iterator[bytes]:
-    """Yield the lines of a program from a line number on; it may have millions of lines."""
+    """Yield the lines of a program from a line number on, chunk by chunk."""
     passed, rest = 1, b""
     for begin in range(0, emitted.size, _CHUNK):
         chunk = emitted.text_slice(begin, min(begin + _CHUNK, emitted.size))

@@ -1,4 +1,4 @@
-"""Make the result of a conversion: simulate the whole emitted program for its verdict, and collect the figures."""
+"""Assemble the result of a conversion: simulate the whole emitted program for its verdict, and collect the figures."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ from shapegcode.verdict.judge import (
     unshaped_regions,
 )
 
-_MOSTLY = 0.7  # of the contour error of the machine table: the command itself errs so much
-_TRIALS = (0.9, 0.7, 0.5)  # of the time constant that a rounding in proportion to it would allow
-# How much worse than the original's a figure must be to be worth a warning: ratio, and size in um.
+_MOSTLY = 0.7  # ratio of the command's contour error to that of the machine table
+_TRIALS = (0.9, 0.7, 0.5)  # ratios to the time constant that a proportional rounding would allow
+# A warning is issued for a figure worse than the original's by this ratio and by this size in um.
 _WORSE_RATIO, _WORSE_UM = 1.2, 5.0
-# How far an emitted path may leave the original's: the larger of both.
+# Permitted distance of the emitted path from the original's: the larger of both.
 _PATH_TOLERANCES, _PATH_UM = 10.0, 200.0
 
 
 @dataclass(frozen=True)
 class ProgramVerdict:
-    """The whole emitted program beside its limits, its price and its original."""
+    """Verdict of the whole emitted program against its limits, its price and its original."""
 
     figures: ProgramFigures
     cuts: tuple[CutOutcome, ...]
@@ -61,7 +61,7 @@ class ProgramVerdict:
 
 
 def judge(plan: ConversionPlan, shaped: Shaped) -> ProgramVerdict:
-    """Judge every cut, shaped or left unchanged, and what lies between them; prove that nothing else changed."""
+    """Judge every cut, shaped or left unchanged, and the moves between them; prove that nothing else changed."""
     machine, rapids = plan.machine, shaped.rapids
     emitted_s = plan.pool.submit(plan.model.cycle_time_s, shaped.emitted.core)
     between = plan.rapid_vibration
@@ -69,7 +69,7 @@ def judge(plan: ConversionPlan, shaped: Shaped) -> ProgramVerdict:
     if rapids_shaped:
         between = plan.pool.submit(rapid_vibration_um, shaped.emitted, plan.model)
     proving = None
-    # Without header comments nothing tells shaped rapids from cuts.
+    # Without a header, shaped rapids cannot be distinguished from cuts.
     if shaped.written.placed and (machine.emission.header or not rapids_shaped):
         proving = plan.pool.submit(prove, plan.program, shaped.emitted, machine, rapids_shaped=rapids_shaped)
     every = sorted(
@@ -92,11 +92,11 @@ def judge(plan: ConversionPlan, shaped: Shaped) -> ProgramVerdict:
 
 
 def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> Conversion:
-    """The result: figures, warnings, what they rest on, and what the control will make of the text."""
+    """Assemble the result: figures, warnings, parameter sensitivity, notes for the control."""
     program, machine, written = plan.program, plan.machine, shaped.written
     core, tolerance, tools_by_index = program.core, machine.tolerance, tools_of_cuts(program)
     tools = [tools_by_index.get(plan.aims.index(place.region)) for place in written.placed]
-    # For a core that waits while the last simulations run.
+    # Uses a core that is idle during the last simulations.
     mark = plan.pool.submit(lambda: shaped.emitted.mark)
     warnings = _warnings(plan, shaped, verdict.figures)
     sensitivity, tried = _sensitivity(plan, shaped)
@@ -220,11 +220,11 @@ def _sensitivity(plan: ConversionPlan, shaped: Shaped) -> tuple[tuple[Sensitivit
 
 
 def _cycle_time_s(plan: ConversionPlan, shaped: Shaped, emitted_s: float, cutting: Pair[float]) -> Pair[float]:
-    """What `shapegcode time` says of both texts."""
+    """Cycle times of both programs as by `shapegcode time`."""
     original_s = plan.original_s.result()
     if plan.machine.emission.header:
         return Pair(original_s, emitted_s)
-    # Nothing in such a text says which regions are shaped.
+    # Without a header the shaped regions cannot be recognised.
     added_s = plan.machine.emission.prefill_dwell_s * len(shaped.written.placed)
     added_s += shaped.rapids.extra_s if shaped.rapids else 0.0
     return Pair(original_s, original_s - cutting.original + cutting.emitted + added_s)
@@ -241,7 +241,7 @@ def _warnings(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> 
     elif not program.regions:
         warnings.append(f"{program.source}: no cutting moves that can be shaped: its motion is unchanged")
     if not written.placed:
-        # Where something was shaped, the sensitivity to unverified parameters names them.
+        # In a shaped program the parameter sensitivity lists them.
         warnings += _open_axes(program, machine)
     warnings += _simulation_warnings(plan, figures)
     warnings += _text_warnings(plan, written, figures)
@@ -254,14 +254,14 @@ def _other_control(machine: Machine) -> list[str]:
     if kind == "grbl":
         return [
             "no dialect for GRBL: the program has words that GRBL does not read (O, M06, G43, G64 and others): "
-            "take them out with emission.words, and read every line before it is run"
+            "remove them with emission.words, and read every line before it is run"
         ]
     if (name if name in {"linuxcnc", "klipper"} else "fanuc") == kind:
         return []
     judged = {"fanuc": "a FANUC control's", "linuxcnc": "LinuxCNC's", "klipper": "Klipper's"}[kind]
     return [
-        f'emission.dialect = "{name}", but the motion is judged by {judged} planner (controller.kind = "{kind}"): '
-        "residual vibration and time hold only if both are the control that runs the program"
+        f'emission.dialect = "{name}", but the motion is simulated with {judged} planner (controller.kind = "{kind}"): '
+        "residual vibration and time are valid only if both are the control that runs the program"
     ]
 
 
@@ -288,17 +288,17 @@ def _used_shaper(grid: Grid) -> parts.UsedShaper:
 
 
 def prove(original: Program, emitted: Program, machine: Machine, *, rapids_shaped: bool) -> ChangeProof:
-    """Compare an emitted program with its original; what shaping changes is allowed.
+    """Compare an emitted program with its original; changes by shaping are allowed.
 
-    The verdict judges how far the response leaves the path. A shaped command leaves it further (up to three tolerances
-    in the conversions of the tests): what is beyond `_PATH_TOLERANCES` and `_PATH_UM` is a part that was left out.
+    The verdict checks the deviation of the response. A shaped command deviates further (up to three tolerances
+    in the conversions of the tests); more than `_PATH_TOLERANCES` and `_PATH_UM` means that a part was left out.
     """
     kinds = {"feeds", "blocks", "calls"}
     kinds |= {"shaped-rapids"} if rapids_shaped else set()
     kinds |= {"compensation"} if original.core.expanded_radii_mm else set()
     path_um = max(_PATH_TOLERANCES * machine.tolerance.contour_um, _PATH_UM)
     found = compare(original, emitted, machine, allow=Allowed(frozenset(kinds), path_um))
-    # Without header comments nothing says that lines of emission.* are the converter's own.
+    # Without a header, lines of emission.* cannot be recognised as the converter's own.
     refused = tuple(each for each in found.refused if machine.emission.header or each.kind != "emission")
     return ChangeProof(found.answer, found.counts, found.path_um, refused)
 
@@ -314,7 +314,7 @@ def recommend(
     """The grade of a program and its reason: the first that applies, from "do not run" upwards.
 
     `original_within`: every cut of the original keeps its limits. `could_gain`: shaping gains enough in some cut, or
-    would as far as is known. `benefit`: of a shaped cut, see `benefits`. `other_changes`: a defect of shapegcode.
+    might. `benefit`: a shaped cut gains enough. `other_changes`: a defect of shapegcode.
     """
     if worse := next((_at(cut, why) for cut in cuts for why in cut.worse), ""):
         return "do not run", worse
@@ -329,7 +329,7 @@ def recommend(
         return "already within tolerance: shaping is optional", "every cut of the original keeps its limits"
     if missed := next((_at(cut, why) for cut in cuts for why in cut.misses), ""):
         return "better, tolerance not met", missed
-    return "worth running", "every cut is within its limits, and within the price"
+    return "worth running", "every cut keeps its limits and its price"
 
 
 def _at(cut: RegionVerdict, why: str) -> str:
@@ -344,7 +344,7 @@ def _filter_advice(plan: ConversionPlan, originals: Sequence[_core.SimulationFig
     if not any(error > limit_um for error, _ in errors):
         return None
     if any(float(run.residual_mm.max()) * 1e3 > floor_um for run in originals):
-        return None  # vibration has to be cured in any case
+        return None  # vibration must be removed in any case
     if any(error > limit_um and command < _MOSTLY * error for error, command in errors):
         return None
     field = "look_ahead_filter_time_constant_s" if machine.controller.motion == "look_ahead" else "time_constant_s"
@@ -371,8 +371,8 @@ def _keeps(plan: ConversionPlan, key: str, value: float) -> bool:
 
 def _open_axes(program: Program, machine: Machine) -> list[str]:
     return [
-        f"{letter.upper()} moves, and whether it has a vibration mode is not known: assumed rigid; "
-        f"tap it (shapegcode identify), or state axes.{letter}.rigid = true"
+        f"{letter.upper()} moves, but it is not known whether it has a vibration mode: assumed rigid; "
+        f"tap it (shapegcode identify), or set axes.{letter}.rigid = true"
         for letter in unknown_axes(machine)
         if any(region.path.extent_mm["xyz".index(letter)] > 0.0 for region in program.regions)
     ]
@@ -401,13 +401,13 @@ def _simulation_warnings(plan: ConversionPlan, figures: ProgramFigures) -> Itera
 
 
 def _binding(plan: ConversionPlan, figures: ProgramFigures) -> Iterator[str]:
-    """Tolerances that a conversion exceeds, by how much, and feasible values; nothing if all are kept."""
+    """Yield tolerances that a conversion exceeds, with the excess and feasible values."""
     tolerance = plan.machine.tolerance
     contour = max((region.contour_error_um for region in figures.regions), default=0.0)
     if contour > tolerance.contour_um:
         rounding_um = math.sqrt(2.0) * written_increment_mm(plan.machine, 21) * 1e3
-        how = "within the price (price.*)" if plan.aims.is_priced else "with the feed lowered as far as it helps"
-        share = f"; rounding the words alone may take {rounding_um:.1f} um of it"
+        how = "within the price (price.*)" if plan.aims.is_priced else "with the feed lowered as far as useful"
+        share = f"; up to {rounding_um:.1f} um of it by rounding of the words"
         yield (
             f"tolerance.contour_um = {tolerance.contour_um:g} is exceeded: {contour:.1f} um were reached "
             f"{how}{share if rounding_um > 0.2 * contour else ''}; "

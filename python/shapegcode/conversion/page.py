@@ -1,4 +1,4 @@
-"""The page of a conversion: whether to run it, what it gains, its sensitivity to unverified parameters, and the
+"""The page of a conversion: whether to run it, before and after, sensitivity to unverified parameters, and the
 operator's run sheet."""
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ def light_of(conversion: Conversion) -> tuple[model.Light, str]:
 def sections_of(conversion: Conversion, provenance: Provenance | None = None) -> Iterator[model.Section]:
     """The sections of the page."""
     how = "Each card: original → emitted. The limit applies to the emitted program."
-    yield model.Section("gain", "What it gains", (model.Figures(tuple(_figures(conversion))),), how=how)
+    yield model.Section("gain", "Before and after", (model.Figures(tuple(_figures(conversion))),), how=how)
     if conversion.proof is not None:
-        how = "The emitted program was read once more and compared with the original; shapegcode compare does the same."
+        how = "The emitted program was re-read and compared with the original, as by shapegcode compare."
         yield model.Section("proof", "What did not change", (model.Text((conversion.proof.answer,)),), how=how)
     yield from warnings_of(conversion)
     yield next_steps(conversion, *_further(conversion))
@@ -60,7 +60,7 @@ def sections_of(conversion: Conversion, provenance: Provenance | None = None) ->
         yield _cases(conversion)
     if conversion.parameter_sensitivity:
         table = sensitivity_table(conversion.parameter_sensitivity, conversion.unverified_parameters_tested)
-        how = "Measure the topmost first: it moves the verdict furthest. Red: it could turn it."
+        how = "Measure the first one first: it changes the verdict most. Red: it could change the verdict."
         yield model.Section("rests", "Sensitivity to unverified parameters", (table,), how=how)
     yield from _price(conversion, provenance)
     yield _times(conversion)
@@ -79,7 +79,7 @@ def sections_of(conversion: Conversion, provenance: Provenance | None = None) ->
 
 
 def _picker(conversion: Conversion, provenance: Provenance | None) -> model.CutPicker:
-    """The cuts that can be chosen; figures of a cut that was not shaped are not known."""
+    """The cuts to choose from; figures of a cut that was not shaped are not known."""
     rows = [
         model.CutRow(
             cut.lines, "" if cut.tool is None else f"T{cut.tool}", cut.gain_um, _tried(cut.residual_um, cut),
@@ -111,7 +111,7 @@ def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[mo
     if conversion.tolerance_curve is not None:
         sentence = conversion.tolerance_curve.sentence
         how = f"{sentence}. " if sentence else ""
-        how += "Planned for the cuts that can be shaped; the price is price.program_time_percent of the machine file."
+        how += "Planned, not simulated, for the cuts that can be shaped. The limit is price.program_time_percent."
         yield model.Section("price", "Tolerance against time", (curve_table(conversion.tolerance_curve),), how=how)
 
 
@@ -128,7 +128,7 @@ def _figures(conversion: Conversion) -> Iterator[model.Figure]:
     error = getattr(conversion.contour_error_um, target)
     key = f"contour_error_um.{target}"
     yield model.Figure(
-        "contour error" + (" of the table" if target == "response" else " of the command"), "µm",
+        "contour error" + (" of the machine table" if target == "response" else " of the command"), "µm",
         error.original.max, error.emitted.max, limit=conversion.limits.contour_um,
         key_before=f"{key}.original.max", key_after=f"{key}.emitted.max",
     )  # fmt: skip
@@ -155,8 +155,8 @@ def _further(conversion: Conversion) -> Iterator[model.NextStep]:
 
 def _cases(conversion: Conversion) -> model.Section:
     axes = [axis for axis in "xyz" if any(case.residual_um[axis] >= _LEAST_SHOWN_UM for case in conversion.cases)]
-    columns = (*(f"residual {axis.upper()} µm" for axis in axes), "contour, command µm", "contour, table µm",
-               "worst share of its limit %")  # fmt: skip
+    columns = (*(f"residual {axis.upper()} µm" for axis in axes), "contour, command µm", "contour, machine table µm",
+               "worst figure, % of its limit")  # fmt: skip
     rows = tuple(_case(rank, case, axes, conversion) for rank, case in enumerate(conversion.cases))
     how = (
         "Each line is an operating condition under which the emitted program was simulated. The colour is the ratio "
@@ -165,7 +165,7 @@ def _cases(conversion: Conversion) -> model.Section:
     counted = sum(case.counts for case in conversion.cases)
     caption = f"{counted} of {len(rows)} operating conditions count ([verdict] of the machine file)"
     heat = model.HeatMap(columns, rows, 1, caption, factors=(*(1.0 for _ in axes), 1.0, 1.0, 100.0))
-    return model.Section("cases", "Under which conditions it was tried", (heat,), how=how)
+    return model.Section("cases", "Operating conditions", (heat,), how=how)
 
 
 def _case(rank: int, case: CaseVerdict, axes: list[str], conversion: Conversion) -> model.HeatRow:
@@ -195,19 +195,19 @@ def _times(conversion: Conversion) -> model.Section:
         times.append(("cut in lines {} to {}".format(*region.lines), region.time_s, f"regions.{rank}.time_s"))
     rows = tuple((name, (pair.original, pair.emitted)) for name, pair, _ in times)
     keys = tuple((f"{key}.original", f"{key}.emitted") if key else ("", "") for _, _, key in times)
-    how = "Two bars each, original above emitted: where they differ, shaping costs or gains time."
+    how = "Two bars each, original above emitted."
     bars = model.Bars("s", rows, ("original", "emitted"), digits=2, keys=keys)
     return model.Section("time", "Where the time goes", (bars,), how=how)
 
 
 def _machine(machine: Machine) -> model.Section:
-    """The machine data used: modes, tolerances, and every value that was not measured."""
+    """The machine data used: modes, tolerances, and all unverified values."""
     values = [value for value in machine.values() if value.unmeasured or value.key.startswith(_SHOWN_KEYS)]
     unmeasured = sum(value.unmeasured for value in values)
     columns = (
         Column("key", left=True),
         Column("value", value=lambda row: f"{row.value} {row.unit if row.unit != '1' else ''}".strip(), text=True),
-        Column("where it comes from", value=lambda row: "assumed" if row.assumed else row.origin, text=True),
+        Column("origin", value=lambda row: "assumed" if row.assumed else row.origin, text=True),
         Column("meaning", text=True),
     )
     how = f"{unmeasured} of these values were not measured on this machine: assumed, inherited, or default."
@@ -216,14 +216,14 @@ def _machine(machine: Machine) -> model.Section:
 
 
 def _sheet(conversion: Conversion, provenance: Provenance | None) -> model.Section:
-    """The run sheet: what the operator takes to the machine, on one page."""
+    """The run sheet for the operator, one page."""
     output = None if provenance is None else provenance.file("output")
     name = f"{Path(conversion.program).name}, shaped" if output is None else Path(output.name).name
     if output is not None:
         sha256 = output.sha256
     else:
         sha256 = "not known" if conversion.from_json else hashlib.sha256(conversion.text).hexdigest()
-    rows = [("program to load", f"{name}, for {conversion.machine}, {conversion.bytes_emitted} bytes")]
+    rows = [("load program", f"{name}, for {conversion.machine}, {conversion.bytes_emitted} bytes")]
     rows.append(("SHA-256 of the program", sha256))
     for role, name in (("input", "original program"), ("machine", "machine file")):
         if provenance is not None and (file := provenance.file(role)) is not None:
@@ -231,6 +231,6 @@ def _sheet(conversion: Conversion, provenance: Provenance | None) -> model.Secti
     rows += [(note.topic, note.text) for note in conversion.at_the_control]
     strong = frozenset(topic for topic, _ in rows if topic in _RUN_FIRST or "override" in topic)
     title = f"Run sheet: {conversion.recommendation}"
-    how = "For the operator. Go through it from top to bottom before cycle start."
+    how = "For the operator. Check it from top to bottom before cycle start."
     points = (restart_table(conversion.restart_points),) if conversion.restart_points else ()
     return model.Section("sheet", title, (model.Notes(tuple(rows), strong), *points), how=how, sheet=True)

@@ -27,22 +27,22 @@ from shapegcode.verdict.judge import Judge, RegionFigures, most_to_gain_um, rapi
 if TYPE_CHECKING:
     from shapegcode.conversion.rapids.shape import ShapedRapids
 
-_SLOWER = 0.98  # than what would just be slow enough
-_LEAST_FEED_RATIO = 0.5  # of the programmed feed: what runs too fast at that is not the feed's doing
-_HELPED = 0.98  # of what was reached before: a tighter plan that brings no more is taken back
-_PRICE_MARGIN = 0.995  # of the time that a price allows, for a plan
-_LOOSER = 1.05  # least step of a plan that was still too expensive
+_SLOWER = 0.98  # factor below the feed that is just slow enough
+_LEAST_FEED_RATIO = 0.5  # of the programmed feed: below it, a too high speed has other causes
+_HELPED = 0.98  # ratio of errors: a tighter plan with less improvement is reverted
+_PRICE_MARGIN = 0.995  # ratio of the permitted time used for a plan
+_LOOSER = 1.05  # smallest step after a plan that was still too expensive
 _LEVELS = 40  # steps of a bisection
 
 
 @dataclass
 class _Attempt:
-    """The last plan of a cut that left its tolerance."""
+    """The last plan of a cut beyond its tolerance."""
 
     room_um: float
-    reached_um: float  # with it
-    overridden: bool  # it left the tolerance only at another feed override
-    helps: bool = True  # a tighter one
+    reached_um: float  # deviation reached with it
+    overridden: bool  # beyond tolerance only at another feed override
+    helps: bool = True  # a tighter one helps
 
 
 class Aims:
@@ -54,29 +54,29 @@ class Aims:
         count = len(program.regions)
         self._machine, self._curve_of = machine, curve_of
         self._places = {id(region): index for index, region in enumerate(program.regions)}
-        self.reasons = reasons  # why a cut is left unchanged; empty: it is shaped; changed here
+        self.reasons = reasons  # why a cut is left unchanged; empty: it is shaped; updated here
         self._asked_um = machine.tolerance.contour_um
-        self.room_um = [machine.tolerance.contour_um * _MARGIN] * count  # deviation that its feed is planned for
-        self.feed_ratio = [1.0] * count  # of the programmed feed, that it is planned with
+        self.room_um = [machine.tolerance.contour_um * _MARGIN] * count  # deviation for which its feed is planned
+        self.feed_ratio = [1.0] * count  # ratio of the planned to the programmed feed
         self.original_s: dict[int, float] = {}
-        self.emitted_s: dict[int, float] = {}  # of every cut that was shaped once, until the set-points rest
-        self._asked_s: dict[int, float] = {}  # likewise, for the tolerance that was asked for
+        self.emitted_s: dict[int, float] = {}  # of every cut once shaped, until the set-points rest
+        self._asked_s: dict[int, float] = {}  # likewise, for the requested tolerance
         self._blocks_s: dict[int, float] = {}  # time of its blocks
         self._tried: dict[int, _Attempt] = {}
-        self._priced: set[int] = set()  # planned as closely as their price allows, whatever that reaches
+        self._priced: set[int] = set()  # planned for the tightest tolerance within their price
 
     def wanted(self) -> dict[int, Aim]:
-        """For what each cut that is not left unchanged is shaped."""
+        """Planned deviation and feed ratio of each cut to shape."""
         return {
             index: (self.room_um[index], self.feed_ratio[index]) for index, why in enumerate(self.reasons) if not why
         }
 
     def index(self, figures_place: object) -> int:
-        """Rank of a region of the original."""
+        """Index of a region of the original."""
         return self._places[id(figures_place)]
 
     def note(self, written: Written, figures: Sequence[RegionFigures]) -> None:
-        """Remember how long the cuts take as they were shaped."""
+        """Store the times of the shaped cuts."""
         for place, region in zip(written.placed, figures, strict=True):
             index = self.index(place.region)
             self.original_s[index], self.emitted_s[index] = region.original.duration_s, region.emitted_s
@@ -85,7 +85,7 @@ class Aims:
                 self._asked_s[index] = region.emitted_s
 
     def slow_down(self, written: Written, figures: Sequence[RegionFigures]) -> bool:
-        """Give cuts that run faster along the path than the machine allows a lower feed. False if there are none."""
+        """Lower the feed of cuts that are too fast along the path. False if there are none."""
         limit = 1.0 + self._machine.tolerance.feed_excess_ratio
         slower = False
         for place, region in zip(written.placed, figures, strict=True):
@@ -97,12 +97,12 @@ class Aims:
         return slower
 
     def tighten(self, written: Written, figures: Sequence[RegionFigures], judge: Judge) -> bool:
-        """Plan cuts that left their contour tolerance more tightly, so that they run slower. False if there is none.
+        """Plan cuts beyond their contour tolerance more tightly, so that they are slower. False if there are none.
 
-        The bound on feed counts corners and arcs one by one; where several fall into one shaper they add up. Where the
-        feed was searched for a target, what it was planned for counts: a looser plan than that would change nothing. A
-        cut that a tighter plan does not help gets its plan back: slower would only be slower. So does one that is
-        within the limit at 100 % feed override, and after one attempt still not at the stated others.
+        The bound on the feed treats corners and arcs one by one, but those within one shaper duration add up. If the
+        feed was searched for a target, tightening starts from the planned deviation (a looser bound would change
+        nothing). A cut gets its former plan back if tightening does not help, or if it is within the limit at 100 %
+        override but, after one attempt, not at other overrides.
         """
         room_um = self.room_um
         tightened = False
@@ -127,7 +127,7 @@ class Aims:
         return tightened
 
     def keep_cut_price(self, written: Written, keepable: Callable[[int], bool], attempts_left: int) -> bool:
-        """Loosen cuts that take longer than the price of one cut; leave unchanged what costs more in any case."""
+        """Loosen cuts that exceed the price of one cut; leave those unchanged that exceed it at any tolerance."""
         percent = self._machine.price.cut_time_percent
         changed = False
         for place in written.placed:
@@ -153,7 +153,7 @@ class Aims:
     def keep_program_price(
         self, excess_s: float, gains_um: Mapping[int, float], keepable: Callable[[int], bool]
     ) -> bool:
-        """Loosen cuts, all to one tolerance, until the program is within its price; then leave cuts unchanged."""
+        """Loosen all cuts to a common tolerance until the program is within its price; then leave cuts unchanged."""
         cuts = [index for index in gains_um if not self.reasons[index]]
         wanted_s = math.fsum(self.emitted_s[index] for index in cuts) - excess_s
 
@@ -185,15 +185,15 @@ class Aims:
 
     @property
     def is_priced(self) -> bool:
-        """Whether cuts are shaped for the tightest tolerance within their price: the requested one costs more."""
+        """True if cuts are shaped for the tightest tolerance within their price: the requested one costs more."""
         return any(not self.reasons[index] for index in self._priced)
 
     def shaped_for_um(self, index: int) -> float:
-        """Contour tolerance that a cut is shaped for: the requested one, or the tightest within its price."""
+        """Contour tolerance of a shaped cut, µm: the requested one, or the tightest within its price."""
         return max(self._asked_um, self.room_um[index] / _MARGIN) if index in self._priced else self._asked_um
 
     def time_s(self, index: int, tolerance_um: float) -> float:
-        """What a cut takes at a contour tolerance: as simulated for the one that was asked for, else as planned."""
+        """Time of a cut at a contour tolerance: simulated for the requested one, else planned."""
         if tolerance_um <= self._asked_um:
             return self._asked_s[index]
         return min(self._asked_s[index], self._planned_s(index, tolerance_um * _MARGIN))
@@ -226,7 +226,7 @@ class Aims:
         return TolerancePoint(name, tolerance_um, time_s, increase, within)
 
     def _planned_s(self, index: int, room_um: float) -> float:
-        """What a cut takes where its feed is planned for a deviation, slowing at the cost that it had as simulated."""
+        """Time of a cut planned for a deviation, s, with the simulated cost of slowing."""
         curve, blocks_s = self._curve_of(index), self._blocks_s[index]
         least_s, now_s, then_s = (curve.time_s(um) for um in (math.inf, self.room_um[index], room_um))
         ratio = max(0.0, blocks_s - least_s) / (now_s - least_s) if now_s > least_s else 1.0
@@ -234,11 +234,11 @@ class Aims:
         return self.emitted_s[index] - blocks_s + slowest_s + ratio * (then_s - least_s)
 
     def _loosen(self, index: int, room_um: float) -> None:
-        self.room_um[index] = max(room_um, _LOOSER * self.room_um[index])  # more, where a plan was too good
+        self.room_um[index] = max(room_um, _LOOSER * self.room_um[index])  # more if the plan was too optimistic
         self._priced.add(index)
 
     def _tightest_um(self, index: int, allowed_s: float) -> float | None:
-        """Smallest deviation for which a cut can be planned within a time; None: there is none."""
+        """Smallest deviation for which a cut can be planned within a time; None if there is none."""
         if self._planned_s(index, math.inf) > allowed_s:
             return None
         now_um = self.room_um[index]
@@ -249,33 +249,33 @@ class Aims:
 
 
 def _bisect(low: float, high: float, is_enough: Callable[[float], bool]) -> float:
-    """Smallest value that is enough, over the logarithm; the upper end if nothing is."""
+    """Smallest sufficient value, by bisection on a logarithmic scale; the upper end if none is."""
     for _ in range(_LEVELS):
         middle = math.sqrt(low * high)
         low, high = (low, middle) if is_enough(middle) else (middle, high)
     return high
 
 
-_MARGIN = 0.95  # of the tolerance, planned for: the rest is for rounding and for what the plan leaves out
+_MARGIN = 0.95  # planned ratio of the tolerance: the rest is for rounding and effects outside the plan
 _FACTORS = (1.0, 1.25, 1.5, 2.0)  # ratios to the requested tolerance at which a cut is planned
-_BETWEEN = (2.8, 4.0, 5.6, 8.0)  # likewise, so that the curve between them is known where a price asks for it
-_FLAT = 0.002  # of the time: a curve that falls by less has no knee
+_BETWEEN = (2.8, 4.0, 5.6, 8.0)  # likewise, to refine the curve where the price requires it
+_FLAT = 0.002  # relative change of time: a flatter curve has no knee
 
 
 @dataclass(frozen=True)
 class CutCurve:
-    """Time of one shaped cut over the deviation that it is planned for."""
+    """Time of one shaped cut over its planned deviation."""
 
-    planned_um: tuple[float, ...]  # ascending; the last is what it reaches without slowing
+    planned_um: tuple[float, ...]  # ascending; the last one is reached without slowing
     times_s: tuple[float, ...]  # of the shaped command at each, descending
 
     @property
     def loosest_um(self) -> float:
-        """Beyond this a looser tolerance saves no time."""
+        """Tolerance above which no time is saved."""
         return self.planned_um[-1] * 1.1
 
     def time_s(self, planned_um: float) -> float:
-        """Between the planned points on straight lines over the logarithm of the deviation; constant beyond them."""
+        """Interpolate linearly over the logarithm of the deviation; constant beyond the planned points."""
         if len(self.planned_um) == 1 or not math.isfinite(planned_um):
             return self.times_s[-1]
         return float(np.interp(math.log(planned_um), np.log(self.planned_um), self.times_s))
@@ -286,7 +286,7 @@ class TolerancePoint:
     """The program at one contour tolerance."""
 
     name: str  # "as asked", "1.5 times", "the original's contour error", "no slowing"
-    tolerance_um: float  # that the cuts are planned for; without slowing: what they then reach
+    tolerance_um: float  # planned tolerance; without slowing: the deviation reached
     time_s: float  # of the program
     time_increase_percent: float  # over the original
     is_within_price: bool  # of the program and of each cut
@@ -294,7 +294,7 @@ class TolerancePoint:
 
     @property
     def remarks(self) -> str:
-        """For a table."""
+        """Remarks for the table."""
         return ", ".join(["knee"] * self.is_knee + ["above the price"] * (not self.is_within_price))
 
 
@@ -303,11 +303,11 @@ class ToleranceCurve:
     """Tolerance against time, of the cuts that can be shaped."""
 
     points: tuple[TolerancePoint, ...]  # from tight to loose
-    cuts: int  # how many cuts it is of
+    cuts: int  # number of cuts
 
     @property
     def sentence(self) -> str:
-        """The price of what was asked and of the knee, such as "15 µm costs +102 %, 25 µm +18 %"; empty: no time."""
+        """Price of the requested tolerance and of the knee: "15 µm costs +102 %, 25 µm +18 %"; empty without knee."""
         first, knee = self.points[0], next((each for each in self.points if each.is_knee), None)
         if knee is None:
             return ""
@@ -329,7 +329,7 @@ def plan_curve(
     planned = _core.plan_tolerances(path, fir, options, tried)
     reached_um = max(planned[0][1] * 1e3, 1e-3)
     points = {reached_um: planned[0][0]}
-    # What keeps a tolerance without slowing says nothing new; a search may end a little above a looser one's time.
+    # Points that need no slowing are redundant; a search may end slightly above the time of a looser one.
     slowest = planned[0][0]
     for tolerance_um, (time_s, _) in zip(wanted, planned[1:], strict=True):
         if tolerance_um < reached_um:
@@ -340,7 +340,7 @@ def plan_curve(
 
 
 class CutCurves:
-    """The curve of each cut of a conversion on one grid, planned when it is first used."""
+    """The curve of each cut of a conversion on one grid, planned on first use."""
 
     def __init__(
         self,
@@ -357,7 +357,7 @@ class CutCurves:
         self._writer, self._known = writer, {}
 
     def note(self, written: Written) -> None:
-        """Remember cuts that the tolerance does not slow: nothing needs to be planned for them."""
+        """Store cuts that the tolerance does not slow: they need no plan."""
         for index in written.unslowed - self._known.keys():
             planned_um = max(written.planned_um.get(index, 0.0), 1e-3)
             self._known[index] = CutCurve((planned_um,), (written.durations_s[index],))
@@ -376,7 +376,7 @@ class CutCurves:
 
 
 def knee_of(tolerances_um: Sequence[float], times_s: Sequence[float]) -> int | None:
-    """Rank of the point that lies furthest below the line from first to last, over logarithms."""
+    """Index of the point furthest below the line from first to last, on logarithmic scales."""
     if len(times_s) < 3 or times_s[0] <= times_s[-1] * (1.0 + _FLAT):
         return None
     x, y = np.log(tolerances_um), np.log(times_s)
@@ -396,22 +396,22 @@ def curve_table(curve: ToleranceCurve) -> Table:
         Column("increase %", value="time_increase_percent", digits=1),
         Column("", value="remarks", text=True),
     )
-    caption = f"of the cuts that can be shaped: {curve.cuts}"
+    caption = f"cuts that can be shaped: {curve.cuts}"
     return Table("tolerance against time", columns, curve.points, caption)
 
 
-_NEAR_PRICE = 0.7  # of the price: from here on the time of the program is worked out in full
+_NEAR_PRICE = 0.7  # ratio of the price above which the program's time is computed in full
 
 Progress = Callable[[str, float, int], None]
 
 
 @dataclass(frozen=True)
 class CutChoice:
-    """What the caller chose."""
+    """Choices of the caller."""
 
-    not_shaped: dict[int, str]  # why a cut is not to be shaped, by its index
+    not_shaped: dict[int, str]  # reason not to shape a cut, by its index
     shape_all: bool  # shape whatever can be shaped
-    tolerance_curve: bool  # work out what other tolerances would cost
+    tolerance_curve: bool  # compute the times at other tolerances
 
 
 @dataclass(frozen=True)
@@ -421,13 +421,13 @@ class Shaped:
     written: Written
     emitted: Program
     figures: list[RegionFigures]
-    trackers: list[_core.ContourTracker | None]  # of its cuts; None: as in the text before
-    started: StartedTrials  # sensitivity that is simulated ahead of need
-    rapids: ShapedRapids | None = None  # what became of its rapids; None: they were not to be shaped
+    trackers: list[_core.ContourTracker | None]  # of its cuts; None: text unchanged
+    started: StartedTrials  # sensitivity trials started early
+    rapids: ShapedRapids | None = None  # None: rapids are not shaped
 
 
 class ConversionPlan:
-    """What a conversion is to do; changed as cuts leave their tolerance, their price or the budget."""
+    """State of a conversion: shaper, aims and choices, updated as cuts exceed tolerance, price or budget."""
 
     def __init__(
         self,
@@ -464,7 +464,7 @@ class ConversionPlan:
         )  # fmt: skip
         self.reasons = self.aims.reasons
         self.gains_um: dict[int, float] = {}
-        self.left: set[int] = set(choice.not_shaped)  # of which the table of cuts says why
+        self.left: set[int] = set(choice.not_shaped)  # with a reason in the table of cuts
         self.simulated: dict[int, tuple[object, RegionFigures]] = {}
         self.originals_judged: dict[int, RegionFigures] = {}
         self.spending = None if budget is None else Spending(budget, program, machine)
@@ -481,7 +481,7 @@ class ConversionPlan:
             self.curves.use(self.writer)
 
     def excess_s(self, shaped: Shaped) -> float:
-        """Time above what the price of the program allows."""
+        """Time above the price of the program, s."""
         price_s = self.price_s()
         cuts_s = math.fsum(figures.emitted_s - figures.original.duration_s for figures in shaped.figures)
         cuts_s += self.machine.emission.prefill_dwell_s * len(shaped.figures)
@@ -490,25 +490,25 @@ class ConversionPlan:
         return self.model.cycle_time_s(shaped.emitted.core) - self.original_s.result() - price_s
 
     def price_s(self) -> float:
-        """Time that shaping may add to the program."""
+        """Time that shaping may add to the program, s."""
         return self.original_s.result() * self.machine.price.program_time_percent / 100.0
 
     def is_benefit(self, shaped: Shaped) -> bool:
-        """Whether a shaped cut gains enough."""
+        """True if a shaped cut gains enough."""
         least, limit_um = self.machine.shaping.least_gain_um, self.machine.tolerance.contour_um
         return any(verdict.is_benefit(limit_um, least) for verdict in self.verdicts(shaped))
 
     def verdicts(self, shaped: Shaped) -> tuple[RegionVerdict, ...]:
-        """Every shaped cut beside its limits."""
+        """Verdict of every shaped cut against its limits."""
         return self.judge.verdicts(shaped.figures, shaped.written.placed, self.grid.block_period_s)
 
     @property
     def chosen(self) -> list[int]:
-        """Cuts that are to be shaped, by their index."""
+        """Indices of the cuts to shape."""
         return [index for index, reason in enumerate(self.reasons) if not reason]
 
     def is_keepable(self, index: int) -> bool:
-        """Whether a cut can be left unchanged."""
+        """True if a cut can be left unchanged."""
         return keepable(self.program.regions[index], self.machine)
 
     def leave(self, index: int, reason: str, gained_um: float | None) -> None:
@@ -519,7 +519,7 @@ class ConversionPlan:
             self.gains_um[index] = gained_um
 
     def leave_out(self) -> None:
-        """Leave unchanged, before anything is shaped, what has nothing to gain or keeps its limits as it is."""
+        """Before shaping, leave cuts unchanged that have nothing to gain or keep their limits already."""
         self.original_within = self._original_is_within()
         if self.choice.shape_all:
             return
@@ -528,19 +528,19 @@ class ConversionPlan:
             if not reason and self.is_keepable(index):
                 most = most_to_gain_um(original.result())
                 if most < least:
-                    self.leave(index, f"nothing there to gain: {most:.1f} µm", most)
+                    self.leave(index, f"nothing to gain: {most:.1f} µm", most)
         if self.original_within:
             self.leave_everything("every cut of the original keeps its limits")
 
     def leave_everything(self, reason: str) -> None:
-        """Nothing is shaped; cuts that can stay as they are and have no reason yet get this one."""
+        """Leave all cuts unchanged that can be; those without a reason get this one."""
         for index in self.chosen:
             if self.is_keepable(index):
                 gained = self.gains_um.get(index)
                 self.leave(index, reason or f"shaping gains {gained or 0.0:.1f} µm", gained)
 
     def _original_is_within(self) -> bool:
-        """Whether every cut as programmed keeps its limits in every operating condition that counts for it."""
+        """True if every cut of the original keeps its limits in every operating condition that counts."""
         regions = self.program.regions
         placed = [Placed(region, region.first_line, region.last_line) for region in regions]
         nominal = Judge(self.model, [case for case in self.judge.cases if case.nominal])

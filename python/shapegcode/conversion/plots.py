@@ -25,10 +25,10 @@ def plots_of(conversion: Conversion) -> dict[str, Plot]:
 
 
 def plot_tolerance(curve: ToleranceCurve, ax: Axes | None = None) -> Axes:
-    """What does a tighter contour cost in time, and where is the knee?
+    """Plot the cycle time over the contour tolerance, and mark the knee.
 
     Args:
-        curve: of a conversion.
+        curve: tolerance curve of a conversion.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -59,7 +59,7 @@ def _simulated(conversion: Conversion) -> SimulatedRegion:
         range(len(conversion.regions)), key=lambda rank: max(conversion.regions[rank].residual_vibration_um.original)
     )
     place, handle = conversion.placed[worst], conversion.simulated
-    assert handle is not None  # a conversion from JSON has no places either
+    assert handle is not None  # a conversion from JSON has no regions either
     model = MachineModel(handle.machine)
     path, blocks = place.region.path, place.blocks(conversion.emitted)
     offset = model.offset(place.region)

@@ -1,6 +1,6 @@
-"""Restart points inside of long cuts: where the shaped command is nearly at rest, and how the block there is written.
+"""Restart points inside long cuts: full modal blocks where the shaped command is nearly at rest.
 
-A start from rest lacks the table's speed and deflection at that block: they remain as a vibration of the slowest mode.
+A start from rest lacks the table's speed and deflection at that block, which excites the slowest mode.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from shapegcode.program.stamp import whole_lines
 from shapegcode.verdict.figures import Placed
 
 EXTRA_SYSTEM = 541  # G54.1 as the core counts it
-PLACEHOLDER = "N00000"  # N word of a restart point before the program that it stands in is put together
+PLACEHOLDER = "N00000"  # N word of a restart point before the program is assembled
 _FIRST_NUMBER, _END_NUMBER = 10_000, 100_000  # five digits, as `PLACEHOLDER`
 _ROUND = 1000
 _N_WORD = re.compile(rb"N *0*([0-9]{1,8})")
@@ -34,45 +34,45 @@ _N_WORD = re.compile(rb"N *0*([0-9]{1,8})")
 class RestartMark:
     """A restart point in the text of a region."""
 
-    byte: int  # of its N word, from the begin of the text
-    line: int  # of it, 0 for the first one of the text
-    time_s: float  # from the begin of the shaped blocks
-    position_mm: tuple[float, float, float]  # where its block begins
+    byte: int  # offset of its N word in the text
+    line: int  # its line, 0 for the first one of the text
+    time_s: float  # from the start of the shaped blocks
+    position_mm: tuple[float, float, float]  # start of its block
     speed_mm_per_s: float  # of the shaped command there
-    vibration_um: float  # amplitude that a start from rest leaves there, in the slowest mode of each axis
-    number: int = 0  # N; 0 before the program is put together
+    vibration_um: float  # amplitude excited by a start from rest, in the slowest mode of each axis
+    number: int = 0  # N; 0 before the program is assembled
 
 
 @dataclass(frozen=True)
 class CutRestarts:
-    """Restart points of a region, and what there is to say about them."""
+    """Restart points of a region, and why there are no others."""
 
     marks: tuple[RestartMark, ...] = ()  # in their order
     longest_s: float = 0.0  # longest time without one
-    reason: str = ""  # why there can be none; empty: there can
-    stops: int = 0  # how many of them are stops that were put in for them
-    stops_s: float = 0.0  # what these add to the cutting time
+    reason: str = ""  # why there can be none; empty if there can
+    stops: int = 0  # number of points that are added stops
+    stops_s: float = 0.0  # added cutting time of these
 
 
 @dataclass(frozen=True)
 class RestartPoint:
-    """A block inside of a shaped cut at which the control can begin, and what is in force there."""
+    """A block inside a shaped cut at which the control can start, with the modal state there."""
 
     number: int  # its N word
     line: int  # of the emitted program, from 1
-    lines: tuple[int, int]  # of the cut in the original, first and last
-    time_s: float  # from the begin of the cut
-    position_mm: tuple[float, float, float]  # where the tool has to be before the start, in the coordinate system
+    lines: tuple[int, int]  # first and last line of the cut in the original
+    time_s: float  # from the start of the cut
+    position_mm: tuple[float, float, float]  # required tool position before the start, in the coordinate system
     speed_mm_per_s: float  # of the shaped command there
-    vibration_um: float  # amplitude that a start from rest leaves there
+    vibration_um: float  # amplitude excited by a start from rest
     coordinate_system: str  # such as "G54" or "G54.1P3"
-    tool: int | None = None  # T number in the spindle; null: the program names none before it
+    tool: int | None = None  # T number in the spindle; null: none programmed before
     length_offset: int | None = None  # H number in force; null: none
     spindle_rev_per_min: float | None = None  # in force; null: none programmed
 
 
 class FreeNumbers:
-    """N numbers for restart points that a program does not use itself."""
+    """N numbers for restart points that are free in a program."""
 
     def __init__(self, program: Program) -> None:
         self._program = program
@@ -99,7 +99,7 @@ class FreeNumbers:
 
 
 def system_of(state: _core.ModalState) -> str:
-    """The coordinate system in force, as it is programmed."""
+    """The active coordinate system as programmed, such as "G54"."""
     extra = state.coordinate_system == EXTRA_SYSTEM
     return f"G54.1P{state.coordinate_number}" if extra else f"G{state.coordinate_system}"
 
@@ -107,7 +107,7 @@ def system_of(state: _core.ModalState) -> str:
 def restart_points(
     program: Program, cuts: Iterable[tuple[Placed, CutRestarts, int | None]]
 ) -> tuple[RestartPoint, ...]:
-    """The restart points of a program, with what is in force at each; the third of a cut is its tool."""
+    """The restart points of a program with their modal states; the third entry of a cut is its tool."""
     return tuple(
         RestartPoint(
             number=mark.number,
@@ -130,12 +130,12 @@ def restart_points(
 IntArray = npt.NDArray[np.int64]
 
 _SLOW_RATIO = 0.2  # of the programmed feed
-_APART = 0.1  # of the interval: nearer to another point, or to an end of the cut, a point is of no use
+_APART = 0.1  # of the interval: smallest useful distance to another point or to an end of the cut
 _MOTION, _PLANE, _FEED = map(re.compile, (rb"G0([123])(?![0-9])", rb"G(1[789])(?![0-9])", rb"F[0-9.]+"))
 
 
 class RestartPlaces:
-    """Chooses restart points of one region while its shaped command is given out."""
+    """Chooses restart points of one region while its shaped command is generated."""
 
     def __init__(self, region: _core.Region, machine: Machine, period_s: float) -> None:
         self._period_s = period_s
@@ -145,11 +145,11 @@ class RestartPlaces:
         self._tolerance_mm = machine.tolerance.contour_um * 1e-3
         self._omega = 2.0 * math.pi * np.array(slowest_excited_hz(machine))
         self.last = 0  # period of the last point
-        self.longest = 0  # most periods between two of them
-        self.reason = _why_none(region)  # why there can be none; empty: there can
+        self.longest = 0  # largest number of periods between two of them
+        self.reason = _why_none(region)  # why there can be none; empty if there can
 
     def low(self, piece: _core.ShapedCommand, at: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Where the commanded speed of a piece is low and a start from rest keeps the contour tolerance."""
+        """Periods of a piece with low commanded speed at which a start from rest keeps the contour tolerance."""
         grid = np.asarray(piece.grid_mm)
         at = at[(at > 0) & (at < len(grid) - 1)]
         before, behind = (grid[at] - grid[at - 1]) / self._period_s, (grid[at + 1] - grid[at]) / self._period_s
@@ -162,7 +162,7 @@ class RestartPlaces:
     def choose(
         self, at: IntArray, left: FloatArray, end: int, *, last: bool, usable: Callable[[int], bool]
     ) -> Iterator[int]:
-        """Points of a piece, such that no more than the interval lies between two of them where there are places."""
+        """Choose restart points, at most one interval apart wherever the command is slow enough."""
         near = self._interval * _APART
         if last:
             at = at[: np.searchsorted(at, end - near)]
@@ -174,7 +174,7 @@ class RestartPlaces:
             if middle == high or left[middle:high].min() > self._floor_mm:
                 middle = low
             order = middle + np.argsort(left[middle:high], kind="stable")
-            # Where there is none in time: the slow place that comes first behind it.
+            # If there is none within the interval: the first slow position after it.
             group = int(np.searchsorted(at, at[high] + near, side="right")) if high < len(at) else high
             later = high + np.argsort(left[high:group], kind="stable")
             found = next((int(each) for each in chain(order, later, range(group, len(at))) if usable(int(each))), None)
@@ -190,17 +190,17 @@ class RestartPlaces:
         self.last = period
 
     def further_stops(self, points: Sequence[int], reached: Sequence[int], end: int) -> list[int]:
-        """Segments before which the command must come to rest, because it is not nearly at rest for too long."""
+        """Segments before which the command must stop, because it is nowhere nearly at rest within the interval."""
         stops: list[int] = []
         begins = np.asarray(reached)
         near = self._interval * _APART
-        aim = self._interval - near  # to slow down takes time too
+        aim = self._interval - near  # deceleration takes time too
         for begin, until in zip([0, *points], [*points, end], strict=True):
             at: float = begin
             while until - at > self._interval:
                 index = int(np.searchsorted(begins, at + aim, side="right")) - 1
                 if index < 0 or begins[index] <= at + near:
-                    index += 1  # a long segment: behind it
+                    index += 1  # a long segment: after it
                 if index >= len(begins) or begins[index] >= until - near:
                     break
                 at = float(begins[index])
@@ -218,7 +218,7 @@ def _why_none(region: _core.Region) -> str:
     entry = region.entry
     unknown = [axis for axis, known in zip("XYZ", entry.known, strict=True) if not known]
     if region.incremental or unknown:
-        return f"the position of {', '.join(unknown) or 'an axis'} is not known, so no absolute one can be written"
+        return f"the position of {', '.join(unknown) or 'an axis'} is not known, so it cannot be written absolutely"
     if entry.uncertain:
         return "its modal state is not known"
     return ""
@@ -226,7 +226,7 @@ def _why_none(region: _core.Region) -> str:
 
 def block_lines(text: bytes, blocks: int) -> tuple[IntArray, IntArray]:
     """Lines of the blocks in a text, without comment lines."""
-    letters = np.frombuffer(text + b"(", dtype=np.uint8)  # so that there is one behind the last line end
+    letters = np.frombuffer(text + b"(", dtype=np.uint8)  # so that a character follows the last line end
     ends = np.flatnonzero(letters == ord("\n")) + 1
     begins = np.concatenate([[0], ends[:-1]]).astype(np.int64)[: len(ends)]
     for _ in range(2):  # a line may end with LF CR CR
@@ -236,22 +236,22 @@ def block_lines(text: bytes, blocks: int) -> tuple[IntArray, IntArray]:
 
 
 class RegionRestarts:
-    """Writes blocks of a region as restart points while it is written, piece by piece."""
+    """Writes blocks of a region as restart points, piece by piece."""
 
     def __init__(
         self, places: RestartPlaces, region: _core.Region, machine: Machine, fit: _core.FitOptions, decimals: int
     ) -> None:
         self._places, self._region, self._fit, self._decimals = places, region, fit, decimals
         self._max = machine.emission.max_line_length
-        # An axis between two increments is left where it is: the list of points names its position.
+        # An axis between two increments is not moved: its position is in the list of points.
         self._resting = between_increments(region, fit.increment_mm)
         self._marks: list[RestartMark] = []
-        self._bytes = self._lines = 0  # of the pieces so far
+        self._bytes = self._lines = 0  # of the previous pieces
 
     def add(
         self, text: bytes, piece: _core.ShapedCommand, fitted: _core.FittedBlocks, state: tuple[int, int], *, last: bool
     ) -> bytes:
-        """The next piece with its restart points."""
+        """Write the next piece with its restart points."""
         firsts, ends = fitted.first_periods.astype(np.int64), fitted.ends
         at, left, speed = self._places.low(piece, firsts)
         # The last block of a region may have to stop exactly.
@@ -310,7 +310,7 @@ class _PointLines:
         return begin, begin + len(self._text[begin:end].rstrip(b"\r\n"))
 
     def write(self, block: int, position: str) -> bytes | None:
-        """A block with all that it depends on, G40 and G64 where there is room; None: it cannot be a restart point."""
+        """A block with its full modal state, G40 and G64 if they fit; None: it cannot be a restart point."""
         if block >= len(self._begins):
             return None
         begin, end = self.extent(block)
@@ -319,7 +319,7 @@ class _PointLines:
         feed = self._in_force(_FEED, end, b"").decode()
         plane = self._in_force(_PLANE, end, self._plane).decode()
         entry = self._region.entry
-        # G54.1 takes P, which a block of a cut shall not have: the list names it, and it is in force before the start.
+        # G54.1 needs P, which a block of a cut must not contain: it is in the list and set before the start.
         system = "" if entry.coordinate_system == EXTRA_SYSTEM else system_of(entry)
         codes = f"{PLACEHOLDER}G{plane}G{entry.units}G90{system}G94"
         for further in ("G40G64", "G40", ""):
@@ -329,7 +329,7 @@ class _PointLines:
         return None
 
     def _in_force(self, pattern: re.Pattern[bytes], end: int, before: bytes) -> bytes:
-        """The last word of a kind up to a byte; `before`: where the piece has none."""
+        """The last word of a kind up to a byte; *before* if the piece has none."""
         while end > 0:
             begin = self._text.rfind(b"\n", 0, end) + 1
             line = self._text[begin:end].lstrip(b"\r")

@@ -1,4 +1,4 @@
-"""What a conversion made: figures before and after, cases, regions, warnings, the next step, the emitted program."""
+"""Result of a conversion: figures before and after, cases, regions, warnings, next step, emitted program."""
 
 from __future__ import annotations
 
@@ -46,31 +46,31 @@ Grade = Literal[
     "no benefit: run the original",
     "do not run",
 ]
-"""From the best down; the first that applies from the end is the answer."""
+"""From best to worst; the first that applies from the end is the answer."""
 
 
 @dataclass(frozen=True)
 class ChangeProof:
-    """What is unchanged in an emitted program."""
+    """Proof of what is unchanged in an emitted program."""
 
     answer: str  # such as "42 of 42 rapids, 7 of 7 tool calls, 31 of 31 offsets unchanged; path within 12.3 µm"
-    counts: tuple[KindCount, ...]  # of each kind of which one of both programs has some
-    path_um: float  # largest distance of the paths of a cut, seen from either; of the command, not of the table
-    refused: tuple[ProgramDifference, ...]  # differences that shaping does not explain; none: it is proven
+    counts: tuple[KindCount, ...]  # for each kind that occurs in one of the programs
+    path_um: float  # largest distance of the paths of a cut, seen from either; of the command, not of the machine table
+    refused: tuple[ProgramDifference, ...]  # differences not explained by shaping; none: proven
 
 
 @dataclass(frozen=True)
 class DialectNotes:
-    """For which control the program is written, and what is known of that control."""
+    """Control for which the program is written, and its known properties."""
 
     name: str  # `emission.dialect`
-    control: str  # which that is
-    facts: Mapping[str, str]  # by topic (words, dwell, look-ahead, override, restart ...) what holds there
-    assumed: tuple[str, ...]  # topics for which there is no source
+    control: str  # its name
+    facts: Mapping[str, str]  # by topic (words, dwell, look-ahead, override, restart ...)
+    assumed: tuple[str, ...]  # topics without a source
 
     @property
     def sentence(self) -> str:
-        """In one sentence."""
+        """The target control and the assumed topics, in one sentence."""
         assumed = f"; assumed: {', '.join(self.assumed)}" if self.assumed else ""
         return f"written for {self.control} (emission.dialect = {self.name}){assumed}"
 
@@ -79,59 +79,59 @@ class DialectNotes:
 class FilterAdvice:
     """A contour error caused by the control's own filter, and its remedy without shaping."""
 
-    key: str  # of the machine file, the filter's time constant
-    now_s: float  # its value
-    enough_s: float  # at which every cut of the original keeps its limits, simulated
-    rounding_um: float  # contour error of the command, which the filter makes
-    lines: tuple[int, int]  # of the cut in which it is largest
+    key: str  # key of the filter's time constant
+    now_s: float  # its present value
+    enough_s: float  # value at which every cut of the original keeps its limits, simulated
+    rounding_um: float  # contour error of the command caused by the filter
+    lines: tuple[int, int]  # lines of the cut with the largest error
 
     def __str__(self) -> str:
-        lower = f"lowered to {self.enough_s * 1e3:.3g} ms" if self.enough_s > 0.0 else "switched off"
+        lower = f"with {self.enough_s * 1e3:.3g} ms" if self.enough_s > 0.0 else "switched off"
         return (
             f"the control's {self.now_s * 1e3:.3g} ms filter rounds the path by {self.rounding_um:.0f} µm "
             "(lines {} to {})".format(*self.lines)
             + f": {lower} ({self.key}), or with contour control, the original "
-            "keeps every limit without shaping"
+            "keeps every limit unshaped"
         )
 
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class Conversion(ProgramFigures, Result):
-    """A program, shaped: the emitted program, and what simulating it beside the original showed.
+    """The emitted program, and the results of its simulation compared with the original.
 
     Attributes:
         program: name of the original.
         machine: name of the machine.
-        recommendation: what to do with it: one of the five values of `Grade`.
-        reason: of the recommendation, in words.
+        recommendation: recommendation for the program: one of the five values of `Grade`.
+        reason: reason of the recommendation.
         cuts: every cut, shaped or left unchanged, with its gain and its price.
-        tolerance_curve: what other contour tolerances cost in time; null: not worked out, or nothing can be shaped.
+        tolerance_curve: what other contour tolerances cost in time; null: not computed, or nothing can be shaped.
         proof: that nothing but the shaped cuts changed; null: nothing was shaped.
-        advice: a smaller filter of the control that would do without shaping; null: there is none.
+        advice: a smaller filter of the control that makes shaping unnecessary; null: none.
         cycle_time_s: whole program: cuts, rapids with in-position wait, dwells, drilling cycles.
         cutting_time_s: the cuts alone, until the set-points rest.
         block_period_s: grid of the shaped blocks.
-        shaper: the design on it.
-        blocks: how many there are.
-        expanded: the original was expanded (calls, macros, coordinate modes) before it was shaped.
-        expanded_radii_mm: radii of cutter compensation that are in the path now, by offset.
+        shaper: the shaper on this grid.
+        blocks: number of blocks.
+        expanded: true if the original was expanded (calls, macros, coordinate modes) before shaping.
+        expanded_radii_mm: radii of cutter compensation included in the path, by offset.
         bytes_read: size of the original, expanded.
         bytes_emitted: size of the emitted program.
         limits: tolerances that were applied.
         warnings: caution, before you run.
-        budget: only under one: what it allowed, and what was given up for it.
-        rapids: only where rapids may be shaped: what became of them.
-        least_gain_um: what is too little.
-        parameter_sensitivity: values that were not measured on this machine, by how far each moves the deciding figure
+        budget: only with a budget: its limits and effect.
+        rapids: only with shaped rapids: their outcome.
+        least_gain_um: smallest gain for which a cut is shaped, µm.
+        parameter_sensitivity: unverified values, by the effect of each on the deciding figure relative
             to its limit.
-        unverified_parameters_tested: how many such values were changed, one at a time.
-        at_the_control: caution, before you run when it is loaded and run; empty where nothing was shaped.
-        restart_points: blocks inside of shaped cuts at which the control can begin.
-        emitted: the same, read back.
-        placed: the shaped regions and their places in it.
-        dialect: only where the program is written for another control than FANUC's.
-        written: the program in the words of that control; None: `emitted` is what is written.
-        simulated: a handle and no data: both programs and the machine, to simulate them again for a picture or a page.
+        unverified_parameters_tested: number of such values changed, one at a time.
+        at_the_control: cautions for loading and running it; empty if nothing was shaped.
+        restart_points: blocks inside shaped cuts at which the control can restart.
+        emitted: the emitted program, read back.
+        placed: the shaped regions and their positions in it.
+        dialect: only if the program is written for a control other than FANUC's.
+        written: the program in the dialect of that control; None: `emitted` is written.
+        simulated: a handle, not data: both programs and the machine, to simulate them again for a picture or a page.
     """
 
     json_extra: ClassVar[dict[str, Any]] = Result.json_extra | {"within_tolerance": bool, "shaped_cuts_within": bool}
@@ -173,7 +173,7 @@ class Conversion(ProgramFigures, Result):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Published methods behind shaper, blocks, controller and proof."""
+        """Published methods used for shaper, blocks, controller and proof."""
         found = [f"shaper {self.shaper.family}"]
         if self.simulated is not None:
             found += self.simulated.methods
@@ -183,33 +183,33 @@ class Conversion(ProgramFigures, Result):
 
     @property
     def text(self) -> bytes:
-        """The program that was written, as a file holds it."""
+        """The content of the emitted program file."""
         return self.emitted.text if self.written is None else self.written
 
     @property
     def ok(self) -> bool:
-        """Whether the recommended program can be run with nothing more to decide: exit code 0."""
+        """True if the recommended program can be run without further decisions: exit code 0."""
         return self.recommendation not in ("better, tolerance not met", "do not run")
 
     @property
     def is_written_as_output(self) -> bool:
-        """False: nobody should run it, and it is written under another suffix."""
+        """False if it must not be run and is written with another suffix."""
         return self.recommendation != "do not run"
 
     @property
     def nothing_shaped(self) -> bool:
-        """Whether the program is as it was."""
+        """True if the program is unchanged."""
         return self.blocks.emitted == 0
 
     @property
     def kept(self) -> tuple[CutOutcome, ...]:
-        """The cuts left unchanged, but for those of a budget."""
+        """The cuts left unchanged, except for a budget."""
         over_budget = {each.lines for each in self.budget.left_unchanged} if self.budget is not None else set()
         return tuple(cut for cut in self.cuts if not cut.is_shaped and cut.lines not in over_budget)
 
     @property
     def answer(self) -> str:
-        """What to do with it, its figures and price; then what is not met, and why."""
+        """Recommendation, figures and price; then missed limits with reasons."""
         lines = [self._headline(), *self._left_out()]
         if self.recommendation == "do not run" and not any(self.reason in line for line in lines):
             lines.append(self.reason)
@@ -265,11 +265,11 @@ class Conversion(ProgramFigures, Result):
         if self.within_tolerance and best.gain_um >= self.least_gain_um:
             return self.reason
         if best.gain_um < self.least_gain_um:
-            return f"shaping would gain {best.gain_um:.1f} µm at most (least: {self.least_gain_um:g})"
+            return f"shaping would gain {best.gain_um:.1f} µm at most (required: {self.least_gain_um:g})"
         return "lines {} to {}: {}".format(*best.lines, best.reason)
 
     def _left_out(self) -> Iterator[str]:
-        """The first cut that is not within its limits, one left unchanged before others, and what would cure it."""
+        """The first cut beyond its limits, unchanged cuts first, and its remedy."""
         out = sorted((cut for cut in self.cuts if cut.misses), key=lambda cut: cut.is_shaped)
         for cut in out[:1]:
             how = f"left unchanged ({cut.reason})" if not cut.is_shaped else self._cost_of(cut)
@@ -288,14 +288,14 @@ class Conversion(ProgramFigures, Result):
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
         if self.nothing_shaped:
-            # A program read in the wrong unit was judged at a twenty-fifth of its size, or its speed.
+            # A program read in the wrong unit was simulated at a twenty-fifth of its size or speed.
             if any("(power_on.units)" in warning for warning in self.warnings):
                 return (
-                    "make sure of the unit, as the program has neither G20 nor G21: convert it with "
+                    "check the unit, because the program has neither G20 nor G21: convert it with "
                     "--set power_on.units=G20 (inch) or G21 (mm), and write that code into it."
                 )
             if self.recommendation.startswith("already"):
-                return "run the program as it is; --shape-all shapes it nevertheless."
+                return "run the original program; --shape-all shapes it nevertheless."
             return "run the original program: nothing in it was shaped."
         if self.recommendation.startswith("no benefit"):
             return "run the original program: the shaped one brings no benefit."
@@ -307,7 +307,7 @@ class Conversion(ProgramFigures, Result):
             return f"do not run it ({self.reason}): {remedy}."
         if not self.within_tolerance:
             return (
-                "decide whether the cuts that stay out of tolerance matter for this part (see the table of "
+                "decide whether the cuts that remain out of tolerance matter for this part (see the table of "
                 "cuts); then run the "
                 "emitted program above the workpiece, without a tool."
             )
@@ -316,16 +316,16 @@ class Conversion(ProgramFigures, Result):
         return "run the emitted program above the workpiece, without a tool, at 100 % feed override."
 
     def misses(self) -> Iterator[str]:
-        """Every tolerance that a cut misses, with the lines of the original program."""
+        """Yield every tolerance that a cut misses, with the lines of the original program."""
         for cut in self.all_cuts:
             for miss in cut.misses:
                 yield "lines {} to {}: {}".format(*cut.lines, miss)
 
     def tables(self, *, every_cut: bool = False) -> list[Table]:
-        """Original against emitted; cut by cut; tolerance against time; operating conditions; sensitivity.
+        """Tables: original and emitted; cut by cut; tolerance against time; operating conditions; sensitivity.
 
         Args:
-            every_cut: list all of them; else those that miss a limit or gain most.
+            every_cut: list all cuts; else those that miss a limit or gain most.
 
         Returns:
             The tables.
@@ -360,13 +360,13 @@ class Conversion(ProgramFigures, Result):
             ]
         between = self.rapid_vibration_um
         yield [
-            BeforeAfter(f"vibration behind rapids {axis.upper()}", "µm", between.original[axis], between.emitted[axis])
+            BeforeAfter(f"vibration after rapids {axis.upper()}", "µm", between.original[axis], between.emitted[axis])
             for axis in "xyz"
             if between.original[axis] >= _LEAST_SHOWN_UM or between.emitted[axis] >= _LEAST_SHOWN_UM
         ]
 
     def residual_limit_um(self, axis: str) -> float | None:
-        """Limit of the cut with the largest emitted residual, the one that is shown.
+        """Limit of the cut with the largest emitted residual, µm.
 
         Args:
             axis: "x", "y" or "z".
@@ -408,7 +408,7 @@ class Conversion(ProgramFigures, Result):
         rows.append(BeforeAfter("duration of the shaper", "ms", None, self.shaper.duration_s * 1e3, 3))
         if self.shaper.per_axis_duration_s:
             shorter_ms = self.shaper.per_axis_duration_s * 1e3
-            rows.append(BeforeAfter("with one for each axis (--per-axis)", "ms", None, shorter_ms, 3))
+            rows.append(BeforeAfter("duration, one shaper per axis (--per-axis, not used)", "ms", None, shorter_ms, 3))
         return rows
 
     def plots(self) -> Mapping[str, Plot]:
@@ -422,7 +422,7 @@ class Conversion(ProgramFigures, Result):
         return found
 
     def page(self, **options: Any) -> Page:
-        """The conversion as a page, see `Result.page`; the emitted program stands there with its verdict.
+        """The conversion as a page, see `Result.page`, with the verdict in the emitted program.
 
         Args:
             options: of `Result.page`.
@@ -436,17 +436,17 @@ class Conversion(ProgramFigures, Result):
         page = super().page(**options)
         if page.scene is None or self.from_json:
             return page
-        # It was read back before it had one.
+        # It was read back before the verdict was written.
         *others, last = page.scene.variants
-        # In FANUC's words, whose lines the simulated motion knows.
+        # In FANUC's words, to whose lines the simulated motion refers.
         with_verdict = replace(last, text=self.emitted.text.decode("utf-8", "replace"))
         return replace(page, scene=replace(page.scene, variants=(*others, with_verdict)))
 
     def page_sections(self, provenance: Provenance | None = None) -> tuple[Section, ...]:
-        """What it gains, its sensitivity to unverified parameters, where the time goes, and the operator's run sheet.
+        """Before and after, sensitivity to unverified parameters, time components, and the operator's run sheet.
 
         Args:
-            provenance: of what it was made; None: it is not known.
+            provenance: provenance of the result; None: unknown.
 
         Returns:
             The sections.

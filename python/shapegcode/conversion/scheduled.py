@@ -1,4 +1,4 @@
-"""Feeds and shaping in one go: the feeds are chosen for the motion that the shaped program really has."""
+"""Feed scheduling and shaping together: feeds are chosen for the real motion of the shaped program."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from shapegcode.shaping.grid import Grid, choose_grid
 
 
 class ShapedMotion(Mover):
-    """The motion that `convert` plans for a region: look-ahead within the contour tolerance, then the shaper."""
+    """Motion that `convert` plans for a region: look-ahead within the contour tolerance, then the shaper."""
 
     def __init__(self, machine: Machine, grid: Grid) -> None:
         period = machine.controller.interpolation_period_s
@@ -60,17 +60,17 @@ class ScheduledConversion(Conversion):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Those of the conversion and of the feeds."""
+        """Methods of conversion and feed schedule."""
         return (*super().methods, *self.feed_schedule.methods)
 
     @property
     def ok(self) -> bool:
-        """Whether the shaped program keeps the machine's tolerances and the tool's limits."""
+        """True if the shaped program keeps the machine's tolerances and the tool's limits."""
         return super().ok and self.feed_schedule.ok
 
     @property
     def answer(self) -> str:
-        """The verdict on the motion and that on the cut."""
+        """The verdicts on motion and cut."""
         return f"{super().answer}; {self.feed_schedule.answer}"
 
     @property
@@ -81,7 +81,7 @@ class ScheduledConversion(Conversion):
         return super().next_step
 
     def tables(self, *, every_cut: bool = False) -> list[Table]:
-        """Those of the schedule, then those of the conversion.
+        """Tables of the schedule, then of the conversion.
 
         Args:
             every_cut: see `Conversion.tables`.
@@ -92,12 +92,12 @@ class ScheduledConversion(Conversion):
         return [*self.feed_schedule.tables(), *super().tables(every_cut=every_cut)]
 
     def plots(self) -> Mapping[str, Plot]:
-        """Those of the conversion and those of the schedule."""
+        """Plots of conversion and schedule."""
         return {**super().plots(), **self.feed_schedule.plots()}
 
 
 _ROUNDS = 4
-_MORE_MARGIN = 0.005  # beyond what the last round was off by
+_MORE_MARGIN = 0.005  # added to the excess of the last round
 
 Progress = Callable[[float], None]
 
@@ -115,12 +115,12 @@ def convert_scheduled(
     budget: Budget | None = None,
     on_progress: Progress = lambda _done: None,
 ) -> ScheduledConversion:
-    """Schedule the feeds of a program, shape it, and look at the force of what was emitted.
+    """Schedule the feeds of a program, shape it, and compute the force of the emitted program.
 
-    Where the emitted program is beyond a limit, feeds are chosen again with more margin.
+    If the emitted program exceeds a limit, feeds are chosen again with more margin.
 
     Args:
-        program: what to convert, or its file.
+        program: the program to convert, or its file.
         machine: controller, modes, tolerances.
         tools: as :func:`shapegcode.feed.schedule.schedule_feed`.
         stock: likewise.
@@ -129,13 +129,13 @@ def convert_scheduled(
         block_period_s: as :func:`shapegcode.convert`.
         arc_feed_ratio: likewise.
         budget: likewise.
-        on_progress: called with the share that is done, 0 to 1.
+        on_progress: called with the finished ratio, 0 to 1.
 
     Returns:
-        The conversion, and the schedule of the feeds that it runs with.
+        The conversion with its feed schedule.
 
     Raises:
-        ProgramError, DesignError, ArgumentError, StockError, RoundTripError: as those two.
+        ProgramError, DesignError, ArgumentError, StockError, RoundTripError: as the two functions.
     """
     machine = Machine.of(machine)
     surveyed = survey(

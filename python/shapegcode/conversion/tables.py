@@ -1,4 +1,4 @@
-"""The tables of a conversion: original against emitted, and the sensitivity to unverified parameters."""
+"""The tables of a conversion: original and emitted figures, and the sensitivity to unverified parameters."""
 
 from __future__ import annotations
 
@@ -22,52 +22,52 @@ from shapegcode.verdict.cases import Case, CaseFigures, case_figures, judge_regi
 from shapegcode.verdict.figures import Placed
 from shapegcode.verdict.judge import Judge, RegionFigures
 
-_LEAST_SHARE = 0.01  # of a limit: a value that moves its figure by less does not matter
+_LEAST_SHARE = 0.01  # of a limit: smaller effects do not matter
 _MOST_SHOWN = 8
-_FREE_S = 60.0  # of motion: so much is always simulated
-_FULL_RUNS = 2  # about half as often as a verdict simulates every region with its contour
-_FILTER_S = 0.024  # moving average of 1769 or 1622 on a machining centre, where the file says that there is none
-_MODE = {"frequency_hz": 40.0, "damping_ratio": 0.02}  # of an axis of a machining centre, where none is known
+_FREE_S = 60.0  # of motion: always simulated
+_FULL_RUNS = 2  # about half as many as the verdict simulates per region with its contour
+_FILTER_S = 0.024  # moving average of 1769 or 1622 on a machining centre, if the file has none
+_MODE = {"frequency_hz": 40.0, "damping_ratio": 0.02}  # of an axis of a machining centre, if none is known
 _USUAL_MODE = f"a mode of {_MODE['frequency_hz']:g} Hz"
-_PERCENT = {"frequency_hz": 5.0, "damping_ratio": 50.0, "participation": 30.0}  # where no uncertainty is stated
+_PERCENT = {"frequency_hz": 5.0, "damping_ratio": 50.0, "participation": 30.0}  # default uncertainties
 
 
 @dataclass(frozen=True)
 class Sensitivity(OldNames):
-    """A value of the machine file that was not measured, and what it would do to the verdict."""
+    """An unverified value of the machine file, and its effect on the verdict."""
 
     key: str  # dotted name in the machine file
-    value: str  # as it stands there, with its unit
+    value: str  # as in the file, with its unit
     origin: str  # "assumed", "inherited" from another machine, or "default"
-    tested_value: str  # the changed value, in words
-    figure: str  # the judged figure that it takes furthest towards its limit
-    figure_um: float  # that figure as the file has the value
-    tested_um: float  # the same with the changed value
-    limit_um: float  # what is allowed
+    tested_value: str  # the changed value, as text
+    figure: str  # the judged figure with the largest effect relative to its limit
+    figure_um: float  # that figure with the value of the file
+    tested_um: float  # that figure with the changed value
+    limit_um: float  # its limit
 
     @property
     def share(self) -> float:
-        """How far the figure goes, of its limit."""
+        """Change of the figure relative to its limit."""
         return (self.tested_um - self.figure_um) / self.limit_um if self.limit_um > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
 class _Trial:
     value: KeyValue
-    tested_value: str  # in words
+    tested_value: str  # as text
     machine: Machine
     shift: float = 0.0
     only: str | None = None
-    moves_command: bool = False  # the set-points are others too, not the table alone
+    moves_command: bool = False  # the set-points change too, not only the machine table
 
 
 StartedTrials = Mapping[tuple[str, str], "Future[CaseFigures]"]
-"""Running simulations, by the value and what it is changed to."""
+"""Running simulations, by key and tested value."""
 
 
 @dataclass(frozen=True)
 class _Region:
-    """A region, how it is simulated, and what its figures are judged by."""
+    """A region with its simulation and its limits."""
 
     place: Placed
     emitted: Program
@@ -75,7 +75,7 @@ class _Region:
     tracker: _core.ContourTracker | None
 
     def simulate(self, trial: _Trial, *, contour: bool) -> CaseFigures:
-        """The figures with a value changed; without the contour they come from the end of the region alone."""
+        """Simulate with one value changed; without *contour* only the end of the region."""
         model, path = MachineModel(trial.machine), self.place.region.path
         contour = contour and self.needs_contour(trial)
         run = model.simulate_emitted(
@@ -87,7 +87,7 @@ class _Region:
         return case_figures(run, contour=contour, response=self.judge.target == "response")
 
     def needs_contour(self, trial: _Trial) -> bool:
-        """Whether the judged deviation is another one with the value changed."""
+        """True if the changed value affects the judged deviation."""
         return trial.moves_command or self.judge.target == "response"
 
     @property
@@ -96,7 +96,7 @@ class _Region:
         return "".join(axis for axis, extent in zip("xyz", extent_mm, strict=True) if extent > 0.0)
 
     def sensitivity(self, value: KeyValue, tested: str, figures: RegionFigures, simulated: CaseFigures) -> Sensitivity:
-        """The figure that a value moves furthest towards its limit, from what it is as the region is meant to run."""
+        """The figure with the largest effect of a value relative to its limit, compared with the nominal condition."""
         limits = self.judge.limits(figures, self.place)
         own = figures.emitted[self.judge.rules.index(self.judge.own_rule)]
         before = {each.figure: each for each in judge_region(case_figures(own), limits)}
@@ -111,7 +111,7 @@ class _Region:
 def start_trials(
     judge: Judge, machine: Machine, place: Placed, emitted: Program, tracker: _core.ContourTracker, pool: Executor
 ) -> StartedTrials:
-    """Start what `parameter_sensitivity` will simulate with the contour, where only one region can decide."""
+    """Start simulations with contour for `parameter_sensitivity`, if only one region can decide."""
     region = _Region(place, emitted, judge, tracker)
     trials = filter(region.needs_contour, islice(_trials(machine, region.moving), _FULL_RUNS))
     return {_name(trial): pool.submit(region.simulate, trial, contour=True) for trial in trials}
@@ -131,7 +131,7 @@ def parameter_sensitivity(
     started: StartedTrials,
     on_step: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> tuple[tuple[Sensitivity, ...], int]:
-    """The unmeasured values that matter for a program, those first that move its verdict furthest towards a limit."""
+    """The unverified values that matter for a program, largest effect on the verdict first; and the number tested."""
     regions = [(_Region(place, emitted, judge, tracker), figures) for place, figures, tracker in simulated]
     deciding, decided = next(pair for pair in regions if pair[0].place.original_lines == deciding_lines)
     moving = deciding.moving
@@ -155,7 +155,7 @@ def parameter_sensitivity(
 
 
 def _ranked(rows: Sequence[Sensitivity]) -> tuple[Sensitivity, ...]:
-    """The worst of each key, the furthest first; an axis that may have a mode or not is always named."""
+    """The worst trial of each key, largest effect first; axes with unknown modes are always listed."""
     worst: dict[str, Sensitivity] = {}
     for row in rows:
         matters = row.share >= _LEAST_SHARE or row.key.endswith(".modes")
@@ -178,14 +178,14 @@ def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
 
 
 def _other_command(machine: Machine, unmeasured: Mapping[str, KeyValue], key: str, other_s: float) -> Iterator[_Trial]:
-    """Another time with which the set-points are others too; nothing where the file could not have it."""
+    """A trial with another time that also changes the set-points; none if it is invalid in a machine file."""
     with suppress(MachineError):
         if key in unmeasured:
             yield _Trial(unmeasured[key], f"{other_s:g} s", machine.with_values(key, other_s), moves_command=True)
 
 
 def unknown_axes(machine: Machine) -> dict[str, KeyValue]:
-    """Letters of the axes of which it is not known whether they have a mode, and their keys."""
+    """Axes of which it is unknown whether they have a mode, with their keys."""
     values = {value.key: value for value in machine.values()}
     return {
         letter: replace(values[f"axes.{letter}.modes"], origin="assumed", assumed=True)
@@ -206,7 +206,7 @@ def _axis_trials(machine: Machine) -> dict[str, _Trial]:
 
 
 def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[Sensitivity, ...]:
-    """Axes that may have a mode, by how much a usual one would vibrate behind the program: which to measure first."""
+    """Rank axes with unknown modes by the vibration of a usual mode with this program: which to measure first."""
     from shapegcode.simulation.simulate import simulate
 
     unknown = unknown_axes(machine)
@@ -222,7 +222,7 @@ def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[
 
 
 def _modes(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str, name: str) -> Iterator[tuple[str, int]]:
-    """Letter and number of every mode of which a value is unmeasured and that a moving axis excites."""
+    """Yield letter and number of every mode with this value unverified that a moving axis excites."""
     for axis, (letter, table) in enumerate(zip("xyz", machine.axes.as_tuple(), strict=True)):
         for number, mode in enumerate(table.modes, start=1):
             excited = any(share and by in moving for share, by in zip(mode.excitation(axis), "xyz", strict=True))
@@ -231,7 +231,7 @@ def _modes(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str, na
 
 
 def _frequencies(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
-    """Changed up and down; a table over a position or a mass changes as a whole."""
+    """Trials of frequencies, up and down; a table over position or mass is scaled as a whole."""
     for letter, number in _modes(machine, unmeasured, moving, "frequency_hz"):
         stem = f"axes.{letter}.modes.{number}"
         stated = getattr(machine.axes, letter).modes[number - 1].frequency_uncertainty_percent
@@ -244,7 +244,7 @@ def _frequencies(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: s
 
 
 def _shares(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
-    """Changed towards more residual vibration: less damping, more participation."""
+    """Trials with more residual vibration: less damping, more participation."""
     for name, sign in (("damping_ratio", -1.0), ("participation", 1.0)):
         for letter, number in _modes(machine, unmeasured, moving, name):
             mode, stem = getattr(machine.axes, letter).modes[number - 1], f"axes.{letter}.modes.{number}"
@@ -256,7 +256,7 @@ def _shares(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -
 
 
 def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> Iterator[Sensitivity]:
-    """What was simulated anyway and does not count: the other rule of block timing, look-ahead on, an underrun."""
+    """Yield results of operating conditions that do not count: other block timing, look-ahead on, underrun."""
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
     for case, simulated in zip(region.judge.cases, figures.cases, strict=True):
         key, tested = _key_of(case)
@@ -265,7 +265,7 @@ def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> It
 
 
 def _key_of(case: Case) -> tuple[str, str]:
-    """The value that a case is about, and what it would be; empty where it is about none."""
+    """Key and tested value of a case; empty if it belongs to none."""
     name = f"case {case.name}"
     if case.look_ahead:
         return "controller.motion", name
@@ -274,8 +274,8 @@ def _key_of(case: Case) -> tuple[str, str]:
     return ("controller.block_end", name) if case.nominal else ("", "")
 
 
-# Rounding in sums of increments stays far below this, a least increment far above.
-# A percentage of less than this compares rounding with rounding.
+# Round-off in sums of increments is far below this, a least increment far above.
+# Percentages of smaller values would compare round-off errors.
 _LEAST_COMPARED_UM = 1.0
 
 
@@ -285,31 +285,31 @@ def change_percent(original: float, emitted: float) -> float:
 
 
 def percent(change: float) -> str:
-    """A change in words."""
+    """A change in percent, as text."""
     return "0 %" if abs(change) < 0.05 else f"{change:+.1f} %"
 
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """One line of the table: a figure of both programs, or of the emitted one alone."""
+    """One line of the table: a figure of both programs, or of the emitted one only."""
 
-    figure: str  # what it is
+    figure: str  # its name
     unit: str  # its unit
-    original: float | None  # figure of the original program; None where there is none
+    original: float | None  # figure of the original program; None if there is none
     emitted: float  # figure of the emitted program
-    digits: int = 1  # behind the point
-    limit: float | None = None  # what the emitted figure is judged by; None where it is not judged
+    digits: int = 1  # decimals
+    limit: float | None = None  # limit of the emitted figure; None if not judged
 
     @property
     def change(self) -> str:
-        """From original to emitted; empty without an original, and where it is too small to compare with."""
+        """Change from original to emitted; empty without an original, or if it is too small."""
         least = _LEAST_COMPARED_UM if self.unit == "µm" else 0.5 * 10.0**-self.digits
         if self.original is None or abs(self.original) < least:
             return ""
         return percent(change_percent(self.original, self.emitted))
 
     def text(self, value: float | None) -> str:
-        """One of its figures with its digits."""
+        """Format one of its figures."""
         return "" if value is None else f"{float(value):z.{self.digits}f}"
 
 
@@ -324,7 +324,7 @@ _BEFORE_AFTER = (
 
 
 def before_after_table(groups: Sequence[Sequence[BeforeAfter]]) -> Table:
-    """Original against emitted, in groups of figures."""
+    """Figures of original and emitted program, in groups."""
     filled = [group for group in groups if group]
     sections = [sum(len(group) for group in filled[:rank]) for rank in range(1, len(filled))]
     return Table("", _BEFORE_AFTER, [row for group in filled for row in group], sections=sections)
@@ -344,7 +344,7 @@ def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
         "sensitivity to unverified parameters: assumed values, changed one at a time",
         columns,
         rows,
-        caption=f"{tried} values changed, one at a time, in the cut that comes nearest to a limit",
+        caption=f"{tried} values changed, one at a time, in the cut closest to a limit",
         row_style=lambda row: "red" if row.tested_um > row.limit_um else "",
     )
 
@@ -364,44 +364,44 @@ _TOOL_CHANGE = 6
 class CutOutcome(OldNames):
     """One cut, shaped or left unchanged."""
 
-    lines: Lines  # of the original, first and last
-    emitted_lines: Lines  # of the emitted program
-    tool: int | None  # T number that cuts; null: the program names none before it
+    lines: Lines  # first and last line of the original
+    emitted_lines: Lines  # likewise of the emitted program
+    tool: int | None  # T number that cuts; null: none programmed before
     is_shaped: bool  # False: it was left unchanged
-    reason: str  # why it was left unchanged; empty: it is shaped
-    # what shaping gains: the larger fall of residual vibration and contour error; of a cut left unchanged what it would
-    # gain, as far as that was tried
+    reason: str  # why it was left unchanged; empty if shaped
+    # gain of shaping: the larger reduction of residual vibration and contour error; for a cut left unchanged the
+    # expected gain, if it was tried
     gain_um: float
     residual_um: Pair[float]  # residual vibration of the worst axis
-    contour_um: Pair[float]  # contour error of what the tolerance is about
-    tolerance_um: float  # contour tolerance that it was shaped for; above the machine's where the price asks for it
+    contour_um: Pair[float]  # contour error of the target of the tolerance
+    tolerance_um: float  # contour tolerance for which it was shaped; above the machine's if the price requires it
     time_s: Pair[float]  # until the set-points rest
-    bytes: Pair[int]  # of its text
-    misses: tuple[str, ...]  # limits that it misses, in words
-    # what would keep the limits that a cut left unchanged misses; empty: nothing is missed, or nothing known
+    bytes: Pair[int]  # size of its text
+    misses: tuple[str, ...]  # limits that it misses, as text
+    # remedy for limits missed by a cut left unchanged; empty: none missed, or none known
     remedy: str = ""
 
     @property
     def cutting_s(self) -> float:
-        """How long it takes as programmed."""
+        """Time of the original cut, s."""
         return self.time_s.original
 
 
 def remedy_for(reason: str) -> str:
-    """What the reason of a cut left unchanged suggests."""
+    """Remedy for the reason of a cut left unchanged."""
     if "price." in reason:
         return "allow more time (--max-cut-time-increase, --max-time-increase) or a larger --contour-tolerance"
     if "--only" in reason or "--leave" in reason:
-        return "choose it too"
+        return "select it too"
     if "minimum_feed" in reason or "feed" in reason.partition(" ")[0]:
         return "a programmed feed within controller.minimum_feed_mm_per_min"
     if "max_program" in reason or "bytes" in reason or "baud" in reason:
         return "a larger size or rate limit for the program: the limits are in the reason"
-    return "a lower programmed feed there, or --shape-all to see what shaping it does"
+    return "a lower programmed feed there, or --shape-all to see the effect of shaping"
 
 
 def cut_table(cuts: Sequence[CutOutcome], *, every: bool) -> Table:
-    """The cuts: those first that miss a limit, then those with the largest gain."""
+    """Table of cuts: first those that miss a limit, then by gain."""
     ranked = sorted(cuts, key=lambda cut: (not cut.misses, -cut.gain_um))
     shown = list(cuts) if every else sorted(ranked[:_SHOWN], key=lambda cut: cut.lines)
     columns = (
@@ -431,7 +431,7 @@ def _change(pair: Pair[float] | Pair[int], digits: int = 1) -> str:
 
 
 def chosen_cuts(program: Program, only: Sequence[Lines] | None, leave: Sequence[Lines]) -> dict[int, str]:
-    """Cuts that are not to be shaped because their lines were not chosen."""
+    """Cuts that are not shaped because of --only or --leave, with the reason."""
     last = program.core.line_count
     spans = [(region.first_line, region.last_line) for region in program.regions]
     for option, ranges in (("--only", only or ()), ("--leave", leave)):
@@ -449,17 +449,17 @@ def chosen_cuts(program: Program, only: Sequence[Lines] | None, leave: Sequence[
         is_chosen = any(first <= end and begin <= to for begin, end in only or ())
         if is_left and is_chosen:
             raise _core.ArgumentError(
-                f"--only and --leave both name the cut in lines {first} to {to}: name it in one of them"
+                f"--only and --leave both contain the cut in lines {first} to {to}: list it in one of them"
             )
         if is_left:
-            found[index] = "named by --leave"
+            found[index] = "listed in --leave"
         elif only is not None and not is_chosen:
-            found[index] = "not chosen by --only"
+            found[index] = "not listed in --only"
     return found
 
 
 def tools_of_cuts(program: Program) -> Mapping[int, int]:
-    """T number in the spindle while each cut runs."""
+    """T number in the spindle by index of the cut."""
     functions = program.core.functions
     changes = any(_TOOL_CHANGE in codes for codes, _, _ in functions)  # else T alone changes the tool
     found: dict[int, int] = {}
@@ -477,27 +477,27 @@ def tools_of_cuts(program: Program) -> Mapping[int, int]:
 
 @dataclass(frozen=True)
 class RapidMove:
-    """A rapid that is a shaped cutting move now."""
+    """A rapid that was replaced by a shaped cutting move."""
 
-    lines: tuple[int, int]  # of the original, first and last
-    emitted_lines: tuple[int, int]  # of the emitted program
+    lines: tuple[int, int]  # first and last line of the original
+    emitted_lines: tuple[int, int]  # likewise of the emitted program
     time_s: Pair[float]  # until the set-points rest
-    in_position_s: Pair[float]  # wait for in-position behind them
+    in_position_s: Pair[float]  # wait for in-position after them
     settling_s: Pair[float]  # from the end of the set-points until the table stays within the band
     residual_vibration_um: Pair[Xyz[float]]  # largest |table - command| while the set-points rest
-    residual_limit_um: Xyz[float]  # what the emitted one is judged by
-    misses: tuple[str, ...]  # tolerances that it leaves; always empty: such a rapid is left unchanged
+    residual_limit_um: Xyz[float]  # limit of the emitted one
+    misses: tuple[str, ...]  # missed tolerances; always empty: such a rapid is left unchanged
 
 
 @dataclass(frozen=True)
 class RapidsOutcome(OldNames):
-    """The rapids of a program: how many are shaped moves now, why the others stay, and what that saves."""
+    """The rapids of a program: number shaped, reasons of the others, and time saved."""
 
     found: int  # rapids in the program
-    shaped: int  # of them, shaped moves now
-    left_unchanged: Mapping[str, int]  # how many stay as they are, by reason
-    time_saved_s: float  # by which the table is ready for the next cuts sooner, in all
+    shaped: int  # number replaced by shaped moves
+    left_unchanged: Mapping[str, int]  # number left unchanged, by reason
+    time_saved_s: float  # total time by which the next cuts can start sooner
     settle_band_um: float  # half the width of the band in which vibration counts as having decayed
     blocks: int  # shaped blocks that replace them
-    slowed_blocks: int  # of these, such as step an axis by more than the corner limit of the look-ahead
-    moves: tuple[RapidMove, ...]  # those that are shaped
+    slowed_blocks: int  # of these, blocks whose speed step of an axis exceeds the corner limit of the look-ahead
+    moves: tuple[RapidMove, ...]  # the replaced ones

@@ -1,7 +1,7 @@
-"""A program in FANUC's words, as the converter emits it, written in the words of another control.
+"""Translate an emitted FANUC program into the dialect of another control.
 
-Nothing is shaped here and nothing judged. A word that means another thing there, or of which it is not known what it
-means, is refused with its line; so the original is translated before it is shaped.
+Nothing is shaped or judged here. A word with another or unknown meaning in the dialect
+is refused with its line; so the original is translated before it is shaped.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from shapegcode.program.stamp import plain_comment, text_mark
 
 Converted = TypeVar("Converted", bound=Conversion)
 
-_SAME_MM = 0.0005  # largest difference of a coordinate that was written from the one that was read
+_SAME_MM = 0.0005  # largest difference between a written and the original coordinate
 _BLEND_MM = 0.001  # LinuxCNC's G64 P
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _WORD = re.compile(rf"([A-Z])\s*({_NUMBER})")
-# Most lines: a move that needs no look at its words.
+# Most lines: a move that is copied without parsing its words.
 _MOVE = re.compile(r"(N\d+)?(?:G0?([0123]))?((?:[XYZIJKRF]-?(?:\d+\.\d*|\.\d+))+)")
 _RADIUS = re.compile(r"R|(?<![\d.])\.")
 _COMMENT = re.compile(r"\(([^()]*)\)")
@@ -48,12 +48,12 @@ _MARK_LINE = re.compile(r"\(TEXT [0-9A-F]{8}\)")
 
 @dataclass(frozen=True)
 class Translation:
-    """A program in the words of another control."""
+    """A program in the dialect of another control."""
 
     text: bytes
-    lines: npt.NDArray[np.int64]  # by line of the FANUC text, from 0: its line in this one, from 1
-    blocks: int  # blocks beyond those of the FANUC text: chords of arcs
-    cautions: tuple[str, ...]  # words that mean the same only as far as the control is set up so
+    lines: npt.NDArray[np.int64]  # its line, from 1, by line of the FANUC program, from 0
+    blocks: int  # blocks added to those of the FANUC program: chords of arcs
+    cautions: tuple[str, ...]  # words whose meaning depends on the setup of the control
 
 
 def translate(
@@ -63,12 +63,12 @@ def translate(
     shaped: Sequence[tuple[_core.Path, tuple[int, int], tuple[int, int]]] = (),
     block_period_s: float = 0.0,
 ) -> Translation:
-    """Write a program in the words of `emission.dialect`.
+    """Write a program in the dialect `emission.dialect`.
 
-    `shaped`: of each shaped cut its blocks, its lines, and the lines of `original` whose place they take.
+    `shaped`: blocks and lines of each shaped cut, and the lines of `original` that it replaces.
     """
     dialect = dialect_of(machine.emission.dialect)
-    assert dialect is not None  # FANUC's words are what is read
+    assert dialect is not None  # FANUC's words are the input
     writer = _Translator(dialect, program, machine, original or program, shaped, block_period_s)
     lines = program.expanded_text.decode("latin-1").split(program.core.line_end)
     has_end = lines[-1] == ""
@@ -88,7 +88,7 @@ def translate(
 
 
 def require_dialect(program: Program, machine: Machine, budget: Budget | None) -> None:
-    """Refuse, before anything is shaped, a program or a budget that `emission.dialect` cannot be written for."""
+    """Before shaping, refuse a program or budget that cannot be written in `emission.dialect`."""
     name = machine.emission.dialect
     if (dialect := dialect_of(name)) is None:
         return
@@ -106,14 +106,14 @@ def require_dialect(program: Program, machine: Machine, budget: Budget | None) -
         reach_mm = float(np.abs(region.path.polyline(1.0)).max())
         if reach_mm >= limit_mm and not region.incremental:
             raise program.region_error(
-                region, f"it reaches {reach_mm:.3f} mm; {decimals + inch} decimals in a word of eight digits name no "
+                region, f"it reaches {reach_mm:.3f} mm; {decimals + inch} decimals in a word of eight digits allow no "
                 f"position beyond {limit_mm:g} mm: set emission.decimals to {decimals - 1} or less"
             )  # fmt: skip
     translate(program, machine)
 
 
 def with_dialect(conversion: Converted) -> Converted:
-    """The conversion with its program in the words of `emission.dialect`."""
+    """The conversion with its program in the dialect `emission.dialect`."""
     found, simulated = translated(conversion), conversion.simulated
     name = "fanuc" if simulated is None else simulated.machine.emission.dialect
     if found is None or (dialect := dialect_of(name)) is None:
@@ -136,7 +136,7 @@ def with_dialect(conversion: Converted) -> Converted:
 
 
 def translated(conversion: Conversion) -> Translation | None:
-    """The emitted program in the words of `emission.dialect`; None: these are FANUC's."""
+    """The emitted program in the dialect `emission.dialect`; None for FANUC."""
     simulated, emitted = conversion.simulated, conversion.emitted
     if simulated is None or simulated.machine.emission.dialect == "fanuc":
         return None
@@ -162,7 +162,7 @@ class _State:
     is_open: bool = False  # the first block was written
     percents: int = 0  # `%` so far
     ended_at: int = 0  # line of M02 or M30
-    feed: str = ""  # the F in force, where a rapid needs one of its own
+    feed: str = ""  # active F, if a rapid needs its own
     needs_feed: bool = False
     added: int = 0
 
@@ -185,7 +185,7 @@ class _Translator:
         self._joined_um = 0.0
         self._rapid = min(axis.rapid_mm_per_min for axis in machine.axes.as_tuple())
         core = program.core
-        self._has_percent = core.find(b"%", 1 + core.find(b"%")) > 0  # one alone is the last
+        self._has_percent = core.find(b"%", 1 + core.find(b"%")) > 0  # a single one is the last
         dwells = (each for each in core.steps if each[0] == _core.StepKind.move)
         others = core.other_moves
         self._dwells = {line: others[index][1] for _, index, line in dwells if others[index][1] > 0.0}
@@ -197,7 +197,7 @@ class _Translator:
         if foreign is not None and foreign.dialect == machine.emission.dialect:
             settings = foreign.settings
         self._names = {} if settings is None else settings.names
-        # Cuts that are left unchanged keep the path tolerance of the program.
+        # Cuts left unchanged keep the path tolerance of the program.
         self._tolerance = None if settings is None else settings.path_tolerance_mm
         self._begins = {first for _, (first, _), _ in shaped}
         self._ends = {last for _, (_, last), _ in shaped}
@@ -242,7 +242,7 @@ class _Translator:
         )
 
     def lines(self, number: int, line: str) -> list[str]:
-        """What becomes of a line; around a shaped cut its own path tolerance."""
+        """Translate a line; add the path tolerance of shaped cuts around them."""
         if self._tolerance is None or not {number} & (self._begins | self._ends):
             return self._line(number, line)
         before, behind = list[str](), list[str]()
@@ -275,7 +275,7 @@ class _Translator:
         if not body or body[0] in "%O:<":
             return self._frame(body, comments, line)
         if self._has_percent and not state.percents:
-            return []  # a leader, which no control reads
+            return []  # a leader, which controls skip
         before = [] if state.is_open else self.opening(body)
         skip = re.match(r"(?:/\d?)?", body)[0]  # type: ignore[index]
         if skip and self._dialect.one_code:
@@ -286,9 +286,9 @@ class _Translator:
         return [*before, *self._block(number, skip, _WORD.findall(body), comments)]
 
     def opening(self, first: str) -> list[str]:
-        """Lines before the first block: what the control may have otherwise when it is switched on.
+        """Lines before the first block: modes that may differ at power-on of the control.
 
-        A mode that the dialect lacks is refused, unless the first block sets another one.
+        A mode that the dialect does not have is refused, unless the first block sets another one.
         """
         self.state.is_open = True
         on, dialect = self._machine.power_on, self._dialect
@@ -314,7 +314,7 @@ class _Translator:
         if dialect.arc_radius == "CR=":
             line = _RADIUS.sub(lambda found: "CR=" if found[0] == "R" else "0.", line)
             line = re.sub(r"^(N\d+)", r"\1 ", line)
-            return [re.sub(r"(^| )G0?(\d)", r"\1G\2 ", line)]  # readers want the blank behind a code
+            return [re.sub(r"(^| )G0?(\d)", r"\1G\2 ", line)]  # the reader needs the blank after a code
         return [line]
 
     def _frame(self, body: str, comments: Sequence[str], line: str) -> list[str]:
@@ -350,7 +350,7 @@ class _Translator:
             before += [stop] if stop else []
             behind += [self._filled(again or self._dialect.becomes[self.state.path])]
         if "G43" in codes and not any(letter == "H" for letter, _ in words):
-            raise self._error(number, f"G43 without H: the offset in force is not known to {self._dialect.control}")
+            raise self._error(number, f"G43 without H: {self._dialect.control} does not know the active offset")
         if not skip and {"M02", "M30"} & {*codes}:
             self.state.ended_at = number
         named = self._named(words)
@@ -363,12 +363,12 @@ class _Translator:
                 out.append("")
                 continue
             out.append(self._word(number, letter, value, code, codes))
-        if (time := self._times.get(number)) is not None:  # in place of F, between G93 and G94
+        if (time := self._times.get(number)) is not None:  # instead of F, between G93 and G94
             out = ["G93" if word == "G94" else word for word in out if not word.startswith("F")] + [f"F{time}"]
             out[:0] = [self._dialect.lock_word] if self._machine.emission.override == "lock" else []
             before += ["G93"] * (number in self._firsts)
             behind += ["G94"] * (number in self._lasts)
-        # A reader of `G4 F1` or `D1` beside other words needs the blank.
+        # `G4 F1` or `D1` next to other words needs the blank.
         gap = " " * (self._dialect.comment == ";")
         lines = self._split(number, codes, words, out) if self._dialect.one_code else [gap.join(filter(None, out))]
         lines = [skip + line for line in (*before, *lines, *behind) if line]
@@ -379,7 +379,7 @@ class _Translator:
         return lines
 
     def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
-        """Words of the control for which the original was written, in place of their translation."""
+        """Original words of the program's own control, used instead of their translation."""
         held = dict(words)
         found = {}
         if (tool := self._names.get(f"T{held.get('T', '')}")) is not None:
@@ -392,7 +392,7 @@ class _Translator:
         return found
 
     def _hold(self, number: int, words: Sequence[tuple[str, str]], codes: Sequence[str], lines: Sequence[str]) -> None:
-        """Hold what was written against what was read: each coordinate is there, and none besides."""
+        """Check that exactly the coordinates that were read are written."""
         stated = any(_COORDINATE.search(self._own.get(code, "")) for code in codes)
         if "G04" in codes or stated or self._taken(codes) or (self._dialect.one_code and self.state.incremental):
             return
@@ -404,7 +404,7 @@ class _Translator:
             raise RoundTripError(f"line {number}: {words} became {lines} for {self._dialect.control}")
 
     def _taken(self, codes: Sequence[str]) -> bool:
-        """Whether what takes the place of a code like G28 takes that of its axes too."""
+        """True if the replacement of a code like G28 also replaces its axis words."""
         own = [self._own[code] for code in codes if code in self._own and code in _WITH_AXES]
         return any(not CODE.fullmatch(text) for text in own)
 
@@ -424,7 +424,7 @@ class _Translator:
             state.tool = state.next_tool or state.tool
 
     def _word(self, number: int, letter: str, value: str, code: str, codes: Sequence[str]) -> str:
-        """A word in the dialect; empty: it is left out."""
+        """A word in the dialect; empty if it is left out."""
         dialect = self._dialect
         if code in self._own:
             return self._own[code]
@@ -442,7 +442,7 @@ class _Translator:
             if code not in dialect.same and code not in dialect.becomes:
                 here, there = fanuc_meaning(code), dialect.means.get(code, "not known")
                 raise self._error(
-                    number, f"{code} is {here} on FANUC, and {there} on {dialect.control}: delete it, or state a "
+                    number, f"{code} is {here} on FANUC, and {there} on {dialect.control}: delete it, or set a "
                     f'replacement: emission.words = {{ "{code}" = "..." }}'
                 )  # fmt: skip
             if code in dialect.cautions and number > 0:
@@ -468,7 +468,7 @@ class _Translator:
             return letter + (self._length("Q", value, dialect) if letter == "Q" else value)
         if self.state.cycle and letter == "P":
             if "G82" not in codes:
-                raise self._error(number, f"P{value}: only in a block with G82 is it known what it means there")
+                raise self._error(number, f"P{value}: its meaning is known only in a block with G82")
             return self._seconds(number, int(value) * 1e-3, dialect.dwell.partition("G04")[2])
         why = " repeats a drilling cycle" if letter == "K" else ""
         raise self._error(number, f"{letter}{value}{why}: its meaning on {dialect.control} is not known{_CURE}")
@@ -578,7 +578,7 @@ class _Translator:
 
 
 _BEHIND_THE_MOVE = {"M00", "M01", "M02", "M05", "M09", "M30"}
-_CURE = ": delete it in the program, or state a replacement (emission.words)"
+_CURE = ": delete it in the program, or set a replacement (emission.words)"
 
 
 def _arcs(program: Program) -> Iterator[tuple[int, _core.Segment]]:
@@ -592,7 +592,7 @@ def _arcs(program: Program) -> Iterator[tuple[int, _core.Segment]]:
 
 
 def _block_times(blocks: _core.Path, period_s: float) -> Iterator[tuple[int, str]]:
-    """Time of each block by its line, whole periods: F is rounded up so that it ends just before them."""
+    """Yield line and time of each block in whole periods; with F rounded up it ends just before."""
     for number, line in enumerate(blocks.segment_lines):
         segment = blocks[number]
         periods = max(1, round(segment.length_mm / segment.feed_mm_per_s / period_s))

@@ -1,4 +1,4 @@
-"""The whole emitted text: header and guards, shaped regions in their places, everything else as it was."""
+"""The whole emitted program: header and guards, shaped regions, everything else unchanged."""
 
 from __future__ import annotations
 
@@ -36,22 +36,22 @@ from shapegcode.verdict.figures import Placed
 
 T = TypeVar("T")
 
-OnShare = Callable[[float], None]  # called with how much of a part is done, 0 to 1
+OnShare = Callable[[float], None]  # called with the finished ratio of a part, 0 to 1
 Step = Callable[[float, int], None]
-Aim = tuple[float, float]  # tolerance, µm, and share of the feed for which a region is shaped
+Aim = tuple[float, float]  # tolerance, µm, and feed ratio of a shaped region
 
-_WAITING = 2  # parts per core that are under way or done and not yet taken: what bounds the memory
-_MOST_PERIODS = 10_000_000  # of a region: what fits into half a gigabyte
+_WAITING = 2  # running or finished parts per core that were not fetched: bounds the memory
+_MOST_PERIODS = 10_000_000  # of a region: fits into half a gigabyte
 
 
 def why_kept(program: Program, region: _core.Region, machine: Machine, grid: Grid) -> str:
-    """Why a region cannot be written as shaped blocks; empty if it can."""
+    """Reason why a region cannot be written as shaped blocks; empty if it can."""
     if reason := why_off_grid(program, region, machine):
         return reason
     longest_s = _MOST_PERIODS * grid.block_period_s
     time_s = region.path.programmed_time_s
     if time_s > longest_s:
-        return f"{time_s:.0f} s of cutting without a stop are more than can be shaped in one piece ({longest_s:.0f} s)"
+        return f"{time_s:.0f} s of cutting without a stop exceed what can be shaped at a time ({longest_s:.0f} s)"
     slowest = region.path.slowest_feed_mm_per_s * 60.0
     least = machine.controller.minimum_feed_mm_per_min
     if slowest < least * (1 - 1e-9):
@@ -60,7 +60,7 @@ def why_kept(program: Program, region: _core.Region, machine: Machine, grid: Gri
 
 
 def why_off_grid(program: Program, region: _core.Region, machine: Machine) -> str:
-    """Why the end of a move cannot be written exactly enough for what follows in the other unit; empty if it can."""
+    """Reason why the end of a move cannot be written exactly enough before a change of unit; empty if it can."""
     if region.incremental:
         return ""
     units = {region.exit.units, *(each.exit.units for each in program.regions)}
@@ -70,33 +70,33 @@ def why_off_grid(program: Program, region: _core.Region, machine: Machine) -> st
     for axis, end_mm, off, extent_mm, is_known in moves:
         if is_known and extent_mm > 0.0 and off > limit_mm:
             return (
-                f"it ends at {axis} {end_mm:.5f} mm, {off * 1e3:.2f} um off what G{region.exit.units} can name; the "
-                f"program changes between G20 and G21 (limit {limit_mm * 1e3:.2f} um)"
+                f"it ends at {axis} {end_mm:.5f} mm, {off * 1e3:.2f} um off the increments of G{region.exit.units}; "
+                f"the program changes between G20 and G21 (limit {limit_mm * 1e3:.2f} um)"
             )
     return ""
 
 
 @dataclass(frozen=True)
 class Written:
-    """The emitted text before it is judged."""
+    """The emitted program before its verdict."""
 
-    parts: list[bytes]  # of the whole text; empty once it was read back
-    texts: list[tuple[RegionText, int]]  # those of its shaped regions, and the byte at which each begins
+    parts: list[bytes]  # of the whole program; empty after it was read back
+    texts: list[tuple[RegionText, int]]  # texts of its shaped regions, and their first bytes
     size: int  # bytes of the whole text
     placed: list[Placed]  # its shaped regions
     blocks: int  # shaped blocks in it
-    kept_warnings: list[str]  # a sentence for every region that is left unchanged
-    # per index of a shaped region the deviation that its feed was planned for, µm, where a target keeps the contour
+    kept_warnings: list[str]  # a sentence for every region left unchanged
+    # planned deviation by index of a shaped region, µm, if there is a contour target
     planned_um: dict[int, float]
-    loads: dict[int, TransferLoad]  # per index of a shaped region what it asks of memory, line and control
-    # per index of a region that was to be shaped and is left unchanged why there is no room for it
+    loads: dict[int, TransferLoad]  # by index of a shaped region
+    # reason by index of a region left unchanged for lack of space
     no_room: dict[int, str]
     unslowed: set[int]  # indices of shaped cuts that their contour tolerance does not slow
-    durations_s: dict[int, float]  # per index of a shaped cut the time of its blocks
+    durations_s: dict[int, float]  # time of the blocks by index of a shaped cut
     restarts: list[CutRestarts]  # of each shaped region, as in `placed`
 
     def read_back(self, machine: Machine) -> Program:
-        """Read the emitted program and compare it with the original; the given program refers to it from then on."""
+        """Read the emitted program and compare it with the original; the region texts then refer to it."""
         for text, _ in self.texts:
             text.hand_over()
         emitted = read_back(self.parts, self.placed, machine)
@@ -106,10 +106,10 @@ class Written:
 
 
 class Prefetch(Generic[T]):
-    """Runs tasks in a pool some steps before their results are asked for, in their order.
+    """Runs tasks in a pool some steps before their results are fetched, in their order.
 
-    `tasks` by number, each calls its argument with the share that is done. `on_progress` is called with the sum of the
-    weights done, those without a task included, by the thread that asks for results; it may be replaced.
+    `tasks` by number; each calls its argument with its finished ratio. `on_progress` is called with the sum of the
+    finished weights, including those without a task, by the thread that fetches results; it may be replaced.
     """
 
     def __init__(
@@ -122,13 +122,13 @@ class Prefetch(Generic[T]):
         self._pool, self._weights, self.on_progress = pool, weights, on_progress
         self._waiting = list(tasks.items())[::-1]
         self._running: dict[int, Future[T]] = {}
-        # Number of a part and its share; None: a part has ended.
+        # Number of a part and its finished ratio; None: a part has ended.
         self._news: SimpleQueue[tuple[int, float] | None] = SimpleQueue()
         self._shares = dict.fromkeys(weights, 0.0)
         self._done = 0.0
 
     def start(self) -> None:
-        """Start the first tasks before a result is asked for."""
+        """Start the first tasks before a result is fetched."""
         while self._waiting and len(self._running) < _WAITING * cores():
             number, task = self._waiting.pop()
             future = self._pool.submit(task, partial(self._put, number))
@@ -168,19 +168,19 @@ class TextWriter:
         self._regions = RegionWriter(model, grid)
         self._numbers = FreeNumbers(program)
         self._pool = pool
-        # By region: tolerance and feed for which it was shaped, and what it came to.
+        # By region: tolerance and feed for which it was shaped, and the result.
         self._shaped: dict[int, tuple[Aim, EmittedRegion]] = {}
         self._loads: dict[int, TransferLoad] = {}
         self._started: tuple[dict[int, Aim], Prefetch[EmittedRegion]] | None = None
 
     def begin(self, aims: dict[int, Aim]) -> None:
-        """Begin to shape a few long regions on cores that would wait else, before anything is known of their gain."""
+        """Start to shape a few long regions on idle cores, before their gain is known."""
         if len(aims) < cores():
             self._started = aims, self._ahead(aims, lambda _done: None)
             self._started[1].start()
 
     def options(self, index: int) -> _core.ShapingOptions:
-        """How a cut is shaped, but for its tolerance and a lowered feed."""
+        """Shaping options of a cut, without tolerance and lowered feed."""
         limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
         offset = self._model.offset(self._program.regions[index])
         return self._regions.options(limits, self._regions.tolerance(), offset)
@@ -188,7 +188,7 @@ class TextWriter:
     def write(
         self, reasons: Sequence[str], aims: Mapping[int, Aim], unreported: Collection[int], on_progress: Step
     ) -> Written:
-        """The whole text; `reasons`: why a region is left unchanged."""
+        """Write the whole program; *reasons*: why a region is left unchanged."""
         core, regions = self._program.core, self._program.regions
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)
@@ -196,7 +196,7 @@ class TextWriter:
         written = Written([], [], 0, [], 0, [], {}, {}, {}, set(), {}, [])
         blocks, size = 0, core.size
         begin = sum(map(len, parts))
-        # Moves that stay as they are: all, less those of the regions that are shaped.
+        # Unchanged moves: all except those of the shaped regions.
         shaped_moves = sum(len(regions[index].path) for index in aims)
         kept_moves = core.move_count - shaped_moves
         ahead = self._ahead(aims, lambda done: on_progress(done, shaped_moves))
@@ -238,7 +238,7 @@ class TextWriter:
         return replace(written, parts=parts, size=sum(map(len, parts)), blocks=blocks)
 
     def _numbered(self, shaped: EmittedRegion, before: Sequence[CutRestarts]) -> CutRestarts:
-        """The restart points of a region, with N words that the program does not use elsewhere."""
+        """The restart points of a region, with unused N words."""
         marks = shaped.restarts.marks
         if not marks:
             return shaped.restarts
@@ -253,14 +253,14 @@ class TextWriter:
         return Room(controller.max_program_bytes - size, controller.max_program_moves - moves, self._machine)
 
     def _ahead(self, aims: Mapping[int, Aim], on_moves: Callable[[float], None]) -> Prefetch[EmittedRegion]:
-        """Regions being shaped in the pool; one with the same tolerance and feed as before is not shaped again."""
+        """Shape regions in the pool, except those with unchanged tolerance and feed."""
         if self._started is not None and aims.items() <= self._started[0].items():
             prefetch = self._started[1]
             prefetch.on_progress = on_moves
             self._started = None
             return prefetch
         regions = self._program.regions
-        # None may have more than the whole program; beside the others it may turn out to be too much nevertheless.
+        # Each is limited to the size of the whole program; together they may still exceed it.
         room = self._room(0, 0)
         tasks = {
             index: partial(self._shaped_anew, regions[index], *aim, room)
@@ -278,7 +278,7 @@ class TextWriter:
             shaped = ahead.result(index)
             bits = self._machine.controller.dnc_bits_per_character
             self._loads[index] = measure_load(self._program.regions[index], shaped, self.grid, bits)
-            shaped.block_periods.clear()  # nobody else asks for them
+            shaped.block_periods.clear()  # not used again
             shaped.block_bytes.clear()
             self._shaped[index] = aim, shaped
         else:
@@ -337,8 +337,8 @@ _STATE_FIELDS = (
 
 
 def read_back(parts: list[bytes], placed: Sequence[Placed], machine: Machine) -> Program:
-    """Read the emitted text and hold it against the original: end points, modal state at every border, sweeps."""
-    # Half an increment: a program may carry more digits than the controller resolves.
+    """Read the emitted program and compare it with the original: end points, modal states between regions, sweeps."""
+    # Half an increment: a program may have more digits than the controller resolves.
     tolerance_mm = {units: 0.5 * written_increment_mm(machine, units) + 1e-9 for units in (20, 21)}
     probes = [line for place in placed for line in (place.first_line - 1, place.last_line)]
     emitted = Program.from_parts(parts, machine, source="emitted program", probe_lines=probes)

@@ -32,7 +32,7 @@ from shapegcode.shaping.grid import Grid
 
 
 class RegionText:
-    """The lines of a region, which stand in memory once: as they were written, then in the program made of them."""
+    """The lines of a region, held in memory once: as written, later as part of the program."""
 
     def __init__(self, parts: Sequence[bytes]) -> None:
         self._parts: Sequence[bytes] | None = parts
@@ -41,7 +41,7 @@ class RegionText:
         self.size = sum(map(len, parts))  # bytes
 
     def parts(self) -> Sequence[bytes]:
-        """The text, in as many parts as it has."""
+        """The text in its parts."""
         if self._inside is not None:
             program, begin = self._inside
             return [program.text_slice(begin, begin + self.size)]
@@ -63,11 +63,11 @@ class RegionText:
         self._parts, self._inside, self._numbers = [bytes(part) for part in parts], None, numbers
 
     def hand_over(self) -> None:
-        """Somebody else has the parts now."""
+        """Release the parts, which are now held elsewhere."""
         self._parts = self._inside = None
 
     def stands_in(self, program: Program, begin: int) -> None:
-        """Whether the text is part of a program's text."""
+        """Take the text from a program's text, from byte *begin* on."""
         self._parts, self._inside = None, (program, begin)
 
 
@@ -76,23 +76,23 @@ class EmittedRegion:
     """The text that replaces a region."""
 
     text: RegionText  # whole lines
-    blocks: int  # shaped blocks in it, without the lines around them
-    # whole block periods that each of them lasts, of each part that holds blocks
+    blocks: int  # number of shaped blocks, without the lines around them
+    # block periods of each block, by part with blocks
     block_periods: list[npt.NDArray[np.uint32]]
-    block_bytes: list[npt.NDArray[np.uint32]]  # likewise the characters of each of them
-    planned_um: float  # deviation of what shall follow the path for which the feed was planned, µm; 0 without a target
-    restarts: CutRestarts  # blocks of it at which the control can begin
+    block_bytes: list[npt.NDArray[np.uint32]]  # likewise the characters of each block
+    planned_um: float  # deviation for which the feed was planned, µm; 0 without a target
+    restarts: CutRestarts  # blocks at which the control can restart
     is_slowed: bool = True  # it is slower than without a contour tolerance
-    duration_s: float = 0.0  # of its blocks
+    duration_s: float = 0.0  # time of its blocks
 
 
 @dataclass(frozen=True)
 class TransferLoad:
     """Memory, data rate and block rate that a shaped region needs."""
 
-    extra_bytes: int  # size of its text less that of the original's
-    baud: float  # what its section with the most blocks per second needs of the line, bit/s
-    blocks_per_second: float  # blocks in its busiest stretch
+    extra_bytes: int  # size of its text minus that of the original
+    baud: float  # required line speed in its section with the most blocks per second, bit/s
+    blocks_per_second: float  # in its busiest section
 
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
@@ -110,24 +110,24 @@ def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_p
 
 
 def keepable(region: _core.Region, machine: Machine) -> bool:
-    """Whether a region may be left unchanged in an emitted program: not with absolute arc centres."""
+    """True if a region may be left unchanged in an emitted program: not with absolute arc centres."""
     return machine.input.arc_centre != "absolute" or region.path.largest_sweep_rad <= 0.0
 
 
 class NoRoomError(Exception):
-    """The shaped text of a region is more than the written program may have."""
+    """The shaped text of a region exceeds the permitted size of the program."""
 
 
 @dataclass(frozen=True)
 class Room:
-    """What the text of a region may have at most."""
+    """Limits of the text of a region."""
 
-    bytes: int  # of text
-    blocks: int  # shaped ones
-    machine: Machine  # whose keys say so
+    bytes: int  # bytes of text
+    blocks: int  # shaped blocks
+    machine: Machine  # with the limits
 
     def require(self, text_bytes: int, blocks: int) -> None:
-        """Refuse what is more; called piece by piece, so that no more than a piece is written in vain."""
+        """Raise NoRoomError beyond the limits; called for each piece, so that at most one is written in vain."""
         controller = self.machine.controller
         if text_bytes > self.bytes:
             limit = f"{controller.max_program_bytes} bytes (controller.max_program_bytes)"
@@ -140,11 +140,11 @@ class Room:
 
 _DEGREE = math.pi / 180.0
 _PLUNGE_CORNER_DEG = 45.0
-_PIECE_PERIODS = 1 << 17  # of a region in one go: what bounds the memory
-_CORNER_SHARE = 0.75  # several corners of a polyline may fall into one shaper, and then their deviations add up
+_PIECE_PERIODS = 1 << 17  # of a region at a time: bounds the memory
+_CORNER_SHARE = 0.75  # deviations of several corners within one shaper duration add up
 
 
-_FADED = 1.0 / 3.0  # of the time after which a vibration is a millionth: it is a hundredth
+_FADED = 1.0 / 3.0  # of the decay time to a millionth: decay to a hundredth
 
 _TARGETS = {
     "response": _core.ContourTarget.response,
@@ -154,7 +154,7 @@ _TARGETS = {
 
 
 def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
-    """What keeps the shaped command within a tolerance at corners and on arcs."""
+    """Data that keep the shaped command within a tolerance at corners and on arcs."""
     tolerance = _core.FilterTolerance()
     tolerance.variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own.variance_s2
     tolerance.mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own.mean_deviation_s
@@ -164,17 +164,17 @@ def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = m
 
 
 class _WithdrawnError(Exception):
-    """What was written of a region is void: its feed does not keep the tolerance."""
+    """The written part of a region is invalid: its feed does not keep the tolerance."""
 
 
 class _Marks:
     def __init__(self, program: Program, notes: Sequence[_core.RegionNote]) -> None:
         self._program, self._notes, self._next = program, notes, 0
         self.first_word = ""
-        """N word at the region's begin, as it was written, which belongs before its prologue; empty: none."""
+        """N word at the start of the region, as written, to put before its prologue; empty: none."""
 
     def within(self, piece: _core.ShapedCommand, *, last: bool) -> tuple[list[_core.BlockMark], list[int]]:
-        """Marks of a piece and the periods at which its blocks must end for them, both counted from its begin."""
+        """Marks of a piece and the periods at which its blocks must end for them, counted from its start."""
         first = piece.first_period
         end = first + len(piece.middle_mm)
         reached = piece.segment_periods
@@ -194,7 +194,7 @@ class _Marks:
 
 
 def _block_bytes(texts: Sequence[bytes], blocks: Iterable[int]) -> list[npt.NDArray[np.uint32]]:
-    """Characters of each block with its line end and the comment lines before it; of the last with those behind it."""
+    """Characters of each block with line end and preceding comment lines; the last one also with following ones."""
     sizes, behind = [], 0
     for text, count in zip(texts, blocks, strict=True):
         ends = block_lines(text, count)[1]
@@ -224,7 +224,7 @@ class RegionWriter:
     def options(
         self, limits: _core.MotionLimits, tolerance: _core.FilterTolerance, offset: Offset = NO_OFFSET
     ) -> _core.ShapingOptions:
-        """How a region is shaped: what the core needs."""
+        """Shaping options of a region for the core."""
         grid, plant = self._grid, self._model.options(offset=offset)
         options = _core.ShapingOptions()
         options.limits = limits
@@ -258,7 +258,7 @@ class RegionWriter:
     ) -> EmittedRegion:
         """Shape one region and write it, from a full safe line to the modal state of the original."""
         options = self.options(limits, tolerance, self._model.offset(region))
-        # Periods without the stops for restart points, and how many stops there are.
+        # Periods without the stops for restart points, and the number of stops.
         stopped = self._stop_for_restarts(region, options) if self._machine.emission.restart_stops else (0, 0)
         marked = [note.segment for note in region.notes]
         shaper = _core.RegionShaper(region.path, self._grid.fir, marked, options)
@@ -272,11 +272,11 @@ class RegionWriter:
     def _places(self, region: _core.Region) -> RestartPlaces:
         places = RestartPlaces(region, self._machine, self._grid.block_period_s)
         if self._mark != REGION_MARK:
-            places.reason = "it takes the place of a rapid"
+            places.reason = "it replaces a rapid"
         return places
 
     def _stop_for_restarts(self, region: _core.Region, options: _core.ShapingOptions) -> tuple[int, int]:
-        """Let the command come to rest where it is nowhere near that for too long; gives its periods without that."""
+        """Add stops for restart points where needed; return the periods without them, and the number of stops."""
         places = self._places(region)
         segments = range(1, len(region.path))
         shaper = _core.RegionShaper(region.path, self._grid.fir, segments, options)
@@ -383,7 +383,7 @@ class RegionWriter:
         return writer
 
     def _units(self, region: _core.Region) -> tuple[float, int]:
-        """Millimetres of the program's unit, and digits behind the point of F."""
+        """Millimetres per unit of the program, and decimals of F."""
         inch = region.exit.units == 20
         controller, own = self._machine.controller, dialect_of(self._machine.emission.dialect)
         decimals = controller.feed_decimals_inch if inch else controller.feed_decimals_mm
@@ -404,7 +404,7 @@ class RegionWriter:
 
 
 def _pieces(shaper: _core.RegionShaper) -> Generator[tuple[_core.ShapedCommand, float, bool]]:
-    """The pieces of a region, its share, and whether one is the last; a thread shapes the next while one is written."""
+    """Yield pieces of a region, finished ratio, and whether it is the last; a thread shapes the next one meanwhile."""
 
     def shaped() -> tuple[_core.ShapedCommand | None, float]:
         piece = shaper.next(_PIECE_PERIODS)
@@ -427,7 +427,7 @@ def _pieces(shaper: _core.RegionShaper) -> Generator[tuple[_core.ShapedCommand, 
 
 
 def _own(emission: Emission, kind: str) -> tuple[str, ...]:
-    """Lines of the machine file around a cut; in another dialect a mark of their place, which `translate` fills."""
+    """Lines of the machine file around a cut; in another dialect a placeholder for `translate`."""
     lines = emission.around_cuts[kind]
     return lines if emission.dialect == "fanuc" or not lines else (f"(EMISSION {kind})",)
 
@@ -437,7 +437,7 @@ def _lines(lines: Sequence[str], writer: _core.WriterOptions) -> bytes:
 
 
 def feed_word(feed: float) -> str:
-    """F with a point, and with a digit behind it below 10, so that it is never a one-digit feed code."""
+    """F with a point, below 10 with a decimal, so that it is never a one-digit feed code."""
     whole = len(str(int(feed))) if feed >= 1.0 else 0
     text = decimal(feed, max(0, 8 - whole))  # a word has eight digits
     return f"F{text}0" if feed < 10.0 and text.endswith(".") else f"F{text}"
@@ -459,7 +459,7 @@ def _safe_line(
             for letter, value, is_known, rests in zip("XYZ", start, entry.known, resting, strict=True)
             if is_known and not rests
         ]
-    # In G93 the modal F is no speed; a feed over the axes' limit is none that the machine runs.
+    # In G93 the modal F is not a speed; a feed above the axes' limit is never reached.
     unit = MM_PER_INCH if entry.units == 20 else 1.0
     words.append(feed_word(max(1e-8, min(region.path[0].feed_mm_per_s * 60.0, fastest_mm_per_min) / unit)))
     return "".join(words)

@@ -1,4 +1,4 @@
-"""What a machine tool is: the machine file, and the import of a FANUC control's parameters."""
+"""Description of a machine tool: the machine file, and the import of a FANUC control's parameters."""
 
 from shapegcode.machine.axes import Axes, Axis, AxisMode, check_axes
 from shapegcode.machine.machine import Machine, inherited_text

@@ -23,61 +23,62 @@ class Drive(TomlTable):
     """Feed drive of an axis, for the simulation with friction."""
 
     motor_inertia_kg_m2: Positive = key(
-        "moment of inertia that turns with the motor: rotor, brake, coupling and ball screw", unit="kg m²"
+        "moment of inertia on the motor shaft: rotor, brake, coupling and ball screw", unit="kg m²"
     )
     screw_lead_mm: Positive = key(
-        "travel for one turn of the motor: lead of the ball screw, times the gear ratio where there is one"
+        "travel per revolution of the motor: lead of the ball screw, times the gear ratio if there is one"
     )
     table_mass_kg: Positive = key("moving mass: table or slide with its load")
     stiffness_n_per_um: Positive = key(
         "axial stiffness from motor to table: screw, nut, bearings and coupling in series"
     )
-    damping_ratio: _Ratio = key("damping ratio of motor against table on that stiffness", assumed=0.05)
+    damping_ratio: _Ratio = key("damping ratio of motor and table on that stiffness", assumed=0.05)
     backlash_um: NonNegative = key(
         "free travel between motor and table (a ball bar shows it together with the elastic windup of the screw); 0: "
         "none",
         assumed=0.0,
     )
     position_feedback: Literal["motor", "table"] = key(
-        'what the position loop measures. "motor": the encoder of the motor (semi-closed); "table": a linear scale '
+        'feedback of the position loop. "motor": the encoder of the motor (semi-closed); "table": a linear scale '
         "(fully closed). Its gain is controller.position_gain_per_s, its feed-forward controller.feed_forward_ratio",
         fanuc="1815#1",
         assumed="motor",
     )
     velocity_bandwidth_hz: Positive = key(
-        "bandwidth of the speed loop with all inertia as one mass; it states its gain", fanuc="2021, 2044"
+        "bandwidth of the velocity loop with motor and load as one inertia; it determines the proportional gain",
+        fanuc="2021, 2044",
     )
     velocity_integral_time_s: NonNegative = key(
-        "integral time of the speed loop; 0: no integral part", fanuc="2043", assumed=0.02
+        "integral time of the velocity loop; 0: no integral part", fanuc="2043", assumed=0.02
     )
     acceleration_feed_forward_ratio: Annotated[NonNegative, Field(le=1)] = key(
-        "share of the torque for the set-points' acceleration that is fed forward; 0: none", fanuc="2069", assumed=0.0
+        "ratio of the acceleration torque that is fed forward; 0: none", fanuc="2069", assumed=0.0
     )
     torque_limit_n_m: Positive | None = optional(
         "largest torque of the motor; left out: not limited", unit="N m", fanuc="2060"
     )
     friction_model: Literal["viscous", "stribeck", "lugre"] = key(
-        'friction of the table. "viscous": in proportion to the speed alone; "stribeck": Coulomb, static and Stribeck '
-        'as a curve over the speed; "lugre": the same with presliding, as a table shows it at reversals',
+        'friction of the table. "viscous": proportional to speed only; "stribeck": Coulomb, static and Stribeck '
+        'as a curve over the speed; "lugre": the same with presliding, as at reversals',
         assumed="viscous",
     )
     friction_viscous_n_s_per_m: NonNegative = key("viscous friction of the guideways", unit="N s/m", assumed=0.0)
     friction_coulomb_n: Positive | None = optional("sliding friction of the guideways; stribeck and lugre need it")
     friction_static_n: Positive | None = optional(
-        "friction of the guideways to be overcome from rest, not below the sliding one; stribeck and lugre need it"
+        "static friction of the guideways, not below the sliding one; stribeck and lugre need it"
     )
     friction_stribeck_velocity_mm_per_s: Positive = key(
         "speed at which the friction has fallen from static to sliding", assumed=5.0
     )
     friction_smoothing_velocity_mm_per_s: Positive = key(
-        "speed within which the friction changes its sign (stribeck alone)", assumed=0.1
+        "speed within which the friction changes its sign (stribeck only)", assumed=0.1
     )
     friction_bristle_stiffness_n_per_um: Positive = key(
-        "force over displacement before the table slides (lugre alone); static friction over it is the distance",
+        "force over displacement before the table slides (lugre only); static friction over it is the distance",
         assumed=30.0,
     )
     friction_bristle_damping_n_s_per_m: NonNegative = key(
-        "damping before the table slides (lugre alone)", unit="N s/m", assumed=30_000.0
+        "damping before the table slides (lugre only)", unit="N s/m", assumed=30_000.0
     )
     motor_friction_viscous_n_m_s_per_rad: NonNegative = key(
         "viscous friction of motor, bearings and nut", unit="N m s/rad", assumed=0.0
@@ -99,9 +100,9 @@ class Drive(TomlTable):
 
 
 class FrequencyOver(InlineTable):
-    """How the frequency of a mode depends on where an axis stands or on what the part weighs."""
+    """Frequency of a mode over an axis position or the mass of the part."""
 
-    axis: Literal["x", "y", "z"] | None = optional("axis whose position counts")
+    axis: Literal["x", "y", "z"] | None = optional("axis on whose position it depends")
     position_mm: tuple[Float, ...] | None = optional("positions of the axis, ascending, in the machine's coordinates")
     mass_kg: tuple[NonNegative, ...] | None = optional("masses of the part, ascending")
     frequency_hz: tuple[_Hertz, ...] = key("natural frequencies, one per row")
@@ -144,11 +145,11 @@ Share = Annotated[Float, Field(ge=-1000, le=1000)]
 
 
 class Direction(InlineTable):
-    """Shares of X, Y and Z; one that is left out is 0."""
+    """Components along X, Y and Z; default 0."""
 
-    x: Share = key("share of the X axis", unit="1", default=0.0)
-    y: Share = key("share of the Y axis", unit="1", default=0.0)
-    z: Share = key("share of the Z axis", unit="1", default=0.0)
+    x: Share = key("component along the X axis", unit="1", default=0.0)
+    y: Share = key("component along the Y axis", unit="1", default=0.0)
+    z: Share = key("component along the Z axis", unit="1", default=0.0)
 
     @model_validator(mode="after")
     def _points_somewhere(self) -> Direction:
@@ -157,7 +158,7 @@ class Direction(InlineTable):
         return self
 
     def as_tuple(self) -> tuple[float, float, float]:
-        """The three shares in the order X, Y, Z."""
+        """The components in the order X, Y, Z."""
         return (self.x, self.y, self.z)
 
 
@@ -167,7 +168,7 @@ class AxisMode(TomlTable):
     frequency_hz: _Hertz = key("natural frequency; from a tap test, or from the decay after a rapid stop")
     damping_ratio: _Ratio = key("damping ratio (1 = critically damped)")
     participation: Annotated[Positive, Field(le=1000)] = key(
-        "share of this mode in the axis's deflection; several modes of one axis need not add up to 1",
+        "participation factor of this mode in the axis' deflection; those of one axis need not add up to 1",
         unit="1",
         default=1.0,
     )
@@ -176,36 +177,36 @@ class AxisMode(TomlTable):
         "axis alone, { y = 1 } under axes.y. A mode that several axes excite is listed under one of them only"
     )
     moves: Direction | None = optional(
-        "what this mode moves at the tool against the part, as shares of its deflection: { y = 1, z = 0.3 } rocks the "
-        "tool by 0.3 mm in Z for every mm in Y; left out: its axis alone. participation counts for all of it"
+        "mode shape at the tool relative to the part: { y = 1, z = 0.3 } moves the tool by 0.3 mm in Z per mm in Y; "
+        "left out: its axis alone. participation scales all components"
     )
     frequency_uncertainty_percent: _Percent | None = optional(
         "uncertainty of the frequency, up and down (position of the table, mass of the workpiece); left out: not "
         "known. With no value, or up to 0.2 %, the shaper is designed for the nominal frequency only"
     )
     damping_uncertainty_percent: _Percent | None = optional(
-        "uncertainty of the damping ratio, up and down, relative; left out: not known, and the ratio is taken as exact"
+        "uncertainty of the damping ratio, up and down, relative; left out: the ratio is taken as exact"
     )
     mass_kg: Positive | None = optional(
-        "equivalent mass of this mode at the point that was tapped; its stiffness there is mass_kg * (2 pi "
+        "equivalent mass of this mode at the tapped point; its stiffness there is mass_kg * (2 pi "
         "frequency_hz)^2. Shapers do not need it; left out: not measured"
     )
     mass_uncertainty_percent: NonNegative | None = optional("uncertainty of the mass, up and down")
-    source: Text | None = optional("where the values of this mode come from")
+    source: Text | None = optional("origin of the values of this mode")
     frequency_over: FrequencyOver | None = optional(
         'table of the frequency over the position of an axis, { axis = "z", position_mm = [0, 200, 400], '
         "frequency_hz = [52, 46, 41] }, or over the mass of the part, { mass_kg = [0, 300], frequency_hz = [46, 38] }; "
-        "damping_ratio = [...] may follow. Linear between the rows, constant beyond them; positions are the machine's: "
-        "program plus work offset and tool length. frequency_hz above stays the nominal value and lies within the "
-        "table"
+        "damping_ratio = [...] is optional. Linear between the rows, constant beyond them; positions are the "
+        "machine's: program plus work offset and tool length. frequency_hz above stays the nominal value and lies "
+        "within the table"
     )
 
     def excitation(self, axis: int) -> tuple[float, float, float]:
-        """Shares of the accelerations of X, Y, Z that excite a mode of an axis (0, 1, 2)."""
+        """Ratios of the accelerations of X, Y, Z that excite a mode of an axis (0, 1, 2)."""
         return _along(axis) if self.excited_by is None else self.excited_by.as_tuple()
 
     def motion(self, axis: int) -> tuple[float, float, float]:
-        """What a mode of an axis (0, 1, 2) moves of X, Y, Z, as shares of its deflection; without participation."""
+        """Mode shape of a mode of an axis (0, 1, 2) in X, Y, Z, without participation."""
         return _along(axis) if self.moves is None else self.moves.as_tuple()
 
     @model_validator(mode="after")
@@ -239,10 +240,10 @@ class Axis(TomlTable):
         "largest jerk while cutting; left out: not limited"
     )
     modes: Annotated[tuple[AxisMode, ...], Field(max_length=_MAX_MODES)] = key(
-        "vibration modes, one table each; none: the axis is taken as rigid", default=()
+        "vibration modes, one table each; none: the axis is simulated as rigid", default=()
     )
     rigid: Bool = key(
-        "this axis has no significant vibration mode: none was found in a test, or so decided. false, and no modes: "
+        "this axis has no significant vibration mode: by test or decision. false, and no modes: "
         "not known; the axis is simulated as rigid, and every verdict says so",
         default=False,
     )
@@ -253,7 +254,7 @@ class Axis(TomlTable):
     @model_validator(mode="after")
     def _rigid_or_not(self) -> Axis:
         if self.rigid and self.modes:
-            raise ValueError("rigid is true, and there are modes: take out one of both")
+            raise ValueError("rigid is true, but there are modes: delete one of them")
         return self
 
 
@@ -270,9 +271,9 @@ class Axes(TomlTable):
 
 
 def check_axes(keep: str, rigid: str) -> None:
-    """Whether axes are named as they can be."""
+    """Refuse names that are not axes, and axes that are both kept and rigid."""
     wrong = sorted({*keep, *rigid} - set("xyz"))
     if wrong:
         raise ArgumentError(f"{', '.join(wrong)}: axes are x, y and z")
     if both := sorted({*keep} & {*rigid}):
-        raise ArgumentError(f"{', '.join(both).upper()}: its modes cannot be kept and it be rigid")
+        raise ArgumentError(f"{', '.join(both).upper()}: its modes cannot be kept if it is rigid")

@@ -1,4 +1,4 @@
-"""The controller of a machine file: how it moves the axes, what else takes time, its state at power-on; the settings of
+"""The controller of a machine file: how it moves the axes, additional times, its state at power-on; the settings of
 other controls' planners, by the names of their own configuration files.
 """
 
@@ -28,7 +28,7 @@ from shapegcode.settings.keys import (
 
 ControllerKind = Literal["fanuc", "linuxcnc", "klipper", "grbl"]
 PLANNER_NAMES = {"fanuc": "FANUC", "linuxcnc": "LinuxCNC", "klipper": "Klipper", "grbl": "GRBL"}
-"""Kinds of controls for people."""
+"""Names of the kinds of controls."""
 
 
 _NO_MEMORY_LIMIT = 4 * 10**9  # bytes
@@ -40,31 +40,31 @@ _Decimals = Annotated[int, Strict(), Field(ge=0, le=6)]
 
 
 class LinuxcncPlanner(TomlTable):
-    """What the INI file and the program say of the motion; its period is interpolation_period_s."""
+    """Motion settings of INI file and program; the servo period is interpolation_period_s."""
 
     blend_tolerance_mm: Annotated[NonNegative, Field(le=100)] = key(
-        "G64 P of the program (those written here have P0.001): how far a blend may leave a corner; 0: G64 without P",
+        "G64 P of the program (emitted: P0.001): largest distance of a blend from a corner; 0: G64 without P",
         assumed=0.001,
     )
     naive_cam_tolerance_mm: Annotated[NonNegative, Field(le=100)] = key(
-        "G64 Q of the program (those written here have Q0), without it as P: lines of one feed within it become one, "
-        "and an arc in XY within it two lines; 0: not",
+        "G64 Q of the program (emitted programs have Q0), without it as P: lines of one feed within it become one, "
+        "and an arc in XY within it two lines; 0: off",
         assumed=0.0,
     )
     ramp_frequency_hz: Annotated[Positive, Field(ge=0.001, le=1e6)] = key(
-        "[TRAJ] ARC_BLEND_RAMP_FREQ: in a segment that takes less than its inverse the speed is a linear ramp",
+        "[TRAJ] ARC_BLEND_RAMP_FREQ: in a segment shorter than its inverse the speed is a linear ramp",
         assumed=100.0,
     )
     kink_ratio: Annotated[Positive, Field(ge=0.001, le=1)] = key(
-        "[TRAJ] ARC_BLEND_KINK_RATIO: share of the acceleration that the change of direction between two segments may "
-        "take, within one period; above it slows. It acts up to 0.7071",
+        "[TRAJ] ARC_BLEND_KINK_RATIO: ratio of the acceleration that the change of direction between two segments may "
+        "use within one period; above it the speed is reduced. Effective up to 0.7071",
         assumed=0.1,
     )
     max_feed_override: Annotated[Positive, Field(ge=0.01, le=100)] = key(
-        "[DISPLAY] MAX_FEED_OVERRIDE: corners are planned for it", unit="1", assumed=1.0
+        "[DISPLAY] MAX_FEED_OVERRIDE: override for which corners are planned", unit="1", assumed=1.0
     )
     optimization_depth: Annotated[int, Strict(), Field(ge=2, le=4096)] = key(
-        "[TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH: segments that it looks ahead", unit="segments", assumed=50
+        "[TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH: segments of the look-ahead", unit="segments", assumed=50
     )
     rapid_follows: Bool = key(
         "a rapid follows each cut; false: a dwell, an M function or the end of the program follows, and the last move "
@@ -74,42 +74,42 @@ class LinuxcncPlanner(TomlTable):
 
 
 class KlipperPlanner(TomlTable):
-    """What printer.cfg says of the motion; max_velocity and max_accel are the smaller of X and Y."""
+    """Motion settings of printer.cfg; max_velocity and max_accel are the smaller of X and Y."""
 
     square_corner_velocity_mm_per_s: Annotated[NonNegative, Field(le=1000)] = key(
         "[printer] square_corner_velocity: speed at a corner of 90 degrees", assumed=5.0
     )
     minimum_cruise_ratio: Annotated[NonNegative, Field(lt=1)] = key(
-        "[printer] minimum_cruise_ratio: share of a move that is no change of speed; with max_accel_to_decel in its "
+        "[printer] minimum_cruise_ratio: ratio of a move at constant speed; with max_accel_to_decel in its "
         "place 1 - max_accel_to_decel / max_accel",
         assumed=0.5,
     )
     arc_resolution_mm: Annotated[Positive, Field(ge=0.001, le=100)] = key(
-        "[gcode_arcs] resolution: length of the lines that an arc of the original becomes; in what is emitted with "
-        'emission.dialect = "klipper" arcs are chords already, and are simulated as these',
+        "[gcode_arcs] resolution: length of the lines that replace arcs of the original; in programs emitted with "
+        'emission.dialect = "klipper" arcs are chords already, and are simulated as such',
         assumed=1.0,
     )
 
 
 class GrblPlanner(TomlTable):
-    """What `$$` says of the motion, and what was compiled in."""
+    """Motion settings of `$$`, and compiled-in settings."""
 
     junction_deviation_mm: Annotated[Positive, Field(ge=1e-6, le=10)] = key(
-        "$11: a corner is passed as an arc that cuts it by so much, at the acceleration of the axes", assumed=0.01
+        "$11: a corner is passed as an arc with this distance to it, at the acceleration of the axes", assumed=0.01
     )
     arc_tolerance_mm: Annotated[Positive, Field(ge=1e-5, le=10)] = key(
-        "$12: distance of the lines that an arc becomes from it", assumed=0.002
+        "$12: distance between an arc and the lines that replace it", assumed=0.002
     )
     look_ahead_blocks: Annotated[int, Strict(), Field(ge=2, le=4096)] = key(
-        "blocks that its planner holds (BLOCK_BUFFER_SIZE less 1); it can always stop at the end of the last one, and "
-        "short blocks slow it by that",
+        "blocks in the planner (BLOCK_BUFFER_SIZE minus 1); it can always stop at the end of the last one, which "
+        "slows short blocks",
         unit="blocks",
         assumed=15,
     )
 
 
 class Controller(TomlTable):
-    """How the controller turns blocks into set-points, and what it accepts."""
+    """How the controller turns blocks into set-points, and its limits."""
 
     kind: ControllerKind = key(
         'control whose planner executes programs. "fanuc": by the keys below. "linuxcnc", "klipper", "grbl": by the '
@@ -119,7 +119,7 @@ class Controller(TomlTable):
         default="fanuc",
     )
     dialect: Literal["auto", "fanuc", "linuxcnc", "haas", "siemens"] = key(
-        'dialect in which programs are read. "auto": recognized by words that only one control has, and a warning '
+        'dialect in which programs are read. "auto": recognized by words that only one control has; a warning '
         "names the word; without such a "
         "word LinuxCNC's with kind = \"linuxcnc\", else FANUC's. A program with words of another control is refused",
         default="auto",
@@ -134,7 +134,7 @@ class Controller(TomlTable):
         "shortest time in which the control can execute a block; emitted blocks are not shorter", assumed=0.005
     )
     block_end: Literal["ceil", "carry"] = key(
-        '"ceil": each block starts with an interpolation period; "carry": the remainder of a period is '
+        '"ceil": each block starts at an interpolation period; "carry": the remainder of a period is '
         "carried into the next block. The verdict covers both",
         assumed="ceil",
     )
@@ -145,7 +145,7 @@ class Controller(TomlTable):
         assumed="look_ahead",
     )
     law: Literal["constant_time", "jerk_limited"] = key(
-        'speed change before interpolation. "constant_time": it lasts time_constant_s whatever the step; '
+        'speed change before interpolation. "constant_time": it lasts time_constant_s for any step; '
         '"jerk_limited": by the acceleration and jerk of the axes',
         assumed="constant_time",
     )
@@ -156,7 +156,7 @@ class Controller(TomlTable):
         assumed=0.05,
     )
     bell_time_s: _Time = key(
-        "time over which the acceleration itself is built up; length of the second moving average; 0: none",
+        "time constant of bell-shaped acc./dec.; length of the second moving average; 0: none",
         fanuc="1772",
         assumed=0.0,
     )
@@ -170,10 +170,10 @@ class Controller(TomlTable):
         "length of the moving average after interpolation in look-ahead mode; 0: none", fanuc="1769", assumed=0.0
     )
     corner_rule: Literal["speed_difference", "junction_deviation", "stops"] = key(
-        'what look-ahead does at corners. "speed_difference": no axis changes its speed by more than '
-        'corner_speed_difference_mm_per_min (FANUC); "junction_deviation": it passes as an arc within '
+        'corner rule of look-ahead. "speed_difference": no axis changes its speed by more than '
+        'corner_speed_difference_mm_per_min (FANUC); "junction_deviation": it is passed as an arc within '
         'junction_deviation_mm (GRBL and others); "stops": it stops where the direction turns by '
-        "corner_stop_angle_deg. Programs are written for a FANUC control with every value",
+        "corner_stop_angle_deg. The emitted dialect is emission.dialect, whatever the value",
         fanuc="1783",
         default="speed_difference",
     )
@@ -183,20 +183,20 @@ class Controller(TomlTable):
         assumed=500.0,
     )
     centripetal_acceleration_mm_s2: Positive = key(
-        "largest acceleration across the path in arcs; it limits the feed there", fanuc="1735", assumed=1000.0
+        "largest centripetal acceleration in arcs; it limits the feed there", fanuc="1735", assumed=1000.0
     )
     polyline_acceleration_mm_s2: Positive | None = optional(
         "the same along polylines, where two lines meet; left out: as in arcs, under another corner_rule than "
         '"speed_difference" not limited'
     )
     junction_deviation_mm: Annotated[Positive, Field(le=10)] | None = optional(
-        'deviation at a corner, run at the acceleration of the axes; corner_rule = "junction_deviation" needs it'
+        'deviation at a corner, passed at the acceleration of the axes; corner_rule = "junction_deviation" needs it'
     )
     corner_stop_angle_deg: Annotated[Positive, Field(le=180)] | None = optional(
-        'least turn of a corner that is a stop; corner_rule = "stops" needs it'
+        'smallest turn of a corner that is a stop; corner_rule = "stops" needs it'
     )
     look_ahead_block_time_s: Annotated[NonNegative, Field(le=1)] = key(
-        "look-ahead runs no block off faster than it reads one; 0: not limited", default=0.0
+        "shortest time per block in look-ahead mode (the time to read one); 0: not limited", default=0.0
     )
     contour_acceleration_mm_s2: PositiveAxisValues | None = optional(
         "largest acceleration of an axis along a contour, corners and curves alike; left out: not limited. One "
@@ -204,7 +204,7 @@ class Controller(TomlTable):
         fanuc="1737",
     )
     rapid_path: Literal["linear", "non_linear"] = key(
-        '"linear": a rapid goes straight; "non_linear": each axis travels at its own speed',
+        '"linear": a rapid is straight; "non_linear": each axis travels at its own speed',
         fanuc="1401#1",
         assumed="linear",
     )
@@ -212,20 +212,19 @@ class Controller(TomlTable):
         "time in which a rapid reaches its speed. One number, or x, y, z", fanuc="1620, 1773", assumed=0.15
     )
     rapid_bell_time_s: _Time = key(
-        "time over which the acceleration of a rapid is built up; 0: none", fanuc="1621, 1774", assumed=0.0
+        "time constant of bell-shaped acc./dec. of a rapid; 0: none", fanuc="1621, 1774", assumed=0.0
     )
     in_position_s: AxisValues = key(
-        "wait for the axis to arrive after a rapid or an exact stop; the slowest axis that moved counts. One "
-        "number, or x, y, z",
+        "in-position wait after a rapid or an exact stop; the slowest axis that moved counts. One number, or x, y, z",
         assumed={"x": 0.025, "y": 0.025, "z": 0.12},
     )
     in_position: Literal["measured", "servo_lag"] = key(
-        'where the wait after a rapid or an exact stop comes from. "measured": in_position_s; "servo_lag": the time '
-        "in which the lag left by position_gain_per_s and feed_forward_ratio falls to in_position_width_um",
+        'origin of the wait after a rapid or an exact stop. "measured": in_position_s; "servo_lag": the time '
+        "in which the lag by position_gain_per_s and feed_forward_ratio falls to in_position_width_um",
         default="measured",
     )
     in_position_width_um: PositiveAxisValues = key(
-        "an axis has arrived when it lags by less than this. One number, or x, y, z", fanuc="1826", assumed=20.0
+        "an axis is in position when it lags by less than this. One number, or x, y, z", fanuc="1826", assumed=20.0
     )
     position_gain_per_s: PositiveAxisValues = key(
         "gain of the position loop (the parameter counts 0.01/s); the servo lag is feed / gain. One number, or x, y, z",
@@ -233,7 +232,7 @@ class Controller(TomlTable):
         assumed=30.0,
     )
     feed_forward_ratio: AxisRatios = key(
-        "share of the servo lag that the feed-forward takes away; 0: none. One number, or x, y, z",
+        "ratio of the servo lag that feed-forward removes; 0: none. One number, or x, y, z",
         fanuc="2005#1, 2068, 2092",
         assumed=0.0,
     )
@@ -244,19 +243,19 @@ class Controller(TomlTable):
         assumed=0.0,
     )
     shaped_bell_time_s: _Time = key(
-        "length of its second moving average, where it builds up the acceleration as a bell; 0: none",
+        "length of the second moving average of the filter for shaped blocks (bell-shaped acc./dec.); 0: none",
         fanuc="1622 with 1610#1",
         assumed=0.0,
     )
     shaped_filter_shape: Literal["linear", "exponential"] = key(
-        'how it smooths. "linear": moving averages of the lengths shaped_time_constant_s and shaped_bell_time_s; '
-        '"exponential": a first-order lag of shaped_time_constant_s',
+        'shape of the filter for shaped blocks. "linear": moving averages of the lengths shaped_time_constant_s and '
+        'shaped_bell_time_s; "exponential": a first-order lag of shaped_time_constant_s',
         fanuc="1610#0, #1",
         assumed="linear",
     )
     program_memory_bytes: Annotated[int, Strict(), Field(gt=0)] = key(
-        "memory for programs; a larger output gets a warning. With kind other than FANUC's 4 GB where it is left out: "
-        "they read from a disk",
+        "memory for programs; a larger output gets a warning. Left out with a kind other than FANUC: 4 GB, "
+        "since they read from a disk",
         assumed=262_144,
     )
     dnc_baud: Count = key(
@@ -277,7 +276,7 @@ class Controller(TomlTable):
     )
     calculator_decimal_point: Bool = key(
         "X10 without a decimal point: 10 mm or inch if true, 10 least increments if false. LinuxCNC, Klipper and GRBL "
-        "(kind) know only the first: true where it is left out",
+        "(kind) know only the first: true if left out",
         fanuc="3401#0",
         default=False,
     )
@@ -285,20 +284,20 @@ class Controller(TomlTable):
     feed_decimals_inch: _Decimals = key("decimals of an F word in inch/min", unit="digits", assumed=2)
     minimum_feed_mm_per_min: Positive = key("smallest feed written in a block", assumed=1.0)
     no_buffer_m_codes: tuple[Code, ...] = key(
-        "M codes at which the controller stops reading ahead, besides M00, M01, M02 and M30",
+        "M codes at which the controller stops reading ahead, in addition to M00, M01, M02 and M30",
         fanuc="3411-3432",
         default=(),
     )
     offset_memory: Literal["A", "B", "C"] = key(
         'which system variables hold the tool offsets. "A": one value for each; "B": geometry and wear; "C": '
-        "geometry and wear, length and radius apart",
+        "geometry and wear, separately for length and radius",
         assumed="C",
     )
     nesting_limit_subprogram: Annotated[int, Strict(), Field(ge=1, le=100)] = key(
-        "how deep subprograms may call one another; 4 on old controls", unit="levels", assumed=10
+        "nesting depth of subprogram calls; 4 on old controls", unit="levels", assumed=10
     )
     max_program_steps: Annotated[int, Strict(), Field(ge=1, le=10**12)] = key(
-        "blocks that a program may execute beyond one for each of its lines; more count as endless",
+        "blocks that may execute beyond one per line; more is an endless loop",
         unit="blocks",
         default=4_000_000,
     )
@@ -309,20 +308,20 @@ class Controller(TomlTable):
         default=100_000_000,
     )
     max_expansion_moves: Annotated[int, Strict(), Field(ge=1, le=10**9)] = key(
-        "those of them beyond one for each line of the text: what loops, calls and drilling cycles expand to",
+        "moves that loops, calls and drilling cycles may add to one per line",
         unit="moves",
         default=800_000,
     )
     max_program_bytes: Annotated[int, Strict(), Field(ge=1, le=4 * 10**9)] = key(
-        "largest text that is read, with the programs that it calls, and largest text that is written",
+        "largest program that is read, with the programs that it calls, and largest program that is written",
         default=1_000_000_000,
     )
     max_expansion_bytes: Annotated[int, Strict(), Field(ge=1, le=4 * 10**9)] = key(
-        "by how much the expanded program (macros, calls, modes resolved) may be larger than the program",
+        "size by which the expanded program (macros, calls, modes resolved) may exceed the program",
         default=33_554_432,
     )
     max_program_s: Annotated[Positive, Field(le=1e9)] = key(
-        "time that a program may take at its feeds, with rapids and dwells: a slip of F or of a dwell is refused at "
+        "longest time of a program at its feeds, with rapids and dwells: a wrong F or dwell is refused at "
         "its line instead of being simulated for hours",
         default=100_000.0,
     )
@@ -345,7 +344,7 @@ class Controller(TomlTable):
 
     @property
     def holds_macros(self) -> bool:
-        """Whether macro statements may stand in a program: the control has them, and is not drip fed."""
+        """True if a program may contain macro statements: the control has them, and is not drip fed."""
         return self.macros and self.dnc_baud == 0
 
 
@@ -372,19 +371,15 @@ class FeedControl(TomlTable):
     """How the controller follows changes of the feed."""
 
     interval_mm: Positive = key(
-        "shortest piece of path over which the controller follows a change of the feed; scheduled blocks are not "
+        "shortest path length over which the controller follows a change of the feed; scheduled blocks are not "
         "shorter. A test cut with feeds that change every 0.2, 0.4 and 0.6 mm shows it (paper 001, figure 8)",
         assumed=0.6,
     )
     max_change_mm_per_min: Positive | None = optional(
         "largest change of the feed from one block to the next; left out: not limited"
     )
-    spindle_power_w: Positive | None = optional(
-        "power that the spindle gives for as long as it takes; left out: not limited"
-    )
-    spindle_torque_nm: Positive | None = optional(
-        "torque that the spindle gives for as long as it takes; left out: not limited"
-    )
+    spindle_power_w: Positive | None = optional("continuous power of the spindle; left out: not limited")
+    spindle_torque_nm: Positive | None = optional("continuous torque of the spindle; left out: not limited")
 
 
 class MCodeTimes(InlineTable):
@@ -401,7 +396,7 @@ class MCodeTimes(InlineTable):
 
 
 class SpindleTimes(InlineTable):
-    """Time that the spindle needs, by its speed: linear between the rows, and from 0 below the first."""
+    """Time of the spindle over its speed: linear between the rows, and from 0 below the first."""
 
     rpm: tuple[Positive, ...] = key("speeds, ascending", unit="1/min")
     s: tuple[Seconds, ...] = key("times", unit="s")
@@ -423,18 +418,18 @@ class SpindleTimes(InlineTable):
 class TimeScatter(InlineTable):
     """Standard deviations of times that no parameter explains."""
 
-    cuts_percent: Annotated[NonNegative, Field(le=100)] = key("of the cutting time of a tool")
-    between_cuts_s: Seconds = key("of what lies between two cutting sections")
-    runs_percent: Annotated[NonNegative, Field(le=100)] = key("between repeated runs of a program")
+    cuts_percent: Annotated[NonNegative, Field(le=100)] = key("scatter of the cutting time of a tool")
+    between_cuts_s: Seconds = key("scatter of the time between two cutting sections")
+    runs_percent: Annotated[NonNegative, Field(le=100)] = key("scatter between repeated runs of a program")
 
 
 class OpenTime(TomlTable):
-    """One direction in which run logs leave the calibrated parameters open."""
+    """A direction in parameter space that run logs do not determine."""
 
-    name: Text = key("the parameter that it is of, mainly")
-    values: tuple[Text, ...] = key('the machine a step further in that direction: "KEY = VALUE" of what differs')
+    name: Text = key("parameter that varies most in this direction")
+    values: tuple[Text, ...] = key('values of the machine one step in that direction: "KEY = VALUE"')
     weight: Annotated[Positive, Field(le=1e9)] = key(
-        "variance of the direction over the square of that step", default=1.0
+        "variance in the direction divided by the square of that step", default=1.0
     )
 
     @model_validator(mode="after")
@@ -457,36 +452,36 @@ class OpenTime(TomlTable):
 class Times(TomlTable):
     """Times in addition to the motion."""
 
-    program_start_s: Seconds = key("from the start key to the first block", assumed=0.0)
+    program_start_s: Seconds = key("time from cycle start to the first block", assumed=0.0)
     last_tool_in_spindle: Bool = key(
         "parts are made in series: the last tool of a program is in the spindle when it starts again, and an M06 that "
         "calls it changes nothing; false: every M06 changes",
         assumed=False,
     )
     feed_override_percent: Annotated[Positive, Field(le=200)] = key(
-        "override of the feed at which this shop usually runs; `time` counts with it unless another is given",
+        "feed override at which this shop usually runs; `time` uses it unless another is given",
         assumed=100.0,
     )
-    rapid_override_percent: Annotated[Positive, Field(le=200)] = key("the same of rapids", assumed=100.0)
-    tool_change_s: Seconds = key("an M06", assumed=0.0)
-    m_function_s: Seconds = key("any other M code that m_codes does not name", assumed=0.0)
-    m_codes: MCodeTimes | None = optional(
-        "M codes with a time of their own, { code = [1, 8], s = [0.3, 5.1] }; left out: none"
+    rapid_override_percent: Annotated[Positive, Field(le=200)] = key(
+        "rapid override at which this shop usually runs", assumed=100.0
     )
+    tool_change_s: Seconds = key("time of a tool change (M06)", assumed=0.0)
+    m_function_s: Seconds = key("time of an M code that is not in m_codes", assumed=0.0)
+    m_codes: MCodeTimes | None = optional("times of single M codes, { code = [1, 8], s = [0.3, 5.1] }; left out: none")
     spindle_start: SpindleTimes | None = optional(
-        "time in which the spindle comes from rest to a speed, { rpm = [5000, 12000], s = [1.0, 7.3] }; it elapses "
+        "time of the spindle from rest to a speed, { rpm = [5000, 12000], s = [1.0, 7.3] }; it elapses "
         "while the axes move; the control waits for the remainder before the next M code or cut; left out: none"
     )
     spindle_stop: SpindleTimes | None = optional(
         "likewise to rest after M05; M00, M01, M02, M30, M06 and the next M03 wait for the remainder; left out: none"
     )
     unknown_move_s: AxisTimes = key(
-        "a rapid of an axis of which the program does not give start or end: G28, G30, G53, and the first one "
-        "behind them or behind M06. One number, or x, y, z",
+        "time of a rapid whose start or end the program does not give: G28, G30, G53, and the first one "
+        "after them or after M06. One number, or x, y, z",
         assumed=0.0,
     )
     scatter: TimeScatter | None = optional(
-        "what calibrated times scatter by, { cuts_percent = 1.1, between_cuts_s = 0.2, runs_percent = 0.3 }; `time` "
-        "gives a 95 % interval where it is stated; left out: none"
+        "scatter of calibrated times, { cuts_percent = 1.1, between_cuts_s = 0.2, runs_percent = 0.3 }; `time` "
+        "then gives a 95 % interval; left out: none"
     )
-    open: tuple[OpenTime, ...] = key("what run logs leave open of the calibrated parameters", default=())
+    open: tuple[OpenTime, ...] = key("directions of calibrated parameters that run logs do not determine", default=())

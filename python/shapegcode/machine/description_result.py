@@ -1,4 +1,4 @@
-"""Every value of a machine with unit, origin and meaning; those nobody measured; what differs between two machines."""
+"""Values of a machine with unit, origin and meaning; unverified ones; differences between two machines."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _Keyed = TypeVar("_Keyed", "KeyValue", "DifferentValue")
 
 @dataclass(frozen=True)
 class OpenValue(OldNames):
-    """A value that was not measured on the machine, and what it would do to a program."""
+    """A value that was not measured on the machine, and its effect on a program."""
 
     key: str  # dotted name
-    value: str  # as it stands in the file, with its unit
+    value: str  # as in the file, with its unit
     origin: str  # "assumed", "inherited" or "default"
-    tested_value: str = ""  # the changed value, in words; empty: it was not tried
-    effect: str = ""  # what that does to the figure that it takes furthest, in words; empty: it was not tried
-    share: float | None = None  # how far the figure goes, of its limit; None: it was not tried
+    tested_value: str = ""  # the changed value, as text; empty: not tested
+    effect: str = ""  # its largest effect on a figure, as text; empty: not tested
+    share: float | None = None  # the changed figure relative to its limit; None: not tested
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -36,12 +36,12 @@ class MachineDescription(Result):
     """Every value of a machine with its unit, origin and meaning.
 
     Attributes:
-        machine: the tables of the machine file, defaults as well.
+        machine: the tables of the machine file, with defaults.
         keys: every value by its dotted key, in the order of the file.
-        warnings: that its origins are read from comments, as older files have them.
-        program: for which the values that were not measured were ranked; None: for none.
-        matters: those of them that move its verdict, the furthest first.
-        source: file of the machine, or its name, where that is known.
+        warnings: a warning if origins were read from comments, as in older files.
+        program: program for which the unverified values were ranked; None: not ranked.
+        matters: unverified values that change its verdict, largest effect first.
+        source: file of the machine, or its name, if known.
     """
 
     machine: Mapping[str, object]
@@ -53,16 +53,16 @@ class MachineDescription(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether the machine can be used: always, as one that cannot is refused."""
+        """Always true: a machine that cannot be used is refused."""
         return True
 
     @property
     def answer(self) -> str:
-        """How much of it nobody measured, and which of that matters most."""
+        """Number of unverified values, and the most important one."""
         name, count = self.machine["name"], len(self._open())
         if self.program is None:
             if not count:
-                return f"{name}: every value is stated"
+                return f"{name}: every value is set"
             sentence = f"{count} of {len(self.keys)} values are assumed or inherited"
             return f"{name}: {sentence}; --for part.nc ranks them by their effect on your program"
         if not self.matters:
@@ -82,16 +82,16 @@ class MachineDescription(Result):
         if self.matters:
             key = self.matters[0].key
             how = "`shapegcode identify --tap-plan`" if ".modes" in key else "docs/howto/characterize.md"
-            return f"measure {key} first: {how} says how."
+            return f"measure {key} first: {how} explains how."
         if self._open() and self.program is None:
             return f"`shapegcode machine show {self.source} --for part.nc` ranks them by their effect on your program."
         return f"use it: shapegcode convert IN -m {self.source} -o OUT."
 
     def tables(self, *, everything: bool = True) -> list[Table]:
-        """What nobody measured, and the keys, those of one table of the file below its name.
+        """Tables of the unverified values and of the keys, grouped by table of the file.
 
         Args:
-            everything: all keys; else, for a program, the values that matter most for it and no others.
+            everything: all keys; False: with a program, only the most important values.
 
         Returns:
             The tables.
@@ -115,7 +115,7 @@ class MachineDescription(Result):
         ]
 
     def _ranking(self, limit: int | None = None) -> list[Table]:
-        """What nobody measured: for a program those values that matter, the furthest first; else all by table."""
+        """Unverified values: with a program the important ones, largest effect first; else all by table."""
         if self.program is not None:
             columns = (
                 Column("matters most", value="key", left=True),
@@ -142,7 +142,7 @@ class MachineDescription(Result):
 
 
 def _by_table(values: Iterable[_Keyed]) -> Iterator[str | _Keyed]:
-    """Values with the name of their table before the first one of each."""
+    """Yield values, with the name of each table before its first one."""
     for table, rows in groupby(values, key=lambda value: value.key.rpartition(".")[0]):
         yield from [table] if table else []
         yield from rows
@@ -170,7 +170,7 @@ def _origin(row: str | KeyValue) -> str | None:
 
 
 def describe_machine(machine: Machine | str | Path) -> MachineDescription:
-    """Every value of a machine: from the file, a default, or a default that is an assumption.
+    """List every value of a machine with origin: file, default, or assumed default.
 
     Args:
         machine: a machine, its file, or the name of a built-in one.
@@ -193,26 +193,26 @@ _NONE = "-"
 
 @dataclass(frozen=True)
 class DifferentValue:
-    """A key that two machines do not have alike."""
+    """A key with different values in two machines."""
 
     key: str  # dotted name
     unit: str  # of the values; "1" for a ratio
     first: str  # value of the first machine, as TOML; "-": it has no such key
-    second: str  # of the second
-    first_origin: str  # where it comes from; see `shapegcode machine show`
-    second_origin: str  # likewise
-    meaning: str  # what it is
+    second: str  # value of the second machine, likewise
+    first_origin: str  # origin, see `shapegcode machine show`
+    second_origin: str  # origin in the second machine
+    meaning: str  # meaning of the key
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class MachineDifference(Result):
-    """What differs between two machines; where values come from does not count.
+    """Differences between two machines; origins are not compared.
 
     Attributes:
         first: name or file of the first machine.
-        second: of the second.
-        keys: how many keys were compared.
-        different: those that differ, in the order of the file.
+        second: name or file of the second machine.
+        keys: number of compared keys.
+        different: differing keys, in the order of the file.
         warnings: none.
     """
 
@@ -224,12 +224,12 @@ class MachineDifference(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether they have the same values."""
+        """True if they have the same values."""
         return not self.different
 
     @property
     def answer(self) -> str:
-        """How many keys differ."""
+        """Number of differing keys."""
         if self.ok:
             return f"{self.first} and {self.second}: all {self.keys} values are the same"
         return f"{self.first} and {self.second}: {len(self.different)} of {self.keys} values differ"
@@ -238,7 +238,7 @@ class MachineDifference(Result):
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
         if self.ok:
-            return "nothing: programs come out the same on both."
+            return "nothing: converted programs are the same for both."
         return f"`shapegcode machine show {self.second}` explains each key."
 
     def tables(self) -> list[Table]:
@@ -253,7 +253,7 @@ class MachineDifference(Result):
 
 
 def _shown(row: str | DifferentValue, which: str) -> str | None:
-    """A value with its unit, and where it comes from; `which`: "first" or "second"."""
+    """A value with unit and origin; *which*: "first" or "second"."""
     if isinstance(row, str):
         return None
     value, origin = getattr(row, which), getattr(row, f"{which}_origin")
@@ -269,7 +269,7 @@ def machine_difference(first: Machine | str | Path, second: Machine | str | Path
         second: likewise.
 
     Returns:
-        What differs.
+        The differences.
 
     Raises:
         MachineError: a file is not TOML or has wrong keys or values; every problem is listed.
@@ -287,7 +287,7 @@ def _different(keys: list[str], ours: dict[str, KeyValue], theirs: dict[str, Key
         both = [ours.get(key), theirs.get(key)]
         first, second = (_NONE if each is None else each.value for each in both)
         if first == second or {first, second} == {_NONE, "not set"}:
-            continue  # they have the same, or neither has it
+            continue  # equal, or missing in both
         origin, other_origin = (_NONE if each is None else _origin(each) or "" for each in both)
         known = both[0] or both[1]
         assert known is not None

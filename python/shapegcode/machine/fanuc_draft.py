@@ -1,4 +1,4 @@
-"""A machine in the making: tables of its file, and for each value where it comes from."""
+"""A machine file in preparation: its tables, and the origin of each value."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Draft:
         self.dump = dump  # the records
         self.values = DumpValues(dump)  # the same as numbers and bits
         self.data = data  # tables of the machine file
-        self.read: list[ReadParameter] = []  # every value of the dump that went into a key
-        self.tables: list[ReadTable] = []  # tables of offsets and variables that went into keys
-        self.assumed: list[AssumedValue] = []  # what was taken though nobody says it
+        self.read: list[ReadParameter] = []  # every value of the dump that was stored in a key
+        self.tables: list[ReadTable] = []  # tables of offsets and variables that were stored in keys
+        self.assumed: list[AssumedValue] = []  # assumed values
         self.missing: list[MissingParameter] = []
-        self.remarks: dict[str, str] = {}  # per dotted key, where its value comes from
+        self.remarks: dict[str, str] = {}  # origin of the value by dotted key
 
     def problem(self, number: int, message: str) -> None:
         """Report a parameter that makes the dump useless, with its line."""
@@ -32,31 +32,31 @@ class Draft:
         self.values.problems.append(Problem(f"parameter {number}", "", message, line))
 
     def miss(self, number: int | str, why: str, line: int | None = None) -> None:
-        """A parameter that is not there, or that changes nothing."""
+        """Note a parameter that is missing or has no effect."""
         if line is None and isinstance(number, int):
             entry = self.dump.get(number) or next(iter(self.values.entries(number)), None)
             line = entry.line if entry else None
         self.missing.append(MissingParameter(str(number), line, why))
 
     def assume(self, key: str, value: Value, why: str) -> None:
-        """A value that rests on an assumption; it is in the machine already, or in no key."""
+        """Note an assumed value; it is in the machine already, or in no key."""
         self.assumed.append(AssumedValue(key, value, why))
 
     def assume_key(self, key: str, value: Value, why: str) -> None:
-        """A value of a key that the dump does not give."""
+        """Set a key that the dump does not contain to an assumed value."""
         self.put(key, value)
         self.remarks[key] = f"assumed: {why}"
         self.assume(key, value, why)
 
     def get(self, key: str) -> Any:
-        """What the machine has under a dotted key; None where it has nothing."""
+        """Value of a dotted key; None if it is not set."""
         value: Any = self.data
         for part in key.split("."):
             value = value.get(part) if isinstance(value, Mapping) else None
         return value
 
     def drop(self, key: str) -> None:
-        """Take a key out, so that its default holds."""
+        """Delete a key, so that its default applies."""
         *tables, name = key.split(".")
         table = self.get(".".join(tables))
         if isinstance(table, dict):
@@ -77,14 +77,14 @@ class Draft:
                 self.read.append(ReadParameter(number, entry.target, entry.letter + entry.text, entry.line, key, shown))
 
     def choose(self, key: str, number: int, bit: int, on: Value = True, off: Value = False) -> bool | None:
-        """Put one of two values into the machine by a bit of the dump; None, and nothing, where the dump has none."""
+        """Put one of two values into the machine by a bit of the dump; do nothing and return None without it."""
         found = self.values.bit(number, bit)
         if found is not None:
             self.set(key, on if found else off, number)
         return found
 
     def put(self, key: str, value: Any) -> Value:
-        """Put a value into the tables, without a word about it; what is shown of it comes back."""
+        """Put a value into the tables without a remark; return it in the form to show."""
         *tables, name = key.split(".")
         table = self.data
         for part in tables:
@@ -98,7 +98,7 @@ class Draft:
 
 
 def take_modes(draft: Draft, base: Machine | None, keep: str, rigid: str) -> None:
-    """Keep the modes of the base where somebody says that they are those of this machine; leave them out elsewhere."""
+    """Keep the modes of the base on the axes for which this is requested; delete the others."""
     check_axes(keep, rigid)
     for axis in "xyz":
         modes = getattr(base.axes, axis).modes if base else ()
@@ -116,8 +116,8 @@ def take_modes(draft: Draft, base: Machine | None, keep: str, rigid: str) -> Non
             continue
         found = ", ".join(f"{mode.frequency_hz:g} Hz" for mode in modes)
         kept = f"--keep-modes {axis.upper()} does"
-        whose = f"; {found} of {base.name} are not taken over: {kept}" if base and found else ""
+        whose = f"; {found} of {base.name} are not adopted: {kept}" if base and found else ""
         draft.remarks[f"{key}.modes"] = "not measured"
         draft.remarks[f"{key}.rigid"] = "assumed: not measured"
         none = f"--rigid {axis.upper()}: it has none"
-        draft.miss("", f"{key}.modes: no dump holds them{whose}; identify finds them; {none}")
+        draft.miss("", f"{key}.modes: a dump does not contain them{whose}; identify finds them; {none}")

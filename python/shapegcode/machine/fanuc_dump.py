@@ -1,4 +1,4 @@
-"""What a FANUC control punches out: its parameters as records, its tables of offsets and macro variables.
+"""Files punched by a FANUC control: parameters as records, tables of offsets and macro variables.
 
 Both grammars of CNC-PARA.TXT are read: ``N01420Q1A1P24000.0A2P24000.0`` (30i, 0i-D, 0i-F; the 15i leaves Q1 out) and
 ``N01825 A1 P 3000 A2 P 3000`` (16, 18, 21). Tables: ``G10G90L10P1R185.676`` (TOOLOFST.TXT),
@@ -32,27 +32,27 @@ _SYSTEMS = {number: f"G{53 + number}" for number in range(1, 7)}
 
 @dataclass
 class ControlTables:
-    """What the tables say, in the units that they are written in."""
+    """Contents of the tables, in their units."""
 
     # kinds of tool offset by number of G10: 1 (one value for all), 10 and 11 (geometry and wear of both, or of the
     # length), 12 and 13 (of the radius)
     kinds: set[int] = field(default_factory=set)
-    tools: dict[int, dict[int, tuple[float, bool]]] = field(default_factory=dict)  # per kind the offsets by number
-    # work offsets by name, "" for the one that is added to all
+    tools: dict[int, dict[int, tuple[float, bool]]] = field(default_factory=dict)  # offsets by kind and number
+    # work offsets by name; "": added to all others
     systems: dict[str, dict[str, tuple[float, bool]]] = field(default_factory=dict)
     variables: dict[int, float | None] = field(default_factory=dict)  # by number; None: vacant
-    # per group ("tools", "systems", "variables") file, first and last line
+    # file, first and last line by group ("tools", "systems", "variables")
     sources: dict[str, tuple[str, int, int]] = field(default_factory=dict)
-    left_out: list[tuple[str, int, str]] = field(default_factory=list)  # lines that hold something else
+    left_out: list[tuple[str, int, str]] = field(default_factory=list)  # other lines
 
     def note(self, group: str, file: str, line: int) -> None:
-        """A line of a file was read into a group."""
+        """Note that a line of a file was read into a group."""
         first = self.sources[group][1] if group in self.sources and self.sources[group][0] == file else line
         self.sources[group] = (file, first, line)
 
 
 def is_table(data: bytes) -> bool:
-    """Whether a file is such a table: its first line with words is a G10 or an assignment, or leads to one."""
+    """True if a file is such a table: G10 or an assignment comes first, after harmless words only."""
     for _, words in _lines(data):
         if _G10.match(words) or _ASSIGNMENT.fullmatch(words):
             return True
@@ -62,7 +62,7 @@ def is_table(data: bytes) -> bool:
 
 
 def read_table(data: bytes, file: str, tables: ControlTables) -> None:
-    """Read a table into those that were read before; a value that is there already is replaced."""
+    """Read a table into *tables*; existing values are replaced."""
     for line, words in _lines(data):
         try:
             if found := _ASSIGNMENT.fullmatch(words):
@@ -77,7 +77,7 @@ def read_table(data: bytes, file: str, tables: ControlTables) -> None:
 
 
 def _every_line(data: bytes) -> Iterator[tuple[int, str]]:
-    """Lines that are not empty, and their numbers; comments may hold the characters of any country."""
+    """Lines that are not empty, and their numbers; comments may contain any characters."""
     text = data.decode("latin-1").removeprefix("ï»¿")
     lines = text.split("\n" if "\n" in text else "\r")
     return ((number, words) for number, raw in enumerate(lines, start=1) if (words := raw.strip()))
@@ -123,7 +123,7 @@ def _take_words(tables: ControlTables, words: str, file: str, line: int) -> None
 
 
 def _length(text: str) -> tuple[float, bool]:
-    """A length, and whether it has a decimal point."""
+    """Parse a length; also return whether it has a decimal point."""
     return float(text), "." in text
 
 
@@ -132,15 +132,15 @@ def _variable(tables: ControlTables, number: int, value: float | None, file: str
         tables.variables[number] = value
         tables.note("variables", file, line)
     else:
-        tables.left_out.append((file, line, f"#{number}: not one that the control keeps (#500 to #999)"))
+        tables.left_out.append((file, line, f"#{number}: not a retained variable (#500 to #999)"))
 
 
 def _value(text: str) -> float | None:
-    """The value of an assignment: a number, numbers joined by + - * / in square brackets, or #0, which is vacant."""
+    """Value of an assignment: a number, an expression with + - * / and square brackets, or #0 (vacant)."""
     if re.fullmatch(r"#\s*0", text.strip()):
         return None
     if not re.fullmatch(r"[-+*/.\d\[\]\s]{1,200}", text):
-        raise ValueError("its value is no number")
+        raise ValueError("its value is not a number")
     return _computed(ast.parse(text.strip().replace("[", "(").replace("]", ")"), mode="eval").body)
 
 
@@ -151,7 +151,7 @@ def _computed(node: ast.expr) -> float:
         return -_computed(node.operand) if isinstance(node.op, ast.USub) else _computed(node.operand)
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
         return float(_OPERATORS[type(node.op)](_computed(node.left), _computed(node.right)))
-    raise ValueError("its value is no number")
+    raise ValueError("its value is not a number")
 
 
 LONGEST_MS = 10_000.0
@@ -159,16 +159,16 @@ _MAX_VALUE = 1e7
 
 
 class DumpValues:
-    """Takes values out of a dump."""
+    """Reads values of a dump and checks them."""
 
     def __init__(self, dump: Dump) -> None:
         self.dump = dump  # the records
         self.axes = (1, 2, 3)  # numbers of the axes X, Y, Z in the dump
-        self.problems: list[Problem] = []  # values that cannot be; whoever takes values looks at them at the end
+        self.problems: list[Problem] = []  # implausible values; the caller checks them at the end
         self.differing: list[tuple[int, float]] = []
 
     def scalar(self, number: int, high: float = _MAX_VALUE, unit: str = "", low: float = 0.0) -> float | None:
-        """A parameter without axes; where the dump gives it per axis, the largest of X, Y, Z."""
+        """A parameter without axes; if the dump has it per axis, the largest of X, Y, Z."""
         entry = self.dump.get(number)
         if entry is not None:
             return self._number(entry, low, high, unit)
@@ -178,7 +178,7 @@ class DumpValues:
         return max(values, default=None)
 
     def per_axis(self, number: int, high: float = _MAX_VALUE, unit: str = "", low: float = 0.0) -> list[float] | None:
-        """The values of X, Y, Z; one without an axis stands for all three. None where the dump lacks one."""
+        """The values of X, Y, Z; one without an axis applies to all three. None if one is missing."""
         entries = self.entries(number)
         if len(entries) < 3:
             one = self.dump.get(number)
@@ -186,17 +186,17 @@ class DumpValues:
         return [self._number(entry, low, high, unit) for entry in entries]
 
     def entries(self, number: int) -> list[Entry]:
-        """What the dump has of a parameter for X, Y and Z, in this order."""
+        """Entries of a parameter for X, Y and Z, in this order."""
         found = (self.dump.get(number, axis) for axis in self.axes)
         return [entry for entry in found if entry is not None]
 
     def bit(self, number: int, bit: int) -> bool | None:
-        """A bit of a parameter, counted from the right; None where the dump has none."""
+        """A bit of a parameter, counted from the right; None if the dump does not contain it."""
         entry = self.dump.get(number) or next(iter(self.entries(number)), None)
         return None if entry is None else self.bit_of(entry, bit)
 
     def bit_of(self, entry: Entry, bit: int) -> bool | None:
-        """A bit of a value, counted from the right; None, and a problem, where it is no eight bits."""
+        """A bit of a value, counted from the right; if it is not eight bits, note a problem and return None."""
         if len(entry.text) != 8 or set(entry.text) - {"0", "1"}:
             name = f"parameter {entry.number} {entry.target}".rstrip()
             self.problems.append(Problem(name, entry.text, "must be eight bits, 0 or 1", entry.line))
@@ -223,9 +223,9 @@ class Entry:
     """One value of a dump."""
 
     number: int  # parameter number
-    target: str  # "A1", "S2", "L1", "T1", or empty where the value has no axis, spindle or path
+    target: str  # "A1", "S2", "L1", "T1", or empty if the value has no axis, spindle or path
     letter: str  # "P", or "M" and "I" for values in mm and inch
-    text: str  # the value as it stands there
+    text: str  # the value as written
     line: int  # line number in the dump, from 1
 
 
@@ -236,16 +236,16 @@ class Dump:
     file: str  # its name
     entries: dict[tuple[int, str], Entry] = field(default_factory=dict)  # first value of each (number, target)
     with_q: bool = False  # True where records carry Q1 (30i, 0i-D, 0i-F)
-    complete: bool = False  # True where a ``%`` ends it
-    # (number, line) of records that give a value again, for another path
+    complete: bool = False  # True if it ends with ``%``
+    # (number, line) of records that repeat a value for another path
     repeated: list[tuple[int, int]] = field(default_factory=list)
-    strange: list[tuple[int, str]] = field(default_factory=list)  # (line, text) of lines that are no records
-    records: int = 0  # how many records it has
-    # parameters that were not wanted, with the line of the first record of each
+    strange: list[tuple[int, str]] = field(default_factory=list)  # (line, text) of lines that are not records
+    records: int = 0  # number of records
+    # other parameters, with the line of their first record
     others: dict[int, int] = field(default_factory=dict)
 
     def get(self, number: int, axis: int | None = None) -> Entry | None:
-        """The value of a parameter for an axis (1, 2, ...), or of the first path; None where the dump has none."""
+        """The value of a parameter for an axis (1, 2, ...), or of the first path; None if it is missing."""
         targets = ("", "L1") if axis is None else (f"A{axis}",)
         return next((self.entries[number, name] for name in targets if (number, name) in self.entries), None)
 
@@ -266,7 +266,7 @@ def read_dump(data: bytes, file: str, wanted: Container[int]) -> Dump:
                 break
             continue
         if not words.startswith("N"):
-            # What stands before the first record is a header.
+            # Lines before the first record are a header.
             if dump.records:
                 dump.strange.append((line, words[:60]))
             continue

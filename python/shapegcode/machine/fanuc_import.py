@@ -1,4 +1,4 @@
-"""A control's parameter dump as a machine; a base machine says what it does not. See docs/reference/parameters.md."""
+"""Read a control's parameter dump as a machine; a base machine supplies the rest. See docs/reference/parameters.md."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _NO_KEY = {
     1020: "read: it determines which of A1, A2, ... is X, Y, Z; no key stores it",
     **dict.fromkeys((1422, 1430, 1432), _CLAMP),
 }
-"""Why a parameter that was read made no key, where there is more to say."""
+"""Reasons why a parameter that was read is not stored in a key."""
 
 
 def import_parameters(
@@ -39,26 +39,26 @@ def import_parameters(
     rigid: str = "",
     source: str = "<dump>",
 ) -> ParameterImport:
-    """The machine that a control's parameter dump describes (CNC-PARA.TXT).
+    """Make a machine from a control's parameter dump (CNC-PARA.TXT).
 
     Args:
         dump: the file, or its content.
-        base: machine for what the dump does not say; None: the defaults of the machine file.
+        base: machine for values that are not in the dump; None: the defaults of the machine file.
         tables: files of tool offsets, work offsets and variables that the control punched out (TOOLOFST.TXT,
             EXT_WKZ.TXT, MACRO.TXT).
-        name: of the machine; None: that of the dump's file.
-        keep_modes: axes whose modes are those of the base, because it is the same machine: "xy". The modes of other
-            axes are not taken over: no dump holds any.
-        rigid: axes that have no modes, because somebody knows or decides it: "z".
+        name: of the machine; None: from the name of the dump file.
+        keep_modes: axes that keep the modes of the base, because it is the same machine: "xy". The modes of other
+            axes are not adopted: a dump contains no modes.
+        rigid: axes declared to have no modes: "z".
         source: names the content in messages.
 
     Returns:
-        The machine, and what was read, assumed and missing; not `ok` where nothing was read: the machine is the base
-        then, or a built-in one.
+        The machine, and what was read, assumed and missing; not `ok` if nothing was read: the machine is then the base
+        or a built-in one.
 
     Raises:
-        MachineError: no dump, a value that is not plausible, or a limit of an axis that neither dump nor base has.
-        ArgumentError: modes to keep of an axis for which the base has none, or that shall be rigid.
+        MachineError: not a dump, an implausible value, or a limit of an axis that neither dump nor base has.
+        ArgumentError: modes to keep for an axis without modes in the base, or for a rigid one.
         OSError: a file cannot be read.
     """
     data, file = (dump, source) if isinstance(dump, bytes) else (read_file(dump, _MAX_DUMP_BYTES), str(dump))
@@ -81,7 +81,7 @@ def import_parameters(
         _require_limits(draft, file)
         machine = Machine.from_data(draft.data, file)
         _remark_the_rest(draft, machine, base)
-    else:  # nothing of the dump is in it, nor what was decided for it
+    else:  # it contains nothing of the dump, nor decisions for it
         machine = base or Machine.load("vx500")
         draft.remarks.clear()
     for number, largest in dict(draft.values.differing).items():
@@ -98,7 +98,7 @@ def import_parameters(
 
 
 def _started(base: Machine | None, name: str | None, file: str) -> dict[str, Any]:
-    """The tables to start from. Name and description are the control's: a base machine only fills gaps."""
+    """Initial tables. Name and description are those of the control: a base machine only fills gaps."""
     data = base.model_dump(mode="python", exclude_unset=True) if base else {}
     stem = "".join(c for c in Path(file).stem if " " <= c <= "~")
     # HM100_CNC-PARA.TXT is the dump of the HM100.
@@ -123,7 +123,7 @@ def _list_missing(draft: Draft) -> None:
     used = {row.parameter for row in draft.read}
     for number in sorted(held - used):
         if str(number) not in listed:
-            draft.miss(number, _NO_KEY.get(number, "read, but no key comes from it here"))
+            draft.miss(number, _NO_KEY.get(number, "read, but not used for a key"))
     if others := draft.dump.others:
         first = min(others)
         count = f"{len(others)} parameter{'' if len(others) == 1 else 's'}"
@@ -133,7 +133,7 @@ def _list_missing(draft: Draft) -> None:
 
 
 def _remark_the_rest(draft: Draft, machine: Machine, base: Machine | None) -> None:
-    """Where the values come from that the dump does not give."""
+    """Note the origins of values that are not in the dump."""
     for value in machine.values():
         if value.key in draft.remarks or value.key in ("name", "description"):
             continue
@@ -145,7 +145,7 @@ def _remark_the_rest(draft: Draft, machine: Machine, base: Machine | None) -> No
 
 
 def _require_limits(draft: Draft, file: str) -> None:
-    """Limits of the axes; those of acceleration and feed that a control has no parameter for, from time constants."""
+    """Require axis limits; derive feed and acceleration without a parameter from rapid rate and time constant."""
     ramp_s = draft.get("controller.time_constant_s")
     for axis in "xyz":
         feed_key, acceleration_key = f"axes.{axis}.max_feed_mm_per_min", f"axes.{axis}.max_acceleration_mm_s2"
@@ -159,7 +159,7 @@ def _require_limits(draft: Draft, file: str) -> None:
 
     needed = {"max_feed_mm_per_min": "1430", "rapid_mm_per_min": "1420", "max_acceleration_mm_s2": "1660"}
     problems = [
-        Problem(f"axes.{axis}.{name}", "", f"not in the dump (parameter {number}); --from MACHINE gives it")
+        Problem(f"axes.{axis}.{name}", "", f"not in the dump (parameter {number}); or use --from MACHINE")
         for axis in "xyz"
         for name, number in needed.items()
         if draft.get(f"axes.{axis}.{name}") is None

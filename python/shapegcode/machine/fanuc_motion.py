@@ -1,6 +1,6 @@
-"""What a parameter dump says about the motion: limits, acceleration, filters, corners, rapids, servo.
+"""Motion data of a parameter dump: limits, acceleration, filters, corners, rapids, servo.
 
-Sources of the meanings stand in docs/reference/parameters.md, with those that no text confirmed.
+Sources of the meanings are in docs/reference/parameters.md, also which are unconfirmed.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ NUMBERS = frozenset((*_LAW, *_AHEAD, 1820, 1825, 1826, 2005, 2068, 2092))  # par
 
 
 def take_motion(draft: Draft) -> None:
-    """Everything about the motion."""
+    """Read all motion data."""
     before = _limits_and_law(draft)
     _shaped_filter(draft)
-    # A control that starts every program with the look-ahead on must be made to leave it, and may not do so.
+    # If programs start with look-ahead on, they switch it off, and the verdict covers look-ahead left on.
     if draft.choose("verdict.look_ahead", 1604, 0):
         draft.set("emission.prologue", ("G05.1Q0",), 1604)
         draft.set("emission.epilogue", ("G05.1Q1",), 1604)
@@ -32,7 +32,7 @@ def take_motion(draft: Draft) -> None:
 
 
 def _limits_and_law(draft: Draft) -> bool:
-    """Limits of the axes and the kind of acceleration; True where it lies before the interpolation."""
+    """Read axis limits and kind of acceleration; True for acceleration before interpolation."""
     values = draft.values
     acceleration = values.per_axis(1660, unit="mm/s²")
     speed, time = values.per_axis(1770, unit="mm/min"), values.per_axis(1771, LONGEST_MS, "ms")
@@ -43,7 +43,7 @@ def _limits_and_law(draft: Draft) -> bool:
     elif speed and time and min(*speed, *time) > 0:
         acceleration = [v / 60 / (t / 1000) for v, t in zip(speed, time, strict=True)]
         numbers = (1770, 1771)
-    # The 16i family has no 1769 or 1772 beside 1770, 1771.
+    # The 16i family has no 1769 or 1772 in addition to 1770, 1771.
     before = bool(numbers) and (numbers[0] == 1770 or filter_ms is not None or bell_ms is not None)
     if before:
         why = "the dump has acceleration before interpolation, but whether it is on the program decides (G05.1, G08)"
@@ -67,7 +67,7 @@ def _limits_and_law(draft: Draft) -> bool:
 
 
 def _look_ahead_filter(draft: Draft, time_s: float) -> None:
-    """1769 with its kind by 1602#3, #6; a bell and an exponential as the moving average with the same error on arcs."""
+    """Read 1769 with its kind by 1602#3, #6; bell and exponential become a moving average of equal error on arcs."""
     key = "controller.look_ahead_filter_time_constant_s"
     linear, bell = draft.values.bit(1602, 6), draft.values.bit(1602, 3)
     if linear is None or bell is None:
@@ -83,7 +83,7 @@ def _look_ahead_filter(draft: Draft, time_s: float) -> None:
 
 
 def _cutting_feeds(draft: Draft) -> None:
-    """The smallest clamp: 1430 holds with the look-ahead off, as shaped cuts run, 1432 with it on, 1422 always."""
+    """Use the smallest clamp: 1430 applies with look-ahead off, as in shaped cuts, 1432 with it on, 1422 always."""
     values = draft.values
     found = {n: values.per_axis(n, unit="mm/min") for n in (1422, 1430, 1432)}
     for k, name in enumerate("xyz"):
@@ -98,7 +98,7 @@ def _cutting_feeds(draft: Draft) -> None:
 
 
 def _after_interpolation_s(draft: Draft) -> tuple[float, float, str, str] | None:
-    """Time constant, second moving average, shape and note of the filter of 1622; None where the dump has none."""
+    """Time constant, second moving average, shape and note of the filter of 1622; None without parameter."""
     time = draft.values.scalar(1622, LONGEST_MS, "ms")
     if time is None:
         return None
@@ -113,17 +113,17 @@ def _after_interpolation_s(draft: Draft) -> tuple[float, float, str, str] | None
 
 
 def _after_interpolation(draft: Draft) -> None:
-    """The ordinary motion of a control that has no acceleration before interpolation."""
+    """Read the motion of a control without acceleration before interpolation."""
     found = _after_interpolation_s(draft)
     if found is None:
-        draft.miss(1622, "no time constant of cutting feed; the kind of motion cannot be known")
+        draft.miss(1622, "no time constant of cutting feed; the kind of motion is unknown")
         return
     why = "no acceleration before interpolation in the dump"
     draft.set("controller.motion", "after_interpolation", 1622, note=why)
     _set_filter(draft, found, "time_constant_s", "bell_time_s", "after_interpolation_shape")
     lowest = draft.values.scalar(1623, unit="mm/min")
     if lowest:
-        draft.miss(1623, f"lowest feed of exponential acceleration, {lowest:g} mm/min: read, but no key holds it")
+        draft.miss(1623, f"lowest feed of exponential acceleration, {lowest:g} mm/min: read, but without a key")
 
 
 def _shaped_filter(draft: Draft) -> None:
@@ -147,7 +147,7 @@ def _corners_and_arcs(draft: Draft) -> None:
     if steps and min(steps) > 0:
         draft.set("controller.corner_speed_difference_mm_per_min", steps, 1783)
     elif steps:
-        draft.miss(1783, "0: what the controller does then is not known")
+        draft.miss(1783, "0: the behaviour of the controller is not known")
     across = [v for v in values.per_axis(1735, unit="mm/s²") or [] if v > 0]
     feed, radius = values.scalar(1730, unit="mm/min"), values.scalar(1731, unit="µm")
     if across:
@@ -155,7 +155,7 @@ def _corners_and_arcs(draft: Draft) -> None:
     elif feed and radius:
         draft.set("controller.centripetal_acceleration_mm_s2", (feed / 60) ** 2 / (radius / 1000), 1730, 1731)
     if values.scalar(1732, unit="mm/min"):
-        draft.miss(1732, "lowest feed of the clamp on arcs: read, but no key holds it")
+        draft.miss(1732, "lowest feed of the clamp on arcs: read, but without a key")
     along = values.per_axis(1737, unit="mm/s²")
     if along and min(along) > 0:
         draft.set("controller.contour_acceleration_mm_s2", along, 1737)
@@ -186,7 +186,7 @@ def _rapids(draft: Draft, before: bool) -> None:
 
 
 def _multiplier(code: float) -> float | None:
-    """Command multiplier (CMR) of a value of 1820: twice the multiplier, or 100 and its denominator; None: none."""
+    """Command multiplier (CMR) of a value of 1820: twice the multiplier, or 100 plus its denominator; None: invalid."""
     if 101 <= code <= 127:
         return 1.0 / (code - 100)
     return code / 2.0 if 1 <= code <= 96 else None
@@ -224,7 +224,7 @@ _KEYS = {10: "tool_length_mm", 11: "tool_length_wear_mm", 12: "tool_radius_mm", 
 
 
 def take_tables(draft: Draft, tables: ControlTables) -> None:
-    """Read offsets and variables as they were when the dump was punched."""
+    """Read offsets and variables, as of the time of punching."""
     _tools(draft, tables)
     _systems(draft, tables)
     if tables.variables:
@@ -257,13 +257,13 @@ def _tools(draft: Draft, tables: ControlTables) -> None:
         _put(draft, tables, "tools", f"input.{key}", rows, len(rows))
     if len(filled) < (total := len({n for rows in mm.values() for n in rows})):
         file, _, last = tables.sources["tools"]
-        draft.miss("", f"{file}: {total - len(filled)} of {total} tool offsets are zero throughout: left out", last)
+        draft.miss("", f"{file}: {total - len(filled)} of {total} tool offsets are all zero: left out", last)
     if halved == 2.0:
         draft.assume("input.tool_radius_mm", "halved", "5004#2: cutter compensation is set as a diameter")
 
 
 def _mm(draft: Draft, value: float, point: bool) -> float:
-    """A value of a table: with a point in mm, or inch where that is the setting; without one in least increments."""
+    """Value of a table in mm: with a point mm, or inch by the setting; without one in least increments."""
     if not point:
         return value * (increment_um(draft)[0] / 1000)
     return value * (MM_PER_INCH if draft.values.bit(0, 2) else 1.0)

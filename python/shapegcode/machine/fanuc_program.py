@@ -1,6 +1,6 @@
 """Program settings of a parameter dump: increments, power-on state, offsets, cycles, calls, serial line.
 
-Sources of the meanings stand in docs/reference/parameters.md, with those that no text confirmed.
+Sources of the meanings are in docs/reference/parameters.md, also which are unconfirmed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NUMBERS = frozenset(
 
 
 def take_program(draft: Draft) -> None:
-    """Everything about programs."""
+    """Read all program settings."""
     _axes(draft)
     _increments(draft)
     _words_and_arcs(draft)
@@ -35,7 +35,7 @@ def take_program(draft: Draft) -> None:
 
 
 def _axes(draft: Draft) -> None:
-    """Which of A1, A2, ... is X, Y, Z."""
+    """Determine which of A1, A2, ... is X, Y, Z."""
     names = {
         float(entry.text): int(entry.target[1:])
         for (number, target), entry in draft.dump.entries.items()
@@ -52,7 +52,7 @@ def _axes(draft: Draft) -> None:
 
 
 def increment_um(draft: Draft) -> tuple[float, bool]:
-    """Least increment of a metric axis, µm: 1013#1 is IS-C, #0 IS-A, neither IS-B; and whether the dump says so."""
+    """Least increment of a metric axis, µm: 1013#1 is IS-C, #0 IS-A, neither IS-B; and whether it is in the dump."""
     number = _increment_parameter(draft)
     if number is None:
         return 1.0, False
@@ -61,7 +61,7 @@ def increment_um(draft: Draft) -> tuple[float, bool]:
 
 
 def _increment_parameter(draft: Draft) -> int | None:
-    """1013 has the bits per axis; older series have them in 1004, for all."""
+    """Number of the parameter with the increment bits: 1013 per axis; in older series 1004 for all."""
     return next((n for n in (1013, 1004) if draft.values.bit(n, 1) is not None), None)
 
 
@@ -87,7 +87,7 @@ def _words_and_arcs(draft: Draft) -> None:
         note = "" if "." in entry.text else "whole number: in least increments"
         draft.set("controller.arc_radius_tolerance_mm", tolerance, 3410, note=note)
     elif entry:
-        draft.miss(3410, "0: taken by some series as no check; not known", entry.line)
+        draft.miss(3410, "0: means no check on some series; not known here", entry.line)
     if draft.choose("power_on.motion", 3402, 0, "G01", "G00") is not None:
         draft.choose("power_on.plane", 3402, 2, "G19", "G18" if values.bit(3402, 1) else "G17")
         draft.choose("power_on.distance", 3402, 3, "G91", "G90")
@@ -99,7 +99,7 @@ def _words_and_arcs(draft: Draft) -> None:
 
 
 def _length_mm(draft: Draft, number: int) -> float | None:
-    """A length without axes: with a point in mm or inch, without one in least increments."""
+    """Read a length without axes: with a point in mm or inch, without one in least increments."""
     value = draft.values.scalar(number, unit="mm")
     if value is None:
         return None
@@ -116,13 +116,13 @@ def _cycles_and_offsets(draft: Draft) -> None:
         note = "" if min(given.values()) == largest else "G73 and G83 differ; the larger one counts for both"
         draft.set("input.peck_clearance_mm", largest, *given, note=note)
     if draft.values.bit(5003, 1):
-        draft.miss(5003, "start-up of cutter compensation of type C: read, but not expanded so; type A or B is used")
+        draft.miss(5003, "start-up of cutter compensation of type C: read, but not supported; type A or B is used")
     else:
         draft.choose("input.compensation_start_up", 5003, 0, "B", "A")
 
 
 def _work_offsets(draft: Draft) -> None:
-    """1221 to 1226 are G54 to G59, to each of which 1220 is added."""
+    """Read 1221 to 1226 (G54 to G59), each with 1220 added."""
     values, step_mm = draft.values, increment_um(draft)[0] / 1000
     found: dict[int, list[float]] = {}
     for number in _OFFSETS:
@@ -138,13 +138,13 @@ def _work_offsets(draft: Draft) -> None:
 
 
 def shifted(offsets: Mapping[str, Sequence[float]], shift: Sequence[float]) -> dict[str, tuple[float, ...]]:
-    """Work offsets with what is added to all of them; those that are zero then are left out."""
+    """Work offsets with the common shift added, without those that are zero."""
     sums = {name: tuple(round(a + b, 9) for a, b in zip(each, shift, strict=True)) for name, each in offsets.items()}
     return {name: each for name, each in sums.items() if any(each)}
 
 
 def _calls(draft: Draft) -> None:
-    """G, M and T codes that call programs."""
+    """Read the G, M and T codes that call programs."""
     tables = (
         ("input.g_macros", range(6050, 6060), 9010),
         ("input.m_subprograms", range(6071, 6080), 9001),
@@ -161,11 +161,11 @@ def _calls(draft: Draft) -> None:
 
 
 def _serial_line(draft: Draft) -> None:
-    """The speed counts where 0020 names the channel that it belongs to: else programs are not drip fed."""
+    """Read the baud rate of the channel in 0020; without it programs are not drip fed."""
     channel = draft.values.scalar(20, 35)
     if channel is None:
         if draft.values.scalar(103) is not None:
-            draft.miss(103, "no 0020: which channel programs come from is not known; not taken as drip feed")
+            draft.miss(103, "no 0020: input channel not known; drip feed not assumed")
         return
     number = _SERIAL.get(int(channel))
     if number is None:
@@ -175,6 +175,6 @@ def _serial_line(draft: Draft) -> None:
     if speed is None:
         draft.miss(number, f"transfer speed of channel {channel:g} (0020) is not in the dump")
     elif not speed < len(_BAUD):
-        draft.miss(number, f"{speed:g}: no transfer speed has this code (0 to {len(_BAUD) - 1})")
+        draft.miss(number, f"{speed:g}: not a code of a transfer speed (0 to {len(_BAUD) - 1})")
     elif speed:
         draft.set("controller.dnc_baud", _BAUD[int(speed)], 20, number)

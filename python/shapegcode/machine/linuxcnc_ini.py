@@ -1,4 +1,4 @@
-"""A LinuxCNC INI file as a machine: limits of the axes, period, what its planner is set to; else its defaults."""
+"""Read a LinuxCNC INI file as a machine: limits of the axes, period, planner settings; else its defaults."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ _PLANNER = {
 
 @dataclass(frozen=True)
 class IniMachine:
-    """A machine that an INI file describes."""
+    """A machine described by an INI file."""
 
-    machine: Machine  # with where each value comes from
+    machine: Machine  # with the origin of each value
     count: int  # values that were read
-    notes: tuple[str, ...]  # what is set there and not part of the model
+    notes: tuple[str, ...]  # settings that are not modelled
 
 
 class _Ini:
-    """Entries of an INI file with their lines, and what is wrong with them."""
+    """Entries of an INI file with their lines, and their problems."""
 
     def __init__(self, file: str, text: str) -> None:
         self.file = file
@@ -41,7 +41,7 @@ class _Ini:
         self.problems: list[Problem] = []
 
     def number(self, section: str, name: str) -> float | None:
-        """A number above 0; None where there is none, and where it is none, which is then a problem."""
+        """A number above 0; None if missing or invalid, which is noted as a problem."""
         text, line = self.entries.get((section, name), ("", 0))
         if not line:
             return None
@@ -59,10 +59,10 @@ class _Ini:
 
 
 def read_ini(file: str | Path, *, name: str | None = None) -> IniMachine:
-    """The machine that a LinuxCNC INI file describes, of that name or [EMC] MACHINE; its modes are not known."""
+    """Read the machine of a LinuxCNC INI file, with *name* or [EMC] MACHINE; its modes are not known."""
     ini = _Ini(str(file), read_file(file, _MAX_BYTES).decode("utf-8", "replace"))
     if not any(section == "TRAJ" for section, _ in ini.entries):
-        raise MachineError(str(file), (Problem("", "", "no INI file of LinuxCNC: it has no section [TRAJ]"),))
+        raise MachineError(str(file), (Problem("", "", "not an INI file of LinuxCNC: it has no section [TRAJ]"),))
     unit_text, line = ini.entries.get(("TRAJ", "LINEAR_UNITS"), ("mm", 0))
     unit_mm = UNITS_MM.get(unit_text.lower())
     if unit_mm is None:
@@ -77,7 +77,7 @@ def read_ini(file: str | Path, *, name: str | None = None) -> IniMachine:
         "description": f"read from {Path(file).name}",
         "axes": axes, "controller": controller, "emission": {"dialect": "linuxcnc"},
     }  # fmt: skip
-    if unit_mm != 1.0:  # of the tool table
+    if unit_mm != 1.0:  # unit of the tool table
         data["input"] = {"machine_unit": "inch"}
     machine = Machine.from_data(data, str(file)).with_remarks(remarks)
     return IniMachine(machine, len(remarks), tuple(_notes(ini)))
@@ -109,9 +109,9 @@ def _axes(ini: _Ini, unit_mm: float) -> tuple[dict[str, dict[str, float]], dict[
 
 
 def _controller(ini: _Ini, remarks: dict[str, str]) -> Iterator[tuple[str, Any]]:
-    """What the file says of servo period and planner."""
+    """Servo period and planner settings."""
     yield "kind", "linuxcnc"
-    # Blocks are not rounded to periods: what is left of one goes to the next block.
+    # Blocks are not rounded to periods: the remainder is carried into the next block.
     yield "block_end", "carry"
     if (period_ns := ini.number("EMCMOT", "SERVO_PERIOD")) is not None:
         yield "interpolation_period_s", round(period_ns * 1e-9, 12)
@@ -126,7 +126,7 @@ def _controller(ini: _Ini, remarks: dict[str, str]) -> Iterator[tuple[str, Any]]
 
 def _notes(ini: _Ini) -> Iterator[str]:
     if ini.entries.get(("TRAJ", "ARC_BLEND_ENABLE"), ("1", 0))[0] == "0":
-        yield "[TRAJ] ARC_BLEND_ENABLE = 0: LinuxCNC looks one segment ahead then; the model looks further"
+        yield "[TRAJ] ARC_BLEND_ENABLE = 0: LinuxCNC then looks one segment ahead; the model looks further"
     for entry in ("PLANNER_TYPE", "MAX_LINEAR_JERK"):
         if ("TRAJ", entry) in ini.entries:
             yield f"[TRAJ] {entry}: the S-curve planner of LinuxCNC 2.10 is not modelled; that of 2.9 is"

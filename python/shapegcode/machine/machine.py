@@ -1,7 +1,7 @@
-"""The machine file, TOML: what shapegcode knows about a machine tool and its controller.
+"""The machine file (TOML): description of a machine tool and its controller.
 
-:class:`Machine` and its tables are the only place that holds defaults for it; ``docs/reference/machine.md`` is made of
-what each key says.
+:class:`Machine` and its tables are the only place for its defaults; ``docs/reference/machine.md`` is generated from
+the key descriptions.
 """
 
 from __future__ import annotations
@@ -50,27 +50,27 @@ from shapegcode.settings.load import (
 _ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
 _VARIABLE = re.compile(r"#\d+")
 _LOCK_LINES = ("lock_lines", "unlock_lines")
-_USUAL_DIAL_PERCENT = (70.0, 120.0)  # as far as operators turn it without thinking
+_USUAL_DIAL_PERCENT = (70.0, 120.0)  # usual range of operators
 
 
 class Machine(TomlTable):
     """A machine tool and its controller, as a machine file describes them."""
 
     name: Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[\x20-\x7e]+$")] = key(
-        "short name, in plain ASCII because it goes into the header of programs"
+        "short name, in plain ASCII for the header of programs"
     )
-    description: Text = key("what machine this is and where its numbers come from", default="")
+    description: Text = key("description of the machine and origin of its values", default="")
     axes: Axes = key("limits and vibration modes of the axes")
-    controller: Controller = key("how the controller moves the axes and what it accepts", default={})
-    times: Times = key("what takes time beside the motion", default={})
+    controller: Controller = key("how the controller moves the axes; its limits", default={})
+    times: Times = key("times in addition to the motion", default={})
     power_on: PowerOn = key("modal state before the first block", default={})
     input: Input = key("how programs are read", default={})
     feed_control: FeedControl = key("how the controller follows changes of the feed", default={})
     emission: Emission = key("how shaped programs are written", default={})
     shaping: Shaping = key("what is shaped, and how", default={})
-    tolerance: Tolerance = key("when an emitted program is good", default={})
-    price: Price = key("what shaping may cost in time", default={})
-    verdict: Verdict = key("under which conditions it must be good", default={})
+    tolerance: Tolerance = key("tolerances of an emitted program", default={})
+    price: Price = key("limits of the time added by shaping", default={})
+    verdict: Verdict = key("operating conditions in which the tolerances must be kept", default={})
 
     @model_validator(mode="after")
     def _block_period_fits(self) -> Machine:
@@ -112,7 +112,7 @@ class Machine(TomlTable):
             for number, mode in enumerate(axis.modes, start=1):
                 if not mode.excitation(index)[index]:
                     shares = mode.excited_by.model_dump() if mode.excited_by else {}
-                    limit = f"must have a share of {letter}: a mode is listed under an axis that excites it"
+                    limit = f"must have a component along {letter}: a mode is listed under an axis that excites it"
                     raise KeyProblem(f"axes.{letter}.modes.{number}.excited_by", shares, limit)
         return self
 
@@ -126,19 +126,19 @@ class Machine(TomlTable):
             for name, lines in zip(_LOCK_LINES, (emission.locking, emission.unlocking), strict=True):
                 if not lines:
                     none = f": no word that switches the feed override of {own.control} off is known" if own else ""
-                    limit = f'must say something with emission.override = "lock"{none}'
+                    limit = f'must not be empty with emission.override = "lock"{none}'
                     raise KeyProblem(f"emission.{name}", [], limit)
         variables = set(_VARIABLE.findall(" ".join((*emission.locking, *emission.unlocking))))
         kept = variables - {"#3003", "#3004"}
         for name, lines in (("prologue", emission.prologue), ("epilogue", emission.epilogue)):
             if used := kept & set(_VARIABLE.findall(" ".join(lines))):
-                limit = f"uses {min(used)}, in which emission.lock_lines keep the switch"
+                limit = f"uses {min(used)}, in which emission.lock_lines store the switch"
                 raise KeyProblem(f"emission.{name}", list(lines), limit)
         if variables and self.shaping.rapids:
             raise KeyProblem(
                 "shaping.rapids",
                 True,
-                'does not go with emission.override = "lock" and variables in emission.lock_lines: name the builder\'s '
+                'does not go with emission.override = "lock" and variables in emission.lock_lines: use the builder\'s '
                 'own codes there, such as ["M49"] and ["M48"], or use "any"',
             )
         if variables and not controller.holds_macros:
@@ -146,7 +146,7 @@ class Machine(TomlTable):
             raise KeyProblem(
                 "emission.override",
                 "lock",
-                f"emission.lock_lines set a variable, and none can be set with {why}: name the builder's own codes "
+                f"emission.lock_lines set a variable, but none can be set with {why}: use the builder's own codes "
                 'there, such as ["M49"] and ["M48"], or use "any"',
             )
         return self
@@ -156,7 +156,7 @@ class Machine(TomlTable):
         if self.shaping.planner == "optimal" and self.controller.kind == "fanuc":
             missing = [f"axes.{a}.max_jerk_mm_s3" for a in "xyz" if getattr(self.axes, a).max_jerk_mm_s3 is None]
             if missing:
-                limit = f'needs {", ".join(missing)}: state the largest jerk of each axis, or use "look-ahead"'
+                limit = f'needs {", ".join(missing)}: set the largest jerk of each axis, or use "look-ahead"'
                 raise KeyProblem("shaping.planner", "optimal", limit)
         return self
 
@@ -164,11 +164,11 @@ class Machine(TomlTable):
     _origins_in_comments: bool = PrivateAttr(default=False)
 
     def __eq__(self, other: object) -> bool:
-        """Whether the values are the same, wherever they come from."""
+        """True if the values are the same; origins are not compared."""
         return self.__dict__ == other.__dict__ if isinstance(other, Machine) else NotImplemented
 
     def __hash__(self) -> int:
-        """By the name: equal machines have the same one."""
+        """Hash of the name: equal machines have the same one."""
         return hash(self.name)
 
     @property
@@ -178,19 +178,19 @@ class Machine(TomlTable):
 
     @property
     def origin_warning(self) -> str:
-        """What to do about a file of the old form, whose comments say where values come from; empty: nothing."""
+        """Hint for an older file with origins in comments; empty for others."""
         if not self._origins_in_comments:
             return ""
         return (
-            "where its values come from is read from comments, as files before [origin] have it: "
+            "the origins of its values are read from comments, as in files before [origin]: "
             "shapegcode machine show FILE --write-origins writes it as a table"
         )
 
     def all_remarks(self) -> dict[str, str]:
-        """The remarks with one for every default: what is written down looks like a statement, and it stays one.
+        """The remarks, with one for every default, so that a written default keeps its origin.
 
         Returns:
-            By dotted key, for keys that the machine has.
+            By dotted key, for keys of the machine.
         """
         held = self.values()
         remarks = {value.key: value.remark for value in held if value.remark}
@@ -200,13 +200,13 @@ class Machine(TomlTable):
         return remarks
 
     def with_remarks(self, remarks: Mapping[str, str]) -> Machine:
-        """The same machine with other provenance of its values.
+        """Copy the machine with other provenance of its values.
 
         Args:
-            remarks: by dotted key, in place of those that there are; see `shapegcode.settings.load` for their form.
+            remarks: by dotted key, replacing the existing ones; see `shapegcode.settings.load` for their form.
 
         Returns:
-            A new machine; this one stays as it is.
+            A new machine; this one is unchanged.
         """
         copy = self.model_copy()
         copy._remarks = {**self._remarks, **remarks}
@@ -214,13 +214,13 @@ class Machine(TomlTable):
 
     @property
     def bears_override(self) -> bool:
-        """Whether emitted blocks are override-tolerant: asked for, or overrides stated in the verdict."""
+        """True if emitted blocks are override-tolerant: by emission.override, or by verdict.override_percent."""
         stated = self.verdict.override_percent != (100.0, 100.0)
         return self.emission.override == "any" or (self.emission.override == "ask" and stated)
 
     @property
     def dial_positions(self) -> tuple[float, ...]:
-        """Feed overrides, by 10 %, for which override-tolerant blocks are made: the stated band, or 70 to 120 %."""
+        """Feed overrides, in steps of 10 %, for which override-tolerant blocks are made: verdict's, or 70 to 120 %."""
         low, high = self.verdict.override_percent
         if low == high == 100.0:
             low, high = _USUAL_DIAL_PERCENT
@@ -231,14 +231,14 @@ class Machine(TomlTable):
     def load(cls, path_or_name: str | Path) -> Machine:
         """Load a machine file, or a built-in machine by its name.
 
-        A string without a folder and without ``.toml`` that names a built-in machine is that machine;
+        A string without folder and ``.toml`` that is the name of a built-in machine is that machine;
         everything else is a path.
 
         Args:
             path_or_name: the file, or the name.
 
         Returns:
-            The machine, its defaults filled in.
+            The machine with its defaults.
 
         Raises:
             MachineError: the file is not TOML or has wrong keys or values; every problem is listed.
@@ -254,7 +254,7 @@ class Machine(TomlTable):
 
     @classmethod
     def of(cls, machine: Machine | str | Path) -> Machine:
-        """A machine as it is, or loaded from its file or by its built-in name.
+        """Return a machine unchanged, or load it from its file or by its built-in name.
 
         Args:
             machine: the machine, its file or its name.
@@ -269,9 +269,7 @@ class Machine(TomlTable):
         if isinstance(machine, cls):
             return machine
         if not isinstance(machine, str | Path):
-            raise ArgumentError(
-                f"machine: a Machine, a file or a built-in name is needed, not {type(machine).__name__}"
-            )
+            raise ArgumentError(f"machine: must be a Machine, a file or a built-in name, not {type(machine).__name__}")
         return cls.load(machine)
 
     @classmethod
@@ -284,9 +282,9 @@ class Machine(TomlTable):
         rapid_mm_per_min: float = 24_000.0,
         max_acceleration_mm_per_s2: float = 3000.0,
     ) -> Machine:
-        """A machine of which little is known: its modes, and limits that all axes share.
+        """Make a machine from its modes and limits common to all axes.
 
-        Everything else is a default of the machine file, and counts as assumed, as do limits that are not given.
+        Everything else is a default of the machine file and counts as assumed, as do limits that are not given.
 
         Args:
             modes: by axis ("x", "y", "z"): natural frequencies in Hz (damping ratio 0.02 assumed) or modes, one or
@@ -297,14 +295,14 @@ class Machine(TomlTable):
             max_acceleration_mm_per_s2: largest acceleration while cutting, mm/s².
 
         Returns:
-            The machine; `with_values` gives others of its keys, `to_toml` its file.
+            The machine; `with_values` changes keys, `to_toml` returns its file.
 
         Raises:
             ArgumentError: an axis other than x, y, z.
-            MachineError: a value that a machine file could not have.
+            MachineError: a value that is invalid in a machine file.
         """
         if unknown := set(modes) - set("xyz"):
-            raise ArgumentError(f"modes: {min(unknown)!r} is no axis: x, y, z are")
+            raise ArgumentError(f"modes: {min(unknown)!r} is not an axis: x, y, z are")
         limits = {
             "max_feed_mm_per_min": max_feed_mm_per_min,
             "rapid_mm_per_min": rapid_mm_per_min,
@@ -327,7 +325,7 @@ class Machine(TomlTable):
             source: its name in messages.
 
         Returns:
-            The machine, its defaults filled in.
+            The machine with its defaults.
 
         Raises:
             MachineError: not TOML, or wrong keys or values; every problem is listed.
@@ -336,15 +334,15 @@ class Machine(TomlTable):
 
     @classmethod
     def from_data(cls, data: dict[str, Any], source: str = "<data>", text: str = "") -> Machine:
-        """Validate the tables of a machine file; *source* names it in messages, *text* gives them line numbers.
+        """Validate the tables of a machine file; *source* names it in messages, *text*: for line numbers.
 
         Args:
-            data: tables of the file, as TOML gives them.
+            data: tables of the file, as parsed from TOML.
             source: their name in messages.
             text: the file, for line numbers.
 
         Returns:
-            The machine, its defaults filled in.
+            The machine with its defaults.
 
         Raises:
             MachineError: wrong keys or values; every problem is listed.
@@ -380,7 +378,7 @@ class Machine(TomlTable):
             name: one of `builtin_names`.
 
         Returns:
-            The file, word for word.
+            The unchanged file.
 
         Raises:
             MachineError: no built-in machine of that name.
@@ -391,12 +389,12 @@ class Machine(TomlTable):
         return (resources.files("shapegcode") / "data" / f"{name}.toml").read_text(encoding="utf-8")
 
     def to_toml(self, remarks: Mapping[str, str] | None = None, *, short: bool = False) -> str:
-        """The machine as a commented machine file, which loads back to an equal machine; origins of values stay.
+        """Write the machine as a commented machine file, which loads as an equal machine with the same origins.
 
         Args:
             remarks: text for the end of a key's line by its dotted key (modes count from 1:
-                ``axes.x.modes.1.frequency_hz``), for example where the value comes from; in place of the machine's own.
-            short: leave out what is a default, and the words on what each key means.
+                ``axes.x.modes.1.frequency_hz``), for example the origin of the value; replacing the machine's own.
+            short: leave out defaults and the descriptions of keys.
 
         Returns:
             The text of the file.
@@ -416,21 +414,21 @@ class Machine(TomlTable):
     @overload
     def with_values(self, values: Mapping[str, object], /, *, source: str = "") -> Machine: ...
     def with_values(self, key: str | Mapping[str, object], value: object = None, /, *, source: str = "") -> Machine:
-        """The machine with other values for some keys, checked as those of a machine file are.
+        """Copy the machine with other values for some keys, checked as in a machine file.
 
         >>> machine.with_values("tolerance.contour_um", 5)
         >>> machine.with_values({"shaping.family": "zvd", "axes.x.modes.1.frequency_hz": 44.5})
 
         Args:
             key: dotted name of a key (modes count from 1, as `shapegcode machine show` prints them), or values by key.
-            value: of the key, in its unit; None takes the key out, so that its default holds.
-            source: names the machine in messages; its name where this is left out.
+            value: of the key, in its unit; None deletes the key, so that its default applies.
+            source: names the machine in messages; default: its name.
 
         Returns:
-            A new machine; this one stays as it is.
+            A new machine; this one is unchanged.
 
         Raises:
-            MachineError: no such key, or a value that a machine file could not have; every problem is listed.
+            MachineError: no such key, or a value that is invalid in a machine file; every problem is listed.
         """
         values = {key: value} if isinstance(key, str) else key
         changed = with_values(self, values, source or self.name, MachineError)
@@ -446,13 +444,13 @@ class Machine(TomlTable):
 
 
 def _wrong_origin(key: str, origin: object, keys: Mapping[str, str]) -> str:
-    """What an origin must be; empty: it is so."""
+    """Rule that an origin violates; empty if it is valid."""
     if key not in keys and not any(key.startswith(f"{each}.") and keys[each].startswith("{") for each in keys):
-        return "no such key of this machine (modes count from 1): take the line out"
+        return "no such key of this machine (modes count from 1): delete the line"
     if isinstance(origin, str) and re.match(ORIGIN_TEXT, origin):
         return ""
     if isinstance(origin, list):
-        return "must be one: this value has two, in [origin] and beside it, or in two spellings of its key"
+        return "must be one: this value has two, in [origin] and next to it, or in two spellings of its key"
     return (
         "must be measured, parameters (of the control), inherited, assumed, choice, default or stated; a note may "
         'follow: "measured: tap of 3 May"'
@@ -463,7 +461,7 @@ _OF_A_MACHINE = ("axes.", "controller.", "times.", "power_on.", "feed_control.")
 
 
 def inherited_text(name: str) -> str:
-    """A built-in machine's file as the start of another one: its measured values become inherited."""
+    """A built-in machine's file as a template: its measured values become inherited."""
     from shapegcode.settings.edit import with_remarks
 
     text = Machine.builtin_text(name)

@@ -1,4 +1,4 @@
-"""How a machine file has programs read (offsets, variables, other programs), shaped and written; when they are good."""
+"""Machine file: how programs are read (offsets, variables, called programs), shaped and written; their tolerances."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from shapegcode.settings.keys import Bool, Float, NonNegative, Positive, Text, T
 
 
 def _named(pattern: str, wrong: str, shown: Callable[[str], str] = json.dumps) -> AfterValidator:
-    """Refuse a table with a name that does not have the form."""
+    """Refuse names in a table that do not match the pattern."""
 
     def check(table: dict[str, Any]) -> dict[str, Any]:
         for name in table:
@@ -27,11 +27,11 @@ def _named(pattern: str, wrong: str, shown: Callable[[str], str] = json.dumps) -
 
 
 _OFFSETS = _named(
-    r"G5[4-9]|G54\.1P[1-9][0-9]{0,2}", 'is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"', str
+    r"G5[4-9]|G54\.1P[1-9][0-9]{0,2}", 'is not a work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"', str
 )
-_NUMBERED = _named("[1-9][0-9]{0,7}", 'is no number; names are whole numbers, for example "1"')
-_G_CODED = _named(r"[1-9][0-9]{0,3}(\.[1-9])?", 'is no G code; names are for example "120" or "120.1"')
-_RETAINED = _named("[5-9][0-9]{2}", 'is no variable that the control keeps: "500" ... "999"')
+_NUMBERED = _named("[1-9][0-9]{0,7}", 'is not a number; names are whole numbers, for example "1"')
+_G_CODED = _named(r"[1-9][0-9]{0,3}(\.[1-9])?", 'is not a G code; names are for example "120" or "120.1"')
+_RETAINED = _named("[5-9][0-9]{2}", 'is not a retained variable: "500" ... "999"')
 _Whole = Annotated[int, Strict(), Field(ge=0)]
 _Lengths = Annotated[dict[str, Float], _NUMBERED]
 _Programs = dict[str, Annotated[int, Strict(), Field(ge=1, le=99_999_999)]]
@@ -49,7 +49,7 @@ class Input(TomlTable):
         'G02 or G03 without R, I, J, K: "alarm" 0022, or a "line" to its end', fanuc="3403#5", assumed="alarm"
     )
     tool_change_unknown_axes: Annotated[str, Strict(), Field(pattern=r"^X?Y?Z?$")] = key(
-        "axes whose position is not known after M06, until they are programmed again; letters of XYZ in this order",
+        "axes whose position is unknown after M06 until programmed again; letters of XYZ in this order",
         assumed="XYZ",
     )
     work_offsets: Annotated[dict[str, tuple[Float, Float, Float]], _OFFSETS] = key(
@@ -66,20 +66,20 @@ class Input(TomlTable):
         "tool length by offset number H; with it the Z travel of a tool length change is known", default={}
     )
     tool_table: Text = key(
-        "LinuxCNC's tool table, or the INI file that names it ([EMCIO] TOOL_TABLE, [TRAJ] LINEAR_UNITS), for programs "
-        "in its words; left out: tool.tbl beside the program, if there is one. tool_length_mm and tool_radius_mm come "
-        "first",
+        "LinuxCNC's tool table, or the INI file that refers to it ([EMCIO] TOOL_TABLE, [TRAJ] LINEAR_UNITS), for "
+        "programs in its dialect; left out: tool.tbl in the folder of the program, if it exists. tool_length_mm and "
+        "tool_radius_mm take precedence",
         default="",
     )
     machine_unit: Literal["mm", "inch"] = key(
-        "unit of LinuxCNC's machine ([TRAJ] LINEAR_UNITS), in which its tool table, its offsets #5211 to #5383 and "
-        "those of the tool #5401 to #5410 are; an INI file in tool_table comes first",
+        "unit of LinuxCNC's machine ([TRAJ] LINEAR_UNITS), of its tool table, its offsets #5211 to #5383 and "
+        "those of the tool #5401 to #5410; an INI file in tool_table takes precedence",
         default="mm",
     )
     tool_length_wear_mm: _Lengths = key("wear of the length by offset number H", default={})
     compensation: Literal["refuse", "expand", "keep"] = key(
         'what `convert` does with cutter compensation G41/G42. "refuse": stops with an error; "expand": shapes the '
-        'tool path for the radius given here, so that the offset in the control no longer acts; "keep": leaves these '
+        'tool path for the radius given here; the offset in the control is then without effect; "keep": leaves these '
         "moves unchanged. Cycle time and pictures always use the expanded path where the radius is known",
         default="refuse",
     )
@@ -87,35 +87,35 @@ class Input(TomlTable):
         "kind of the start-up and cancel moves of cutter compensation", fanuc="5003#0, #1", assumed="A"
     )
     material_side: Literal["left", "right"] | None = optional(
-        "side of the programmed tool path on which the workpiece lies, seen along the travel: right where the contour "
-        "is cut as with G41, left as with G42; with it deviations are reported as gouge and excess; left out: not "
-        "known"
+        "side of the programmed tool path on which the workpiece lies, in the direction of travel: right if the "
+        "contour is cut as with G41, left as with G42; with it deviations are reported as gouge and excess; left out: "
+        "not known"
     )
     scale_unit: Annotated[Positive, Field(le=1)] = key(
         "unit of the factors P, I, J, K of scaling G51 without a decimal point", unit="1", fanuc="5400#7", assumed=0.001
     )
     peck_clearance_mm: NonNegative = key(
-        "distance to which a peck of G73 and G83 returns before it feeds on; for the cycle time",
+        "clearance at which a peck of G73 and G83 changes to feed; for the cycle time",
         fanuc="5114, 5115",
         assumed=0.5,
     )
     block_skip: Literal["unknown", "on", "off"] = key(
         'block-skip switch on the panel: "on": blocks with / do not run; "off": they run; "unknown": either may be '
-        "true, and nothing is shaped whose state depends on it",
+        "true, and cuts whose state depends on it are not shaped",
         default="unknown",
     )
     variables: Annotated[dict[str, Float], _RETAINED] = key(
-        'values of the variables that the control keeps, #500 ... #999, for macros that read them: { "500" = 12.5 }',
+        'values of the retained variables, #500 ... #999, for macros that read them: { "500" = 12.5 }',
         default={},
     )
     program_folders: tuple[Text, ...] = key(
-        "folders in which programs are looked for that a file calls and does not hold (O0123, O0123.nc, 0123.NC ...); "
+        "folders to search for called programs that are not in the file (O0123, O0123.nc, 0123.NC ...); "
         "the folder of the calling file comes first",
         default=(),
     )
     opaque_programs: tuple[_Whole, _Whole] = key(
         "first and last O number of programs of the machine builder or of a probe: a call of one that is not available "
-        "is left unchanged, and position and variables are unknown after it; outside of this range a missing program "
+        "is left unchanged, and position and variables are unknown after it; outside this range a missing program "
         "is an error",
         assumed=(9000, 9999),
     )
@@ -146,7 +146,7 @@ class Emission(TomlTable):
 
     dialect: DialectName = key(
         "control for which `convert` writes (for input programs: controller.dialect); other commands that write "
-        "programs refuse all but fanuc",
+        "programs accept fanuc only",
         default="fanuc",
     )
     words: dict[str, Text] = key(
@@ -156,7 +156,7 @@ class Emission(TomlTable):
         default={},
     )
     feed_form: Literal["constant", "linear"] = key(
-        'feed of shaped blocks. "constant": each block has its own; "linear": from the F of the block before to its '
+        'feed of shaped blocks. "constant": each block has its own; "linear": from the F of the previous block to its '
         'own, linear along its path (FLIN), which needs fewer blocks; only for dialect = "siemens", and not tested on '
         "a control",
         default="constant",
@@ -175,7 +175,7 @@ class Emission(TomlTable):
     )
     epilogue: tuple[Text, ...] = key("lines written after each shaped cut", default=())
     override: Literal["ask", "any", "lock"] = key(
-        'how shaped cuts deal with the feed override. "ask": the header asks the operator for 100 %; with a wider '
+        'treatment of the feed override in shaped cuts. "ask": the header asks the operator for 100 %; with a wider '
         'verdict.override_percent as "any". "lock": lock_lines switch the feed override off before each shaped cut, '
         'unlock_lines switch it on again after it; "any": blocks of equal duration and a block period for which other '
         "overrides cause little vibration (a larger program)",
@@ -202,14 +202,14 @@ class Emission(TomlTable):
         default=60.0,
     )
     restart_stops: Bool = key(
-        "let a shaped cut stop to make a restart point if it is nowhere nearly at rest for restart_interval_s: costs "
+        "let a shaped cut stop for a restart point if it is not nearly at rest within restart_interval_s: costs "
         "time, and the tool dwells in the cut",
         default=False,
     )
     compensation_guard: Literal["alarm", "stop"] = key(
         'where cutter compensation was expanded: "alarm" compares the offset in the control with the expanded radius '
-        'and raises an alarm if it differs; "stop" halts with M00 for the operator to compare (always so where '
-        "programs are drip fed: IF cannot run from there)",
+        'and raises an alarm if it differs; "stop" halts with M00 for the operator to compare (always if '
+        "programs are drip fed, where IF cannot run)",
         default="alarm",
     )
     header: Bool = key(
@@ -217,25 +217,25 @@ class Emission(TomlTable):
         default=True,
     )
     failed_suffix: Annotated[str, Strict(), Field(min_length=1, pattern=r"^[^/\\\x00-\x1f]+$")] = key(
-        "added to the name of an output that misses its tolerance, so that it is not run by mistake",
+        "suffix for an output that misses its tolerance, so that it is not run by mistake",
         default=".out-of-tolerance",
     )
     max_line_length: Annotated[int, Strict(), Field(ge=30, le=250)] = key(
         "longest line written", unit="characters", assumed=60
     )
     arc_min_chord_mm: NonNegative = key(
-        "a piece of an arc with a shorter chord is written as a line: rounding could turn it into a full circle",
+        "part of an arc with a shorter chord is written as a line: rounding could turn it into a full circle",
         default=0.02,
     )
     merge_tolerance_increments: NonNegative = key(
-        "blocks are merged into one where the path and the feed stay within this many least increments; "
+        "blocks are merged into one if path and feed stay within this many least increments; "
         "0: only where they agree exactly",
         unit="increments",
         default=0.35,
     )
     rounding: Literal["vibration", "nearest"] = key(
-        'how the ends of blocks are rounded. "vibration": to that of the two neighbouring increments that leaves the '
-        'modes at rest; "nearest": each to the nearest increment, which leaves up to several increments of vibration',
+        'rounding of block ends. "vibration": to that of the two neighbouring increments that leaves the '
+        'modes at rest; "nearest": each to the nearest increment, with a vibration of up to several increments',
         default="vibration",
     )
 
@@ -244,9 +244,9 @@ class Emission(TomlTable):
     def _codes(cls, words: dict[str, str]) -> dict[str, str]:
         for word, text in words.items():
             if not re.fullmatch(r"[GM]\d{1,4}(\.\d)?", word):
-                raise ValueError(f'{json.dumps(word)} is no G or M code; names are for example "M11" or "G05.1"')
+                raise ValueError(f'{json.dumps(word)} is not a G or M code; names are for example "M11" or "G05.1"')
             if not _BLOCK_CHARACTERS.fullmatch(text):
-                raise ValueError(f"{json.dumps(text)} for {word} has a character that a program may not hold")
+                raise ValueError(f"{json.dumps(text)} for {word} has a character that is not allowed in a program")
         if len({code_name(word) for word in words}) < len(words):
             raise ValueError("a code is named twice, with leading zeros and without")
         return words
@@ -258,7 +258,7 @@ class Emission(TomlTable):
             if not _BLOCK_CHARACTERS.fullmatch(line):
                 raise ValueError(
                     f"the line {json.dumps(line)} has a character other than capital letters, digits and "
-                    "signs that a program may hold (no %, no end of line)"
+                    "signs allowed in a program (no %, no end of line)"
                 )
         return lines
 
@@ -270,7 +270,7 @@ class Emission(TomlTable):
                 raise ValueError(f"the line {json.dumps(line)} has {len(line)} characters, {limit}")
         for name, stated in (("words", self.words), ("decimals", self.decimals)):
             if stated and self.dialect == "fanuc":
-                raise ValueError(f"{name} counts only where emission.dialect is another one than fanuc")
+                raise ValueError(f"{name} has an effect only if emission.dialect is not fanuc")
         if self.feed_form == "linear" and self.dialect != "siemens":
             raise ValueError(
                 f'feed_form = "linear" with dialect = "{self.dialect}": no word for a feed linear along a block is '
@@ -280,12 +280,12 @@ class Emission(TomlTable):
 
     @property
     def locking(self) -> tuple[str, ...]:
-        """Lines that switch the feed override off, the dialect's own in place of FANUC's; none where it is not."""
+        """Lines that switch the feed override off, in the dialect's words; empty if it is not locked."""
         return self._override_lines(0, self.lock_lines)
 
     @property
     def unlocking(self) -> tuple[str, ...]:
-        """Lines that switch it on again, likewise."""
+        """Lines that switch the feed override on again, likewise."""
         return self._override_lines(1, self.unlock_lines)
 
     def _override_lines(self, rank: int, stated: tuple[str, ...]) -> tuple[str, ...]:
@@ -296,23 +296,23 @@ class Emission(TomlTable):
 
     @property
     def around_cuts(self) -> Mapping[str, tuple[str, ...]]:
-        """Lines before and behind a shaped cut, by what they are for."""
+        """Lines before and after a shaped cut, by their purpose."""
         return {"PROLOGUE": self.prologue, "EPILOGUE": self.epilogue, "LOCK": self.locking, "UNLOCK": self.unlocking}
 
     @property
     def position_decimals(self) -> int | None:
-        """Decimals of positions in mm that are finer than the control's own; None: as these."""
+        """Decimals of positions in mm; None: those of the control's increment."""
         own = dialect_of(self.dialect)
         return self.decimals if own is None or self.decimals is not None else own.decimals
 
     @property
     def prefill_lines(self) -> tuple[str, ...]:
-        """The dwell before each shaped cut, as a line; none where there is none."""
+        """The dwell before each shaped cut as a line; empty if it is 0."""
         return (f"G04P{round(self.prefill_dwell_s * 1e3)}",) if self.prefill_dwell_s > 0.0 else ()
 
     @property
     def leaves_look_ahead(self) -> bool:
-        """Whether the prologue switches a look-ahead mode off: G05.1 Q0 or G08 P0."""
+        """True if the prologue switches a look-ahead mode off: G05.1 Q0 or G08 P0."""
         last = [found for line in self.prologue for found in _LOOK_AHEAD.findall(line)]
         return bool(last) and last[-1] == "0"
 
@@ -328,39 +328,40 @@ class Shaping(TomlTable):
 
     max_duration_s: Annotated[Positive, Field(le=10)] = key("longest shaper that is accepted", default=0.25)
     family: _Family = key(
-        'family of the shaper (`shapegcode shaper` compares them); "auto": the shortest without negative impulses, '
-        "exact at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
+        'family of the shaper (`shapegcode shaper` compares them). "auto": the shortest one without negative impulses '
+        "with zero residual at the modes, or below vibration_limit over their bands if these have "
+        "frequency_uncertainty_percent",
         default="auto",
     )
     per_axis: Bool = key(
-        "a shaper for each axis, which cancels only that axis' modes: shorter than one for all, usable because the "
-        'contour is brought back (not with contour = "off", stated bands, or modes that move with an axis)',
+        "one shaper per axis, for that axis' modes only: shorter than one for all. Needs contour compensation (so not "
+        'contour = "off", stated bands, or modes that move with an axis)',
         default=False,
     )
     vibration_limit: Annotated[Positive, Field(lt=1)] = key(
-        "largest residual vibration over the modes' bands as a share of the unshaped one, for families that leave some",
+        "largest residual ratio over the modes' bands, for families with a residual",
         unit="1",
         default=0.05,
     )
     arc_feed_ratio: Annotated[Positive, Field(le=1)] = key(
-        "feed in arcs as a share of the programmed feed, reached before the arc begins; 1: no reduction", default=1.0
+        "feed in arcs relative to the programmed feed, reached before the arc begins; 1: no reduction", default=1.0
     )
     contour: Literal["response", "command", "off"] = key(
-        "what contour compensation keeps on the programmed path behind the shaper, at the highest feed within "
-        'tolerance.contour_um: "response" is the table with its modes, and so the part; "command" the set-points; '
-        '"off": neither, the feed alone keeps the command within the tolerance',
+        'what contour compensation keeps on the path at the highest feed within tolerance.contour_um. "response": the '
+        'table with its modes, and so the part; "command": the set-points; "off": no compensation, a lower feed '
+        "keeps the command within the tolerance",
         default="response",
     )
     planner: Literal["auto", "look-ahead", "optimal"] = key(
-        'what plans the command of a cut before it is shaped. "look-ahead": as a FANUC control\'s look-ahead, by its '
-        'law of acceleration and its rule for corners; "optimal": as fast as feed, acceleration and jerk of the axes '
+        'planner of the command of a cut before shaping. "look-ahead": as a FANUC control\'s look-ahead, by its '
+        'law of acceleration and its corner rule; "optimal": as fast as feed, acceleration and jerk of the axes '
         "allow, corners and short moves rounded within tolerance.contour_um (needs axes.*.max_jerk_mm_s3); "
         '"auto": "look-ahead" where controller.kind is "fanuc", else "optimal"',
         default="auto",
     )
     jerk_time_s: Annotated[Positive, Field(ge=0.001, le=1)] = key(
         'time in which a cut planned by "optimal" builds up max_acceleration_mm_s2 of an axis without max_jerk_mm_s3, '
-        'where controller.kind is not "fanuc": those planners know no jerk',
+        'where controller.kind is not "fanuc": those planners have no jerk limit',
         assumed=0.05,
     )
     rapids: Bool = key(
@@ -369,18 +370,18 @@ class Shaping(TomlTable):
         default=False,
     )
     least_gain_um: NonNegative = key(
-        "a cut stays unchanged unless shaping lowers residual vibration or the contour error of the machine table by "
+        "a cut is left unchanged unless shaping lowers residual vibration or the contour error of the machine table by "
         "at least this; 0: everything is shaped",
         default=3.0,
     )
     plunge_angle_deg: Annotated[NonNegative, Field(le=90)] = key(
-        "a corner is a forced stop of the shaped command if a side of it leans from the Z axis by no more than "
+        "a corner is a forced stop of the shaped command if one side of it is inclined to the Z axis by no more than "
         "this and the direction changes by 45 degrees or more: a shaper must not mix plunges with other cuts",
         default=15.0,
     )
     part_mass_kg: NonNegative | None = optional(
-        "mass of the part on the table, for modes with a table over mass_kg; left out: not known, and their "
-        "nominal frequency holds"
+        "mass of the part on the worktable, for modes whose frequency depends on it (frequency_over); left out: "
+        "nominal frequency"
     )
 
 
@@ -388,34 +389,34 @@ _Override = Annotated[Positive, Field(le=254)]
 
 
 class Tolerance(TomlTable):
-    """When an emitted program is good: outside these limits the conversion says so and exits with 1."""
+    """Tolerances of an emitted program; if one is missed, the conversion reports it and exits with 1."""
 
     contour_um: Annotated[Positive, Field(ge=0.001, le=1e6)] = key(
-        "largest deviation from the programmed path of what shaping.contour names: the response, or the command",
+        "largest deviation from the programmed path of the target of shaping.contour: the response, or the command",
         default=20.0,
     )
     residual_ratio: Annotated[NonNegative, Field(le=1)] = key(
-        "residual vibration passes if it is below this share of the original program's, or below residual_floor_um",
+        "residual vibration passes if it is below this ratio to the original program's, or below residual_floor_um",
         default=0.25,
     )
     residual_floor_um: NonNegative = key(
         "residual vibration below this passes whatever the original's was", default=3.0
     )
     residual_floor_increments: NonNegative = key(
-        "residual vibration below this passes too: rounding the words alone may leave a lightly damped mode so much",
+        "residual vibration below this passes too: rounding of words may excite a lightly damped mode that much",
         unit="increments",
         default=5.0,
     )
     feed_excess_ratio: Annotated[NonNegative, Field(ge=0.01, le=10)] = key(
         "ratio by which the set-points may be faster along the path than the programmed feed at the same position, "
-        "averaged over one, four and sixteen shortest blocks, less the two increments by which rounding may lengthen "
-        "a block; contour compensation keeps to it, and needs at least 0.01",
+        "averaged over one, four and sixteen shortest blocks; two increments are subtracted, since rounding may "
+        "lengthen a block by that much. Contour compensation keeps to it, and needs at least 0.01",
         default=0.05,
     )
 
 
 class Price(TomlTable):
-    """What shaping may cost: a cut that costs more gets the tightest tolerance within the price, or stays as it is."""
+    """Limits of the added time: a cut beyond them gets the tightest possible tolerance or is left unchanged."""
 
     program_time_percent: Annotated[Positive, Field(le=1e6)] = key(
         "largest increase of the program's time", default=10.0
@@ -424,11 +425,11 @@ class Price(TomlTable):
 
 
 ANY_PRICE = {"price.program_time_percent": 1e6, "price.cut_time_percent": 1e6}
-"""Values of a machine on which shaping may take any time: where its effect is asked for, not its worth."""
+"""Values for shaping at any price: to determine its effect, not its worth."""
 
 
 class Verdict(TomlTable):
-    """The stated band: which of the cases that are simulated decide. All are shown; 100 % override always counts."""
+    """Operating conditions that decide the verdict. All are simulated and shown; 100 % override always counts."""
 
     plant: Literal["modal", "feed-drive"] = key(
         'model between command and machine table. "modal": ideal servo and vibration modes, so that the verdict does '
@@ -438,17 +439,17 @@ class Verdict(TomlTable):
         default="modal",
     )
     override_percent: tuple[_Override, _Override] = key(
-        "lowest and highest feed override under which the program will run: every case in between must be good. The "
-        "header of a program asks for 100 %, so only that counts unless you state more",
+        "lowest and highest feed override of the program: every override in between must be within tolerance. The "
+        "header of a program asks for 100 %, so only that counts by default",
         default=(100.0, 100.0),
     )
     mode_uncertainty: Bool = key(
-        "whether every mode must be allowed to be off by its frequency_uncertainty_percent, with less damping by its "
-        "damping_uncertainty_percent; modes that state neither are taken as exact",
+        "whether modes shifted by their frequency_uncertainty_percent count, with damping reduced by their "
+        "damping_uncertainty_percent; modes without these are taken as exact",
         default=True,
     )
     block_end: Literal["both", "own"] = key(
-        '"both": the program must be good under either rule of block timing; "own": under controller.block_end, '
+        '"both": within tolerance with either rule of block timing; "own": with controller.block_end, '
         "for a controller whose rule is known",
         default="both",
     )
@@ -458,11 +459,11 @@ class Verdict(TomlTable):
         default=False,
     )
     starved_block: Bool = key(
-        "whether the program must be good if the block buffer runs empty once, at the worst place; false: it never "
-        "does (memory or a data server, emission.prefill_dwell_s)",
+        "whether the program must be within tolerance if the buffer runs empty once, at the worst position; false: it "
+        "never does (memory or a data server, emission.prefill_dwell_s)",
         default=False,
     )
-    starved_s: Annotated[Positive, Field(le=10)] = key("how long the axes then wait for the next block", assumed=0.02)
+    starved_s: Annotated[Positive, Field(le=10)] = key("duration of the buffer underrun", assumed=0.02)
 
     @model_validator(mode="after")
     def _band_ascends(self) -> Verdict:

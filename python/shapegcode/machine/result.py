@@ -1,4 +1,4 @@
-"""What the machine's own commands find: a parameter dump as a machine, and every value of a machine with its origin."""
+"""Result of the import of a parameter dump as a machine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shapegcode.results.table import Column, Table
 from shapegcode.settings.keys import toml
 
 DEFAULT_WHY = "default of the machine file"
-"""Why a value is assumed that the dump does not hold and no decision was needed for."""
+"""Reason of a value that is not in the dump and needed no decision."""
 _SHOWN = 20
 
 Value = bool | int | float | str | tuple[int, ...] | Xyz[float]
@@ -23,43 +23,43 @@ Value = bool | int | float | str | tuple[int, ...] | Xyz[float]
 
 @dataclass(frozen=True)
 class ReadParameter:
-    """A value of a dump and the key that it went into."""
+    """A value of a dump and the key in which it is stored."""
 
     parameter: int  # number of the parameter
-    axis: str  # "A1" ... of an axis, "S1" ... of a spindle, "L1" ... of a path; empty where the value has none
-    raw: str  # the value as it stands there, with its letter
-    line: int  # of the dump, from 1
+    axis: str  # "A1" ... of an axis, "S1" ... of a spindle, "L1" ... of a path; empty if the value has none
+    raw: str  # the value as written, with its letter
+    line: int  # line of the dump, from 1
     key: str  # dotted name in the machine file
-    value: Value  # of the key; several values of a dump may make one
+    value: Value  # value of the key; may combine several values of the dump
 
 
 @dataclass(frozen=True)
 class ReadTable:
-    """A table of offsets or variables of the control, and the key that it went into."""
+    """A table of offsets or variables of the control, and the key in which it is stored."""
 
     file: str  # name of the file
-    first_line: int  # of it, from 1
-    last_line: int  # of it
+    first_line: int  # first line, from 1
+    last_line: int  # last line
     key: str  # dotted name in the machine file
-    count: int  # how many values the key has
+    count: int  # number of values in the key
 
 
 @dataclass(frozen=True)
 class AssumedValue:
-    """What the dump does not say, and what is taken for it."""
+    """An assumed value that is not in the dump."""
 
-    key: str  # dotted name in the machine file, or the fact in words
-    value: Value  # what is taken
-    why: str  # in words
+    key: str  # dotted name in the machine file, or the fact as text
+    value: Value  # the assumed value
+    why: str  # reason
 
 
 @dataclass(frozen=True)
 class MissingParameter:
-    """What the dump does not hold, or what was not understood."""
+    """A parameter that is missing, not understood or not used."""
 
-    parameter: str  # number of the parameter; empty where it is none
-    line: int | None  # of the dump, from 1; None where it is about none
-    why: str  # in words
+    parameter: str  # number of the parameter; empty if it is not one parameter
+    line: int | None  # line of the dump, from 1; None without a line
+    why: str  # reason
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -68,13 +68,13 @@ class ParameterImport(Result):
 
     Attributes:
         dump: name of the dump.
-        machine: the machine that it describes.
-        read: per value that was taken, in the order of the keys.
-        tables_read: per key that a table of offsets or variables gave.
-        assumed: what is an assumption.
-        missing: what the dump does not say or what was not understood.
-        remarks: text behind the keys of the machine file: where each value comes from.
-        warnings: none; caution stands under `assumed` and `missing`.
+        machine: the machine described by the dump.
+        read: values stored in keys, in the order of the keys.
+        tables_read: keys from tables of offsets or variables.
+        assumed: assumed values.
+        missing: parameters missing in the dump, not understood or not used.
+        remarks: text after the keys of the machine file: origin of each value.
+        warnings: none; see `assumed` and `missing`.
     """
 
     dump: str
@@ -88,7 +88,7 @@ class ParameterImport(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether anything was read: a machine of nothing but assumptions is none."""
+        """True if anything was read: a machine consisting only of assumptions is useless."""
         return bool(self.read or self.tables_read)
 
     @property
@@ -114,10 +114,10 @@ class ParameterImport(Result):
         return self.next_step_after("MACHINE")
 
     def next_step_after(self, file: str) -> str:
-        """The same with the name of the machine file that was written.
+        """Next step with the name of the machine file that was written.
 
         Args:
-            file: name of it.
+            file: name of the machine file.
 
         Returns:
             One sentence.
@@ -126,23 +126,23 @@ class ParameterImport(Result):
             return "punch the parameters out again (CNC-PARA.TXT, all of them), and import that."
         find = f"shapegcode identify TAP.csv --update {file}"
         if not any(axis.modes for axis in self.machine.axes.as_tuple()):
-            return f"find the vibration modes, which no dump holds: {find}."
+            return f"find the vibration modes, which a dump does not contain: {find}."
         axes = zip("xyz", self.machine.axes.as_tuple(), strict=True)
         open_axes = [letter for letter, axis in axes if not axis.modes and not axis.rigid]
         if open_axes:
             names = ", ".join(open_axes).upper()
-            return f"tap {names}, whose modes nobody knows: {find}."
+            return f"tap {names}, whose modes are unknown: {find}."
         return "measure the assumed values: shapegcode characterize."
 
     def to_toml(self) -> str:
-        """The machine file, each value with the parameter it comes from."""
+        """Text of the machine file, each value with its parameter."""
         return self.machine.to_toml(self.remarks)
 
     def tables(self, *, everything: bool = True) -> list[Table]:
-        """What was read, assumed and missed; those of them that have rows.
+        """Tables of values read, assumed and missing; only those with rows.
 
         Args:
-            everything: each value in a row of its own, with where it comes from; else the keys by table of the file.
+            everything: one row per value, with its origin; else the keys by table of the file.
 
         Returns:
             The tables.
@@ -170,7 +170,7 @@ class ParameterImport(Result):
         return [table for table in found if table.rows]
 
     def _keys_by_table(self) -> Table:
-        """Keys by table of the machine file: those that were read, and those for which a decision was taken."""
+        """Keys by table of the machine file: those read, and those decided."""
         tables: dict[str, tuple[list[str], list[str]]] = {}
         decided = [row.key for row in self.assumed if row.why != DEFAULT_WHY]
         read = [*(row.key for row in self.read), *(row.key for row in self.tables_read)]
@@ -191,7 +191,7 @@ class ParameterImport(Result):
         return Table("", columns, list(alike.items()), caption=f"{more}--verbose: every value, its line, and why")
 
     def _missing_numbers(self) -> Table:
-        """Parameters by why they are missing, the first of many."""
+        """Missing parameters by reason, the first ones of many."""
         reasons: dict[str, list[str]] = {}
         for row in self.missing:
             reasons.setdefault("not in the dump" if row.line is None else "not understood or not used", []).append(
@@ -210,7 +210,7 @@ def _first_of(names: Sequence[str]) -> str:
 
 
 def _origins(rows: list[ReadParameter]) -> str:
-    """Where the value of a key comes from: "line 11: 1660 A1 P900.0 A2 P700.0"."""
+    """Origin of the value of a key: "line 11: 1660 A1 P900.0 A2 P700.0"."""
     words = []
     for (number, line), group in groupby(rows, key=lambda row: (row.parameter, row.line)):
         words.append(f"line {line}: {number} " + " ".join(f"{row.axis} {row.raw}".strip() for row in group))

@@ -1,1 +1,1 @@
-"""What every result shares: figures, tables, plots, JSON."""
+"""Common parts of all results: figures, tables, plots, JSON."""

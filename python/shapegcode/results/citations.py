@@ -1,6 +1,6 @@
-"""The papers behind the methods that a result names, as BibTeX: what ``--cite`` prints.
+"""BibTeX entries of the papers on the methods of a result, printed by ``--cite``.
 
-The entries stand in ``data/references.bib``, in full sentences in docs/evidence/references.md.
+The entries are in ``data/references.bib``, as text in docs/evidence/references.md.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from importlib import resources
 
 __all__ = ["METHODS", "bibliography", "entries_of"]
 
-#: Keys of the entries behind each method; none: it is this project's own, or the user's.
+#: Keys of the entries of each method; empty: own method, or the user's.
 METHODS: Mapping[str, tuple[str, ...]] = {
     "shaper zv": ("smith1958", "park2009"),
     "shaper zvd": ("singer1990",),
@@ -48,6 +48,6 @@ def bibliography() -> Mapping[str, str]:
 
 
 def entries_of(methods: Iterable[str]) -> tuple[str, ...]:
-    """The entry of the program and those behind some methods, each once, in the order of the file."""
+    """The entries of the program and of the methods, each once, in the order of the file."""
     keys = {"shapegcode", *(key for name in methods for key in METHODS[name])}
     return tuple(entry for key, entry in bibliography().items() if key in keys)

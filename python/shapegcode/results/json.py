@@ -1,6 +1,6 @@
-"""One serialiser for every JSON, and the schema of a result from its class: fields, and properties of `json_extra`.
+"""Serialiser of all JSON, and the schema of a result from its class: fields, and properties of `json_extra`.
 
-Numbers have nine digits but for `json_exact`, no minus zero, nothing below a millionth; NaN and infinity are null.
+Numbers have nine digits except `json_exact`, no minus zero, nothing below a millionth; NaN and infinity are null.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ import numpy as np
 
 from shapegcode.io.data_file import open_file
 
-FORMAT = 1  # of the JSON of results: raised where an older file can no longer be read
+FORMAT = 1  # format of the JSON of results: increased when older files can no longer be read
 
 
 @dataclass(frozen=True)
 class ProvenanceFile:
     """A file that was read or written."""
 
-    role: str  # what it was for: "input", "machine", "output" and so on
-    name: str  # as it was given
-    sha256: str  # of its bytes; empty: it could not be read again
-    size_bytes: int  # how many it has
+    role: str  # purpose: "input", "machine", "output" and so on
+    name: str  # as given
+    sha256: str  # empty: it could not be read
+    size_bytes: int  # its size
 
     @classmethod
     def of(cls, role: str, name: str | Path, content: bytes | memoryview | None = None) -> ProvenanceFile:
-        """Of a file, or of what is about to be written into it."""
+        """Make the entry of a file, or of content to be written."""
         if content is not None:
             return cls(role, str(name), hashlib.sha256(content).hexdigest(), len(content))
         try:
@@ -56,7 +56,7 @@ class Provenance:
     result: str  # name of its class
     by: str  # "shapegcode" and its version
     format: int  # see `FORMAT`
-    command: str  # as it was typed, or the same for one program of several
+    command: str  # as typed; with ``--program all`` for one program
     files: tuple[ProvenanceFile, ...]  # read and written
 
     def file(self, role: str) -> ProvenanceFile | None:
@@ -82,12 +82,12 @@ def this_version() -> str:
 
 
 _DIGITS = 9
-_NOTHING = 1e-9  # of a unit in which nobody measures so little
+_NOTHING = 1e-9  # smaller values are noise in any unit
 _COARSE_UNITS = ("_um", "_mm", "_s", "_percent")
 
 
 def hidden() -> dict[str, Any]:
-    """Metadata of a field that no JSON holds: ``field(metadata=hidden())``."""
+    """Metadata of a field that is not in the JSON: ``field(metadata=hidden())``."""
     return {"hidden": True}
 
 
@@ -97,7 +97,7 @@ def exact() -> dict[str, Any]:
 
 
 def sparse() -> dict[str, Any]:
-    """Metadata of a field whose key is left out where its value is None: ``field(default=None, metadata=sparse())``."""
+    """Metadata of a field whose key is left out if its value is None: ``field(default=None, metadata=sparse())``."""
     return {"sparse": True}
 
 
@@ -117,22 +117,22 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
     "Result": {"made": "provenance"},
     "Sensitivity": {"moved": "tested_value", "moved_um": "tested_um"},
 }
-"""By class: keys of the JSON and fields, as the version before named them, and as they are named."""
+"""Renamed JSON keys and fields by class: former and present names."""
 
 
 @cache
 def renamed_of(cls: type) -> Mapping[str, str]:
-    """The old names of the fields of a class and its bases, and the new ones."""
+    """Former and present names of the fields of a class and its bases."""
     return {old: new for base in cls.__mro__ for old, new in RENAMED.get(base.__name__, {}).items()}
 
 
 class OldNames:
-    """Base of what has fields that were renamed: the name of the version before gives the value, with a warning."""
+    """Base of classes with renamed fields: the former name gives the value, with a warning."""
 
     if not typing.TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """The field that had another name."""
+            """Value of a renamed field."""
             new = renamed_of(type(self)).get(name)
             if new is None:
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
@@ -142,7 +142,7 @@ class OldNames:
 
 
 def current_keys(cls: type, data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The JSON of an object with the keys of this version; warns once of each key of the version before."""
+    """The JSON of an object with present keys; warns once of each former key."""
     old = {key: new for key, new in renamed_of(cls).items() if key in data and new not in data}
     for key, new in old.items():
         _warn_of_old_key(cls.__name__, key, new)
@@ -155,7 +155,7 @@ def _warn_of_old_key(what: str, key: str, new: str) -> None:
 
 
 class Streamed(list[Any]):
-    """Many entries that become plain one by one in `json.JSONEncoder.iterencode`; `json.dumps` would find it empty."""
+    """Entries converted one by one in `json.JSONEncoder.iterencode`; `json.dumps` would see an empty list."""
 
     def __init__(self, entries: Sequence[object]) -> None:
         super().__init__()
@@ -165,12 +165,12 @@ class Streamed(list[Any]):
         return len(self._entries)
 
     def __iter__(self) -> Iterator[Any]:
-        """Each as `plain` makes it."""
+        """Entries converted by `plain`."""
         return map(plain, self._entries)
 
 
 def plain(value: object) -> Any:
-    """A value as what JSON knows: objects, lists, texts, numbers, true, false, null."""
+    """Convert a value to JSON types: objects, lists, strings, numbers, true, false, null."""
     return _plain(value, coarse=False, every_digit=False)
 
 
@@ -202,7 +202,7 @@ def _plain(value: object, *, coarse: bool, every_digit: bool) -> Any:
         return str(value)
     if isinstance(value, Sequence | set | frozenset) and not isinstance(value, bytes):
         return [inner(entry) for entry in value]
-    raise TypeError(f"{type(value).__name__} has no form in JSON")
+    raise TypeError(f"{type(value).__name__} cannot be written as JSON")
 
 
 def _number(value: float, *, coarse: bool, every_digit: bool) -> float | None:
@@ -214,7 +214,7 @@ def _number(value: float, *, coarse: bool, every_digit: bool) -> float | None:
 
 
 def to_text(value: object) -> str:
-    """A plain value as stable JSON: sorted keys, two spaces, one newline at the end."""
+    """Write a plain value as stable JSON: sorted keys, two spaces, one newline at the end."""
     return json.dumps(value, sort_keys=True, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
@@ -227,14 +227,14 @@ def schema(result: type) -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of the output of `plain` for a dataclass, from its annotations and docstrings.
 
     Args:
-        result: the class. One with `json_extra` (names to types) has those keys too, and where the command wrote
-            pictures and a program, their names under `plots` and `output`; under `provenance` command, version, files.
+        result: the class. With `json_extra` (names to types) it has these keys too, and, if the command wrote
+            pictures and a program, their names in `plots` and `output`; command, version and files in `provenance`.
 
     Returns:
         The schema.
 
     Raises:
-        TypeError: an annotation that has no form in JSON.
+        TypeError: an annotation that cannot be written as JSON.
     """
     definitions: dict[str, Any] = {}
     root = _object(result, {}, definitions, files=hasattr(result, "json_extra"))
@@ -268,7 +268,7 @@ _FIELD = re.compile(r" {4}(\w+): .*?(?:  # (.*))?")
 
 
 def _meanings(cls: type) -> dict[str, str]:
-    """What a class and its bases say of their fields: under `Attributes:`, else in comments; and of the properties."""
+    """Descriptions of the fields of a class and its bases, from `Attributes:`, comments, and properties."""
     found: dict[str, str] = {}
     for name in getattr(cls, "json_extra", {}):
         member = getattr(cls, name, None)
@@ -292,7 +292,7 @@ def _meanings(cls: type) -> dict[str, str]:
 
 
 def _comments(cls: type) -> dict[str, str]:
-    """What stands behind the fields of a class in its source, or in the lines above them."""
+    """Comments after the fields of a class in its source, or in the lines above them."""
     found: dict[str, str] = {}
     above: list[str] = []
     for line in inspect.getsource(cls).splitlines():
@@ -324,7 +324,7 @@ def _of(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
             definitions[name] = _object(cls, bound, definitions)
         return {"$ref": f"#/$defs/{name}"}
     if not isinstance(cls, type):
-        raise TypeError(f"{hint} has no form in JSON")
+        raise TypeError(f"{hint} cannot be written as JSON")
     if issubclass(cls, np.ndarray):
         return {"type": "array"}
     if issubclass(cls, enum.Enum):
@@ -338,4 +338,4 @@ def _of(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
         return {"type": "string"}
     if issubclass(cls, Sequence | set | frozenset):
         return {"type": "array", **({"items": _of(arguments[0], definitions)} if arguments else {})}
-    raise TypeError(f"{hint} has no form in JSON")
+    raise TypeError(f"{hint} cannot be written as JSON")

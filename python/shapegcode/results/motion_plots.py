@@ -1,6 +1,6 @@
-"""Simulated or measured motion over time: how fast, how much vibration; `path_plots` has the path.
+"""Plots of simulated or measured motion over time: feed, vibration; `path_plots` has the path.
 
-The first trace, usually the original program, is the wider line, so that it shows beneath the others.
+The first trace, usually the original program, has the wider line, so that it is visible below the others.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ class Trace:
         command_mm: set-points of the axes after every filter, shape (n, 3).
         response_mm: position of the table at the same instants, shape (n, 3).
         start_s: time of the first sample.
-        stops: the record holds the stop at the end; False where it is cut before.
-        largest_mm: largest distance of the table from the programmed path over the whole run, as the core measured
-            it; None: not measured.
+        stops: the record contains the final stop; False if it ends before.
+        largest_mm: largest distance of the table from the programmed path over the whole run, as measured
+            by the core; None: not measured.
         residual_mm: largest |response - command| of each axis after the stop, likewise.
 
     Raises:
@@ -86,7 +86,7 @@ class Trace:
 
     @property
     def rest_s(self) -> float:
-        """Instant at which the set-points have come to rest for good: first sample at the final position."""
+        """Instant at which the set-points finally come to rest: first sample at the final position."""
         moved = np.flatnonzero((np.abs(self.command_mm - self.command_mm[-1]) > _STILL_MM).any(axis=1))
         return self.start_s + (float(moved[-1] + 1) * self.period_s if len(moved) else 0.0)
 
@@ -94,12 +94,12 @@ class Trace:
         """The samples between two instants.
 
         Args:
-            begin_s: of the first one, as far as there are samples.
-            end_s: of the last one, likewise.
+            begin_s: instant of the first sample, if there are samples.
+            end_s: instant of the last sample, likewise.
             zero_s: instant that becomes time zero.
 
         Returns:
-            At least two samples; it stops if the stop is among them.
+            At least two samples; `stops` if the stop is among them.
         """
         count = len(self.command_mm)
         ranks = (np.array([begin_s, end_s]) - self.start_s) / self.period_s
@@ -118,15 +118,15 @@ AXIS_NAMES = "XYZ"
 _WIDTHS = (2.4, 0.9, 0.9, 0.9)
 _MAX_POINTS = 4000
 MOVES_MM = 1e-9
-# A deflection below this is none.
+# A smaller deflection counts as zero.
 SHOWN_MM = 5e-5
-_FLAT = 0.06  # of an axis in µm or mm/min
+_FLAT = 0.06  # range of an axis in µm or mm/min
 
 
 def thin_min_max(
     times: npt.ArrayLike, values: npt.ArrayLike, max_points: int = _MAX_POINTS
 ) -> tuple[FloatArray, FloatArray]:
-    """Reduce the points of a curve without a visible change: only the smallest and largest value of each interval."""
+    """Decimate a curve without visible change: keep minimum and maximum of each interval."""
     t, v = np.asarray(times, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.shape != v.shape or t.ndim != 1:
         raise ValueError(f"times have shape {t.shape}, values {v.shape}: must be equal and one-dimensional")
@@ -145,12 +145,12 @@ def thin_min_max(
 
 @dataclass(frozen=True)
 class View:
-    """Smallest and largest value of an interval of time, plotted as one column of a picture.
+    """Traces over one time range, plotted as one column of a picture.
 
     Attributes:
         traces: usually the original and the emitted program.
-        heading: what the stretch is; empty where it is all there is.
-        time_label: of the time axis.
+        heading: title of the range; empty for the whole.
+        time_label: label of the time axis.
     """
 
     traces: Sequence[Trace]
@@ -159,12 +159,12 @@ class View:
 
 
 def plot_feed(views: Sequence[View], ax: Axes | None = None, *, part: str = "") -> Axes:
-    """How fast does the command go, along the path and per axis?
+    """Plot the speed of the command along the path and per axis.
 
     Args:
-        views: stretches of time, side by side.
+        views: time ranges, side by side.
         ax: where to draw; None: a new figure.
-        part: which part of the program this is, for the title.
+        part: part of the program, for the title.
 
     Returns:
         The first panel.
@@ -187,7 +187,7 @@ def plot_feed(views: Sequence[View], ax: Axes | None = None, *, part: str = "") 
         for panel in panels:
             _spread_flat(panel)
         plot.legend_above(panels[0])
-        # Standstill before and after says nothing about feed.
+        # Leave out standstill before and after.
         begin = min(trace.departure_s for trace in view.traces)
         end = max(trace.rest_s if trace.stops else float(trace.times_s[-1]) for trace in view.traces)
         margin = 0.03 * (end - begin) or view.traces[0].period_s
@@ -198,12 +198,12 @@ def plot_feed(views: Sequence[View], ax: Axes | None = None, *, part: str = "") 
 def plot_vibration(views: Sequence[View], ax: Axes | None = None, *, part: str = "") -> Axes:
     """Plot the vibration of each axis about its command, and what remains after the stop.
 
-    Axes that do not swing are named, not drawn.
+    Axes that do not vibrate are named, not drawn.
 
     Args:
-        views: stretches of time, side by side.
+        views: time ranges, side by side.
         ax: where to draw; None: a new figure.
-        part: which part of the program this is, for the title.
+        part: part of the program, for the title.
 
     Returns:
         The first panel.
@@ -239,7 +239,7 @@ def plot_vibration(views: Sequence[View], ax: Axes | None = None, *, part: str =
 def _columns(
     ax: Axes | None, views: Sequence[View], names: Sequence[str], row_inch: float, title: str, part: str
 ) -> list[list[Axes]]:
-    """One column of panels per view, each with its own time axis; `names` are those of the rows."""
+    """One column of panels per view, each with its own time axis; *names*: of the rows."""
     size_inch = (8.0 + 4.0 * (len(views) - 1), 1.8 + row_inch * len(names))
     rows = plot.grid(ax, len(names), len(views), size_inch=size_inch, title=title, part=part, sharex="col")
     for row, name in zip(rows, names, strict=True):
@@ -278,7 +278,7 @@ def line_style(number: int, *, fine: bool = False) -> dict[str, Any]:
 
 
 def _moving_axes(traces: Sequence[Trace]) -> list[int]:
-    """Axes that move in any trace; X where none does, so that a picture is never empty."""
+    """Axes that move in any trace; X if none does, so that a picture is never empty."""
     travel = np.max([np.ptp(trace.command_mm, axis=0) for trace in traces], axis=0)
     return [axis for axis in range(3) if travel[axis] > MOVES_MM] or [0]
 
@@ -289,6 +289,6 @@ def _curve(panel: Axes, number: int, label: str, times: FloatArray, values: Floa
 
 
 def _spread_flat(panel: Axes) -> None:
-    """A curve at zero is a line in the middle, not rounding writ large."""
+    """Show a curve at zero as a line in the middle, not magnified round-off."""
     if max(map(abs, panel.get_ylim())) < _FLAT:
         panel.set_ylim(-1, 1)

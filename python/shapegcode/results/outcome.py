@@ -1,7 +1,6 @@
-"""What every result says of itself, and when two are equal; its pictures are drawn by the module `plots` beside it.
-Figures of simulations as results state them: per axis, in µm.
+"""Answer and equality of results; figures per axis, in µm. The module `plots` of the same folder draws their pictures.
 
-In a pickle a path is built again; of other objects of the core the figures travel, and what they compute is missing.
+When unpickled, paths are rebuilt; other core objects keep their figures but cannot compute.
 """
 
 from __future__ import annotations
@@ -29,21 +28,21 @@ if TYPE_CHECKING:
 
 
 class NotKeptError(_core.ArgumentError):
-    """A result that was read back from its JSON or a pickle does not hold the requested data."""
+    """A result that was read back from its JSON or a pickle does not contain the requested data."""
 
 
 class CoreFigures:
-    """The figures of an object of the core, in a result that was pickled."""
+    """Figures of a core object in an unpickled result."""
 
     def __init__(self, name: str, figures: Mapping[str, Any]) -> None:
         self.__dict__.update(figures)
         self._core_name = name
 
     def __getattr__(self, attribute: str) -> Any:
-        if attribute.startswith("_"):  # asked for by Python itself, such as by copy
+        if attribute.startswith("_"):  # requested by Python itself, such as by copy
             raise AttributeError(attribute)
         raise NotKeptError(
-            f"{self._core_name}.{attribute}: a pickled result does not hold it; compute the result again to have it"
+            f"{self._core_name}.{attribute}: a pickled result does not contain it; compute the result again"
         )
 
     def __repr__(self) -> str:
@@ -51,7 +50,7 @@ class CoreFigures:
 
 
 def same_fields(first: Any, second: Any) -> bool:
-    """Whether two dataclasses of one class hold the same data: arrays by value, NaN like NaN; handles are no data."""
+    """True if two dataclasses of one class have equal data: arrays by value, NaN equals NaN; handles are ignored."""
     return all(_same(getattr(first, each.name), getattr(second, each.name)) for each in fields(first) if each.compare)
 
 
@@ -73,7 +72,7 @@ def _same(first: Any, second: Any) -> bool:
 
 
 def _is_handle(value: Any) -> bool:
-    """What is there to simulate or draw again: a function, or an object of the core that has no equality."""
+    """True for objects used to simulate or draw again: functions, and core objects without equality."""
     kind = type(value)
     return callable(value) or kind is CoreFigures or (kind.__module__ == _core.__name__ and kind in _HANDLES)
 
@@ -81,7 +80,7 @@ def _is_handle(value: Any) -> bool:
 def _reduced(value: Any) -> tuple[Any, ...]:
     figures = {}
     for name, entry in vars(type(value)).items():
-        with contextlib.suppress(_core.ShapegcodeError):  # a figure that this one does not have
+        with contextlib.suppress(_core.ShapegcodeError):  # a figure that this object does not have
             if isinstance(entry, property):
                 figures[name] = getattr(value, name)
     return CoreFigures, (type(value).__name__, figures)
@@ -103,14 +102,14 @@ _HANDLES = frozenset(
     for kind in vars(_core).values()
     if isinstance(kind, type) and vars(kind).get("__eq__") is None and not issubclass(kind, BaseException)
 )
-_IN_RESULTS = (  # beside what only the core makes
+_IN_RESULTS = (  # in addition to objects made only by the core
     _core.Region, _core.ModalState, _core.Material, _core.MillingForce, _core.EndMill,
     _core.FeedStretch, _core.CuttingCoefficients, _core.ToolBeam, _core.FeedLimits,
 )  # fmt: skip
 for _kind in _HANDLES:
     if _kind in _IN_RESULTS or isinstance(vars(_kind)["__init__"], types.WrapperDescriptorType):
         copyreg.pickle(_kind, _reduced)
-# Of the same motion; which lines it comes from is not known in the copy.
+# The same motion; its program lines are not kept in the copy.
 copyreg.pickle(_core.Path, lambda path: (_core.Path, ([path[rank] for rank in range(len(path))],)))
 copyreg.pickle(_core.Segment, lambda segment: (_segment, (_parts(segment),)))
 copyreg.pickle(types.MappingProxyType, lambda mapping: (types.MappingProxyType, (dict(mapping),)))
@@ -126,8 +125,8 @@ class Pair(Generic[T]):
     """A figure before and after.
 
     Attributes:
-        original: of the program as it was.
-        emitted: of the program as it was written.
+        original: figure of the original program.
+        emitted: figure of the emitted program.
     """
 
     original: T
@@ -139,9 +138,9 @@ class Xyz(Generic[T]):
     """One value per axis.
 
     Attributes:
-        x: of X.
-        y: of Y.
-        z: of Z.
+        x: value of X.
+        y: value of Y.
+        z: value of Z.
     """
 
     x: T
@@ -159,10 +158,10 @@ class Xyz(Generic[T]):
 
 
 class Outcome(OldNames):
-    """What every result is; `json_extra` names properties that the JSON holds beside the fields, with their types."""
+    """Interface of every result; `json_extra`: properties written to the JSON in addition to the fields, with types."""
 
     from_json: bool = False
-    """It was read back from its JSON: what no JSON holds is missing."""
+    """True if it was read back from JSON: data that are not in the JSON are missing."""
 
     json_extra: ClassVar[dict[str, Any]] = {"ok": bool, "warnings": tuple[str, ...], "next_step": str}
 
@@ -170,7 +169,7 @@ class Outcome(OldNames):
 
     @property
     def ok(self) -> bool:
-        """Whether it is done and within tolerance."""
+        """True if it is done and within tolerance."""
         raise NotImplementedError
 
     @property
@@ -184,26 +183,26 @@ class Outcome(OldNames):
         raise NotImplementedError
 
     def next_step_after(self, file: str) -> str:
-        """The one thing to do next once a file was written with it."""
+        """The next step after a file was written."""
         del file
         return self.next_step
 
     @property
     def exit_code(self) -> int:
-        """Of the command: 0 done and within tolerance, 1 done but out of tolerance, 2 refused."""
+        """Exit code of the command: 0 done and within tolerance, 1 done but out of tolerance, 2 refused."""
         return 0 if self.ok else 1
 
     def to_dict(self) -> dict[str, Any]:
-        """What ``--json`` writes: the fields and `json_extra`, as JSON knows them; see `shapegcode.results.json`."""
+        """Content of ``--json``: the fields and `json_extra` as JSON types; see `shapegcode.results.json`."""
         found: dict[str, Any] = plain(self)
         return found
 
     def to_json(self) -> dict[str, Any]:
-        """`to_dict` for who writes it at once: very many rows may be `shapegcode.results.json.Streamed`."""
+        """`to_dict` for immediate writing: very many rows may be `shapegcode.results.json.Streamed`."""
         return self.to_dict()
 
     def tables(self) -> list[Table]:
-        """What the command shows below its answer, in this order."""
+        """Tables that the command shows below its answer, in this order."""
         return []
 
     def plots(self) -> Mapping[str, Plot]:
@@ -211,29 +210,29 @@ class Outcome(OldNames):
         return {}
 
     def save_plots(self, folder: str | Path) -> list[str]:
-        """Write every picture as PNG and SVG into a folder, which is made where it is missing."""
+        """Write every picture as PNG and SVG into a folder, which is created if missing."""
         from shapegcode.results.plot import save_all
 
         return save_all(self.plots(), folder)
 
     def __eq__(self, other: object) -> bool:
-        """Whether both hold the same data; programs count, what there is to simulate and draw again does not."""
+        """True if both have equal data, including programs; handles for simulation and drawing are ignored."""
         return same_fields(self, other) if type(self) is type(other) else NotImplemented
 
     def __hash__(self) -> int:
-        """By class and answer: equal results have the same ones."""
+        """Hash of class and answer, which are the same for equal results."""
         return hash(repr(self))
 
     def __repr__(self) -> str:
-        """Class and answer: a result may hold millions of samples."""
+        """Class and answer: a result may contain millions of samples."""
         return f"<{type(self).__name__}: {self.answer}>"
 
     def _drawn_beside(self) -> Mapping[str, Plot]:
-        """The pictures that the module `plots` of the result's folder offers for it: its `plots_of(result)`."""
+        """Pictures from `plots_of(result)` of the module `plots` in the result's folder."""
         return self._drawable(lambda: self._beside("plots").plots_of(self))
 
     def _drawable(self, plots_of: Callable[[], Mapping[str, Plot]]) -> Mapping[str, Plot]:
-        """Pictures, without those that need what is missing in a result that was read back from its JSON."""
+        """Pictures, without those that need data missing in a result read back from JSON."""
         if not self.from_json:
             return plots_of()
         try:
@@ -242,7 +241,7 @@ class Outcome(OldNames):
             return {}
 
     def _beside(self, name: str) -> Any:
-        """A module of the result's folder, which imports the result and is loaded when somebody asks for it."""
+        """A module of the result's folder; it imports the result, so it is loaded on demand."""
         return importlib.import_module(f"{type(self).__module__.rpartition('.')[0]}.{name}")
 
 
@@ -255,12 +254,12 @@ def _draws(plot: Plot) -> bool:
 
 
 CONTOURS = {"command": "contour error of the command", "response": "contour error of the machine table"}
-"""What the contour errors of `Tracks` are called."""
+"""Names of the contour errors of `Tracks`."""
 
 
 @dataclass(frozen=True)
 class Tracks(Generic[T]):
-    """A figure of both tracks that a machine makes."""
+    """A figure of both tracks of a machine."""
 
     command: T  # of the set-points
     response: T  # of the table
@@ -268,7 +267,7 @@ class Tracks(Generic[T]):
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far a track leaves the programmed path."""
+    """Deviation of a track from the programmed path."""
 
     largest_mm: float  # distance, either side; corners that the track cuts short count too
     left_mm: float  # to the left of the travel, or above
@@ -276,12 +275,12 @@ class Deviation:
 
     @classmethod
     def of(cls, stats: Iterable[_core.DeviationStats]) -> Deviation:
-        """The largest of one or several runs."""
+        """Maxima over one or several runs."""
         return cls.largest(cls(each.max_abs_mm, each.most_positive_mm, -each.most_negative_mm) for each in stats)
 
     @classmethod
     def largest(cls, deviations: Iterable[Deviation]) -> Deviation:
-        """The largest of each."""
+        """Maximum of each field."""
         return cls(
             *map(max, zip(*((each.largest_mm, each.left_mm, each.right_mm) for each in deviations), strict=True))
         )
@@ -294,20 +293,20 @@ class Deviation:
 
 @dataclass(frozen=True)
 class ContourError:
-    """How far a track leaves the programmed path, in µm."""
+    """Deviation of a track from the programmed path, µm."""
 
     max: float  # distance, either side; corners that the track cuts short count too
     rms: float  # root mean square over all samples
     left: float  # largest to the left of the travel, or above
     right: float  # largest to the right of it, or below
-    # largest towards the workpiece, which cuts too much; only where the side of the workpiece is known
+    # largest deviation towards the workpiece (too much material removed); only if its side is known
     gouge: float | None = field(default=None, metadata=sparse())
-    # largest away from it, which leaves material standing; likewise
+    # largest deviation away from it (remaining material); likewise
     excess: float | None = field(default=None, metadata=sparse())
 
     @classmethod
     def of(cls, stats: Iterable[_core.DeviationStats], material_side: str | None = None) -> ContourError:
-        """Of one or several runs together; all zero without any."""
+        """Combine one or several runs; all zero without any."""
         rows = list(stats)
         count = sum(row.count for row in rows)
         squares = sum(row.sum_of_squares_mm2 for row in rows)
@@ -318,7 +317,7 @@ class ContourError:
 
 
 def largest_xyz_um(vectors: Iterable[FloatArray]) -> Xyz[float]:
-    """Largest of each axis, mm to µm."""
+    """Maximum of each axis, converted from mm to µm."""
     rows = list(vectors)
     x, y, z = np.max(rows, axis=0) * 1e3 if rows else np.zeros(3)
     return Xyz(float(x), float(y), float(z))

@@ -1,4 +1,4 @@
-"""A path and its motion from above, deviations magnified; the pictures of the worst position of a region."""
+"""Plots of a path and its motion from above, deviations magnified; pictures of the worst position of a region."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ if TYPE_CHECKING:
 Plane = Literal["XY", "ZX", "YZ"]
 
 _STRAIGHT = (
-    "The path is straight: the table deviates along it only,\nwhich no drawing of the path shows. "
+    "The path is straight: the table deviates along it only,\nwhich is not visible here. "
     "See the picture of the vibration."
 )
 
-_CUT = "The table rounds corners off: there each side is drawn up to the bisector, magnified from its own line."
-# Less than that between two segments is an arc in pieces.
+_CUT = "The table rounds corners: each side is drawn up to the bisector, magnified from its own line."
+# A smaller angle between two segments belongs to an arc in pieces.
 _CORNER_RAD = 0.3
-# The two sides of a corner are drawn further apart than that share of the picture: no line joins them.
+# If both sides of a corner are further apart than this ratio of the picture, they are not joined.
 _APART = 0.01
-# A drawn curve so many times as long as its path oscillates.
+# Ratio of lengths above which a drawn curve oscillates about its path.
 _SWINGS = 4.0
 
 
@@ -56,10 +56,10 @@ def plot_path(
     part: str = "",
     whole_mm: npt.ArrayLike | None = None,
 ) -> Axes:
-    """How far, and to which side, does the table leave the programmed path?
+    """Plot the deviation of the table from the programmed path, magnified.
 
-    Each curve is the programmed path plus the deviation times the magnification, every sample of it; the title says the
-    magnification. The legend has the figure that the core measured over the whole run; where a trace has none, that of
+    Each curve is the programmed path plus the magnified deviation of every sample; the title gives the
+    magnification. The legend has the figure measured by the core over the whole run; without it, that of
     the samples drawn.
 
     Args:
@@ -69,9 +69,9 @@ def plot_path(
         quantity: deviation of the table ("response") or of the set-points ("command").
         plane: plane of the picture.
         magnification: factor of the deviation; None: chosen so that the largest one is easy to see.
-        part: which part of the program this is, for the title.
-        whole_mm: the whole path where `programmed_mm` is a piece of it, shape (k, 3): a second panel shows where
-            the piece lies.
+        part: part of the program, for the title.
+        whole_mm: the whole path if `programmed_mm` is a part of it, shape (k, 3): a second panel shows
+            the position of the part.
 
     Returns:
         The panel of the path.
@@ -111,7 +111,7 @@ def plot_path(
         cut = cut or bool(len(breaks))
         curve = np.insert(curve, breaks, np.nan, axis=0)
         label = _path_label(trace, deviation, quantity, is_part=whole is not None)
-        # Of a straight path the label alone.
+        # For a straight path only the label.
         panel.plot(*curve[: 0 if straight else None].T, label=label, **_style(number, curve, polyline))
     panel.set_aspect("equal", adjustable="datalim")
     panel.margins(0.08)
@@ -130,7 +130,7 @@ def plot_path(
 
 
 def _distances(polyline: FloatArray) -> FloatArray:
-    """How far each vertex is along a polyline."""
+    """Distance of each vertex along a polyline, mm."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1))])
 
 
@@ -145,8 +145,8 @@ def _at_corners(along: FloatArray, polyline: FloatArray, curve: FloatArray, apar
     """Samples before which the nearest point, and the plotted curve with it, changes from one side of a corner to the
     other.
 
-    A table that rounds a corner on the inside is nearest to the one side, then, from one sample to the next, to the
-    other. Magnified from there the two lie far apart, and a line between them would close a loop that nobody drove.
+    A table that rounds a corner on the inside is nearest to one side, then, from one sample to the next, to the
+    other. Magnified, the two are far apart, and a line between them would draw a loop that was not traversed.
     """
     steps = np.diff(polyline, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
@@ -159,7 +159,7 @@ def _at_corners(along: FloatArray, polyline: FloatArray, curve: FloatArray, apar
 
 
 def _style(number: int, curve: FloatArray, polyline: FloatArray) -> dict[str, Any]:
-    """Colour and width of a curve; one that oscillates is finer, so that its cycles do not run together."""
+    """Style of a curve; an oscillating one is thinner, so that its cycles remain distinct."""
     drawn_mm = float(np.nansum(np.linalg.norm(np.diff(curve, axis=0), axis=1)))
     length_mm = float(_distances(polyline)[-1])
     style = line_style(number)
@@ -167,7 +167,7 @@ def _style(number: int, curve: FloatArray, polyline: FloatArray) -> dict[str, An
 
 
 def _path_label(trace: Trace, deviation: FloatArray, quantity: str, *, is_part: bool) -> str:
-    """Name and figures: the core's own, which also see what lies between and beyond the samples drawn."""
+    """Name and figures of a trace: those of the core, which include motion between and beyond the samples drawn."""
     here = f"{1e3 * float(np.linalg.norm(deviation, axis=1).max()):.1f} µm"
     if trace.largest_mm is None or quantity != "response":
         return f"{trace.label}, largest {here} in this picture"
@@ -175,7 +175,7 @@ def _path_label(trace: Trace, deviation: FloatArray, quantity: str, *, is_part: 
 
 
 def _only_along(polyline: FloatArray, deviations: Sequence[FloatArray]) -> bool:
-    """Whether the path is one straight line and nothing deviates across it."""
+    """True if the path is one straight line and no deviation is perpendicular to it."""
     chord = polyline[-1] - polyline[0]
     length = float(np.linalg.norm(chord))
     if length == 0:
@@ -189,7 +189,7 @@ def _only_along(polyline: FloatArray, deviations: Sequence[FloatArray]) -> bool:
 
 
 def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:
-    """The whole path, small, and where the piece lies on it."""
+    """Draw the whole path, small, with the part marked on it."""
     axes.plot(whole[:, 0], whole[:, 1], color=plot.GREY, linewidth=0.8)
     axes.plot(piece[:, 0], piece[:, 1], color="black", linewidth=2)
     along = _distances(piece)
@@ -197,12 +197,12 @@ def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:
     axes.plot(*middle, marker="o", markersize=16, markerfacecolor="none", markeredgecolor="black")
     axes.set_aspect("equal", adjustable="box", anchor="N")
     axes.margins(0.08)
-    axes.set_title("where that is on the whole path", loc="left", fontsize=9)
+    axes.set_title("position on the whole path", loc="left", fontsize=9)
     axes.tick_params(labelsize=8)
 
 
 def _deviation_scale(axes: Axes, factor: float, largest_mm: float) -> None:
-    """A scale bar: a round number of µm at the magnification of the deviation."""
+    """Draw a scale bar: a round number of µm at the magnification of the deviation."""
     from matplotlib.lines import Line2D
     from matplotlib.offsetbox import AnchoredOffsetbox, AuxTransformBox, TextArea, VPacker
 
@@ -220,23 +220,23 @@ def _deviation_scale(axes: Axes, factor: float, largest_mm: float) -> None:
     axes.add_artist(above)
 
 
-# Pieces of the programmed path among which the nearest one is looked for.
+# Segments of the programmed path among which the nearest one is searched for.
 _PATH_PIECES = 20_000
 _SHORTEST_PIECE_MM = 0.01
-# A millimetre between two places along the path counts as this many mm between a sample and the path.
+# Weight of a distance along the path against the distance between a sample and the path.
 _PROGRESS_WEIGHT = 0.03
 _SEGMENTS_ASKED = 3  # on either side of the nearest vertex
 _SAGITTA_MM = 1e-5
 
-COARSE_STEP_RAD = 0.05  # of an arc between two points of a polyline that is looked at from afar
+COARSE_STEP_RAD = 0.05  # angle of an arc between two points of a coarse polyline
 
 
 def follow(
     command_mm: FloatArray, points: FloatArray, polyline_mm: FloatArray, *, complete: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Points of a polyline nearest to samples that follow it, as distances along it and positions.
+    """Nearest points of a polyline to samples that follow it: distances along it, and positions.
 
-    Where it passes a point twice, the distance travelled decides.
+    If it passes a point twice, the distance travelled decides.
     """
     from scipy.spatial import KDTree
 
@@ -251,7 +251,7 @@ def follow(
     nearest = tree.query(np.column_stack([points, _PROGRESS_WEIGHT * gone]), workers=-1)[1]
     feet, best = np.empty_like(points), np.full(len(points), np.inf)
     progress = np.zeros(len(points))
-    # The foot lies on a segment near the nearest vertex.
+    # The nearest point is on a segment near the nearest vertex.
     for shift in range(-_SEGMENTS_ASKED, _SEGMENTS_ASKED):
         first = np.clip(nearest + shift, 0, len(vertices) - 2)
         start, chord = vertices[first], vertices[first + 1] - vertices[first]
@@ -266,7 +266,7 @@ def follow(
 
 
 def _refine(polyline: FloatArray) -> FloatArray:
-    """The polyline without repeated points, its long segments split, so that vertices stand for the path."""
+    """The polyline without repeated points and with long segments split, so that vertices represent the path."""
     lengths = np.linalg.norm(np.diff(polyline, axis=0), axis=1)
     polyline = polyline[np.concatenate([[True], lengths > 0])]
     lengths = lengths[lengths > 0]
@@ -287,7 +287,7 @@ def _piece_of(polyline: FloatArray, begin_mm: float, end_mm: float) -> FloatArra
 
 
 def polyline_of(path: _core.Path) -> FloatArray:
-    """The path as a polyline that is nowhere further than a hundredth of a micrometre from its arcs."""
+    """The path as a polyline within a hundredth of a micrometre of its arcs."""
     if path.largest_sweep_rad == 0.0:
         return path.polyline()
     parts = [path.start_mm[None, :]]
@@ -301,9 +301,9 @@ def polyline_of(path: _core.Path) -> FloatArray:
     return np.concatenate(parts)
 
 
-RECORD_SAMPLES = 1_000_000  # that a simulation keeps for pictures, at most
+RECORD_SAMPLES = 1_000_000  # maximum number kept by a simulation for pictures
 
-# A longer region shows its worst place and its stop.
+# For a longer region its worst position and its stop are shown.
 _WHOLE_S = 10.0
 _PLACES = 20_000  # some milliseconds apart in minutes of motion
 _AROUND_S = 1.5
@@ -312,18 +312,18 @@ _BEFORE_STOP_S = 2.0
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRegion:
-    """What the pictures of a region draw."""
+    """Data for the pictures of a region."""
 
     traces: tuple[Trace, ...]  # one or more, for example of the original and of the emitted program
     path: _core.Path  # as programmed
-    part: str = ""  # which part of the program it is, for titles; empty where it is all of it
+    part: str = ""  # part of the program, for titles; empty for the whole
 
     @classmethod
     def of_runs(
         cls, runs: Mapping[str, _core.SimulationFigures], path: _core.Path, period_s: float, *,
         lines: tuple[int, int], regions: int,
     ) -> SimulatedRegion:  # fmt: skip
-        """The region that vibrates most, as the core simulated it."""
+        """The region that vibrates most, from core simulations."""
         traces = tuple(_trace(label, run, period_s) for label, run in runs.items())
         parts = [f"lines {lines[0]} to {lines[1]}, the region that vibrates most after its stop"] if regions > 1 else []
         if not traces[0].stops:
@@ -358,23 +358,23 @@ def motion_pictures(simulated: Callable[[], SimulatedRegion]) -> dict[str, Plot]
 class _Scene:
     """The part of a region that is plotted."""
 
-    views: tuple[View, ...]  # stretches of time: the whole, or the worst place and the stop
-    part: str  # which part of the program they are of
-    near: tuple[Trace, ...]  # the traces, or of a long region their stretches around the worst place
-    near_part: str  # which part of the program these are of
-    programmed_mm: FloatArray  # the path beside them, (m, 3)
-    whole_mm: FloatArray | None = None  # the whole path where that is a piece of it, (k, 3)
+    views: tuple[View, ...]  # time ranges: the whole, or the worst position and the stop
+    part: str  # part of the program
+    near: tuple[Trace, ...]  # the traces; of a long region around the worst position
+    near_part: str  # part of the program of these
+    programmed_mm: FloatArray  # the path of these, (m, 3)
+    whole_mm: FloatArray | None = None  # the whole path if that is a part of it, (k, 3)
 
     @classmethod
     def of(cls, simulated: SimulatedRegion) -> _Scene:
-        """All of a short region; of a long one the worst place and, if it is there, the stop."""
+        """All of a short region; of a long one the worst position and the stop, if there is one."""
         traces, programmed = simulated.traces, polyline_of(simulated.path)
         if max(len(trace.command_mm) * trace.period_s for trace in traces) <= _WHOLE_S:
             return cls((View(traces),), simulated.part, traces, simulated.part, programmed)
         near, piece, time_s = _worst_place(traces, programmed, simulated.path)
         at = f"at {time_s:.2f} s"
-        around = f"{2 * _AROUND_S:g} s around the worst place of the {traces[0].label} ({at})"
-        views = [View(near, f"the worst place, {at}", "time from the worst place in s")]
+        around = f"{2 * _AROUND_S:g} s around the worst position of the {traces[0].label} ({at})"
+        views = [View(near, f"worst position, {at}", "time from the worst position in s")]
         if all(trace.stops for trace in traces):
             stop = tuple(trace.part(trace.rest_s - _BEFORE_STOP_S, math.inf, trace.rest_s) for trace in traces)
             views.append(View(stop, f"the stop, at {traces[0].rest_s:.2f} s", "time from the stop in s"))
@@ -386,8 +386,8 @@ class _Scene:
 def _worst_place(
     traces: tuple[Trace, ...], programmed: FloatArray, path: _core.Path
 ) -> tuple[tuple[Trace, ...], FloatArray, float]:
-    """Where the first trace is furthest from the path: the parts of all traces around it, each there at time 0; the
-    piece of the programmed path, (m, 3), mm; the instant of the first trace."""
+    """Parts of all traces around the largest deviation of the first one, each with time 0 there; the corresponding
+    part of the programmed path, (m, 3), mm; the instant of the first trace."""
     first = traces[0]
     away = _core.PathFollower(path).step(first.command_mm, first.response_mm)
     at = int(np.argmax(np.linalg.norm(away, axis=1)))
@@ -405,7 +405,7 @@ def _worst_place(
 
 
 def _progress(trace: Trace, programmed: FloatArray) -> FloatArray:
-    """How far along the path each set-point is, (n,), mm, rising; of a long motion between places that are found."""
+    """Distance along the path of each set-point, (n,), mm, ascending; interpolated in a long motion."""
     count = len(trace.command_mm)
     rows = np.unique(np.append(np.arange(0, count, -(-count // _PLACES)), count - 1))
     command = trace.command_mm[rows]

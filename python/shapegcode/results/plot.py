@@ -1,4 +1,4 @@
-"""The paper of the pictures: one style, figures and panels, titles, files (PNG or SVG); no window, no global state.
+"""Common plotting: style, figures and panels, titles, files (PNG or SVG); no window, no global state.
 
 A plot is a function ``plot_x(result, ax=None) -> Axes`` that writes nothing. Colours are those of Okabe and Ito.
 """
@@ -35,7 +35,7 @@ def figure(width_inch: float, height_inch: float) -> Figure:
 
 
 def axes(ax: Axes | None = None, *, size_inch: tuple[float, float] = (8.0, 4.5), title: str = "") -> Axes:
-    """One panel in the house's style."""
+    """One panel in the common style."""
     panel: Axes = figure(*size_inch).subplots() if ax is None else ax
     _style(panel)
     if title:
@@ -53,14 +53,14 @@ def grid(
     part: str = "",
     **subplots: Any,
 ) -> list[list[Axes]]:
-    """Panels of one picture, row by row: of a new figure, or in the place of the caller's axes."""
+    """Panels of one picture, row by row: in a new figure, or replacing the caller's axes."""
     whole: Any
     if ax is None:
         whole = figure(*size_inch)
     else:
         place = ax.get_subplotspec()
         if place is None:
-            raise ValueError("ax has no place in a grid of panels: make it with figure.subplots() or plt.subplots()")
+            raise ValueError("ax is not in a grid of panels: make it with figure.subplots() or plt.subplots()")
         parent: Any = ax.get_figure()
         whole = parent.add_subfigure(place)
         ax.set_axis_off()
@@ -73,7 +73,7 @@ def grid(
 
 
 def column(ax: Axes | None, rows: int, *, sharex: bool = True, **options: Any) -> list[Axes]:
-    """Panels above each other; options as those of `grid`."""
+    """Stacked panels; options as in `grid`."""
     return [row[0] for row in grid(ax, rows, 1, sharex=sharex, **options)]
 
 
@@ -84,14 +84,14 @@ def _style(panel: Axes) -> None:
 
 
 def aligned(panels: Sequence[Axes]) -> Axes:
-    """Names of the vertical axes of panels below each other in one line; returns the first."""
+    """Align the y-labels of stacked panels; returns the first panel."""
     whole: Any = panels[0].figure
     whole.align_ylabels(panels)
     return panels[0]
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number for a title: so many significant digits at most, never as a power of ten."""
+    """Format a number for a title: at most *digits* significant digits, never as a power of ten."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
     places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
@@ -100,13 +100,13 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def round_below(value: float) -> float:
-    """The largest of 1, 2 and 5 times a power of ten that is not above a value."""
+    """The largest of 1, 2 and 5 times a power of ten that does not exceed a value."""
     decade = 10.0 ** math.floor(math.log10(value))
     return float(max(step * decade for step in (1, 2, 5) if step * decade <= value * (1 + 1e-9)))
 
 
 def note(panel: Axes, text: str, x: float, y: float, *, shift: int = 4, **options: Any) -> None:
-    """Text beside a point: to its right, or with a negative shift (in points) to its left."""
+    """Text next to a point: to its right, or with a negative shift (in points) to its left."""
     side = "left" if shift > 0 else "right"
     panel.annotate(
         text, (x, y), xytext=(shift, 0), textcoords="offset points", ha=side, va="center", fontsize=8, **options
@@ -114,14 +114,14 @@ def note(panel: Axes, text: str, x: float, y: float, *, shift: int = 4, **option
 
 
 def legend_above(panel: Axes, *, columns: int = 4) -> None:
-    """Legend between the panel and what is above it, where it hides no curve."""
+    """Legend above the panel, where it hides no curve."""
     panel.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, frameon=False, borderaxespad=0.2, fontsize=9
     )
 
 
 def legend_below(panel: Axes, *, of: Axes | None = None, columns: int = 4) -> None:
-    """Legend below the panel, and below the name of its axis."""
+    """Legend below the panel and its axis label."""
     handles, labels = (of or panel).get_legend_handles_labels()
     panel.legend(
         handles, labels, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=columns, frameon=False, fontsize=9,
@@ -130,7 +130,7 @@ def legend_below(panel: Axes, *, of: Axes | None = None, columns: int = 4) -> No
 
 
 def save_all(plots: Mapping[str, Callable[..., Axes]], folder: str | Path) -> list[str]:
-    """Draw pictures and write each in every format into a folder, which is made where it is missing."""
+    """Draw pictures and write each in every format into a folder, which is created if missing."""
     if not plots:
         return []
     place = Path(folder)
@@ -139,7 +139,7 @@ def save_all(plots: Mapping[str, Callable[..., Axes]], folder: str | Path) -> li
     for name, plot in plots.items():
         drawn = plot()
         figure: Any = drawn.figure.figure
-        # Panels get their places once for every format: to find them takes as long as to draw all.
+        # The layout is computed once for all formats: it takes as long as drawing.
         if (engine := figure.get_layout_engine()) is not None:
             engine.execute(figure)
             figure.set_layout_engine("none")
@@ -151,7 +151,7 @@ def save_all(plots: Mapping[str, Callable[..., Axes]], folder: str | Path) -> li
 
 def save(drawn: Axes | Figure, file: str | Path) -> None:
     """Write the picture to which the axes belong as PNG or SVG, by the file's ending; same data, same bytes."""
-    figure: Any = drawn.figure.figure  # of axes in a part of a figure: the whole
+    figure: Any = drawn.figure.figure  # for axes in a subfigure: the whole figure
     path = Path(file)
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
@@ -176,7 +176,7 @@ _ID = re.compile(r'(\bid="|xlink:href="#|\bhref="#|url\(#)')
 
 
 def svg_text(drawn: Axes | Figure, key: str, *, label: str) -> str:
-    """The whole picture of the axes as an `svg` element of a page, very many points as pixels; same data, same text."""
+    """The whole picture of the axes as an `svg` element of a page, many points as pixels; same data, same text."""
     figure: Any = drawn.figure.figure
     for artist in figure.findobj(_is_heavy):
         artist.set_rasterized(True)
@@ -188,7 +188,7 @@ def svg_text(drawn: Axes | Figure, key: str, *, label: str) -> str:
     assert box is not None
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
     body = _ID.sub(rf"\g<1>{key}-", body)
-    # matplotlib's style is for every element of a page: keep it inside.
+    # matplotlib's style applies to every element of a page: restrict it to this one.
     body = body.replace('<style type="text/css">*{', f'<style type="text/css">#{key}-svg *{{')
     width = float(box[0].split()[2])
     return (

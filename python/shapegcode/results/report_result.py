@@ -12,11 +12,11 @@ from shapegcode.results.table import Column, Table
 class ReportPage:
     """A page that was written."""
 
-    source: str  # JSON that it was made of
+    source: str  # JSON from which it was made
     page: str  # file that was written
     result: str  # class of the result; empty: it could not be read back
     motion: bool  # the programs were found unchanged and simulated again
-    problems: tuple[str, ...]  # what is not as it should be; they stand on the page too
+    problems: tuple[str, ...]  # also listed on the page
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -33,12 +33,12 @@ class Reports(Result):
 
     @property
     def ok(self) -> bool:
-        """Every page shows its result as it was made."""
+        """True if every page shows its result without a problem."""
         return not self.warnings
 
     @property
     def answer(self) -> str:
-        """How many pages, and whether they can be trusted."""
+        """Number of pages, and of those with a caution."""
         count = len(self.pages)
         sentence = f"{count} page{'s' if count > 1 else ''} written"
         bad = sum(bool(page.problems) for page in self.pages)
@@ -48,7 +48,7 @@ class Reports(Result):
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
         if not self.ok:
-            return "run the command again for the program as it is now: its page then has no such remark."
+            return "run the command again for the present program: its page then has no such remark."
         return f"open {self.pages[0].page} in a browser."
 
     def tables(self) -> list[Table]:

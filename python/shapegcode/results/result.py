@@ -1,4 +1,4 @@
-"""Base of every result: what it offers beside its fields: page, pictures, tables for pandas and xarray."""
+"""Base of every result: page, pictures, tables for pandas and xarray."""
 
 from __future__ import annotations
 
@@ -32,35 +32,35 @@ _AXES = ("x", "y", "z")
 
 
 class Simulatable(Protocol):
-    """What can be simulated again for a page: a program, or two of them, on a machine."""
+    """Interface to simulate one or two programs on a machine again for a page."""
 
     def scene(self, on_progress: Callable[[float], None] = ...) -> Scene | None:
-        """Simulate it."""
+        """Simulate the programs."""
 
 
 class Result(Outcome):
-    """Base of every result. A class that inherits it is a frozen dataclass and says what is abstract in `Outcome`."""
+    """Base of every result. A derived class is a frozen dataclass and implements the abstract members of `Outcome`."""
 
     published: ClassVar[tuple[str, ...]] = ()
-    """Methods of others that every result of the class rests on."""
+    """Published methods on which every result of the class is based."""
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Published methods that it rests on, by their names in `shapegcode.results.citations.METHODS`."""
+        """Published methods on which it is based, by their names in `shapegcode.results.citations.METHODS`."""
         return self.published
 
     @property
     def citations(self) -> tuple[str, ...]:
-        """BibTeX entries of this program and of the papers behind its methods: what ``--cite`` prints."""
+        """BibTeX entries of this program and of the papers on its methods, printed by ``--cite``."""
         from shapegcode.results.citations import entries_of
 
         if self.from_json:
-            raise NotKeptError("citations: the JSON of a result does not hold its methods; run the command with --cite")
+            raise NotKeptError("citations: the JSON of a result does not contain its methods; use --cite")
         return entries_of(self.methods)
 
     @property
     def simulated(self) -> Simulatable | None:
-        """What was simulated, to simulate it again for a page; a result of programs has a field of this name."""
+        """Handle to simulate the programs again for a page; overridden by a field in results of programs."""
         return None
 
     @property
@@ -74,7 +74,7 @@ class Result(Outcome):
 
     @property
     def page_title(self) -> str:
-        """Heading of its page: what was done with what."""
+        """Heading of its page: kind of result and program."""
         from shapegcode.results.page.default import title_of
 
         return title_of(self)
@@ -87,10 +87,10 @@ class Result(Outcome):
         """Sections of its page between verdict and provenance.
 
         Args:
-            provenance: command, version and files of the result; None: it is not known.
+            provenance: command, version and files of the result; None: unknown.
 
         Returns:
-            Tables and pictures, unless the class has more to show.
+            Tables and pictures, unless the class adds more.
         """
         from shapegcode.results.page.default import sections_of
 
@@ -107,10 +107,10 @@ class Result(Outcome):
         """The result as a page.
 
         Args:
-            motion: simulate the programs again for the picture that one can turn; else the page has none.
-            provenance: command, version and files of the result; None: from Python, it is not known.
-            problems: what is not as it should be with the page, such as a program that was changed since.
-            on_progress: called with the share that is done.
+            motion: simulate the programs again for the rotatable picture of the motion; False: without it.
+            provenance: command, version and files of the result; None: unknown, as from Python.
+            problems: problems of the page, such as a program that was changed since.
+            on_progress: called with the finished ratio.
 
         Returns:
             The page, as data.
@@ -132,11 +132,11 @@ class Result(Outcome):
         )
 
     def report(self, path: str | Path, script: Script = "inline") -> list[str]:
-        """Write the page of the result: one HTML file that opens without a server and without a network.
+        """Write the page of the result: one HTML file, readable offline.
 
         Args:
-            path: of the file.
-            script: "inline": all in one file; "beside": the script in a file beside it, which pages can share.
+            path: path of the file.
+            script: "inline": all in one file; "beside": the script in a file of the same folder, shared by pages.
 
         Returns:
             The files written.
@@ -151,35 +151,35 @@ class Result(Outcome):
         return save(self.page(), path, script)
 
     def plot(self, name: str = "", ax: Axes | None = None) -> Axes:
-        """Draw a picture of it.
+        """Draw one of its pictures.
 
         Args:
             name: one of `plots()`; empty: the first of them.
-            ax: to draw into; None: a new figure.
+            ax: axes to draw into; None: a new figure.
 
         Returns:
             The axes.
 
         Raises:
-            ArgumentError: there is no such picture; the message has those that there are.
+            ArgumentError: there is no such picture; the message lists the existing ones.
         """
         plots = self.plots()
         if not plots or (name and name not in plots):
-            there = f"one of {', '.join(plots)}" if plots else "there is no picture of this"
+            there = f"one of {', '.join(plots)}" if plots else "this result has no picture"
             raise ArgumentError(f"plot {name}: {there}" if name else there)
         return plots[name or next(iter(plots))](ax)
 
     def to_pandas(self, what: str = "") -> pd.DataFrame:
-        """A table of it for pandas, one row for each entry, units in the names; needs `shapegcode[study]`.
+        """One of its lists as a pandas table, one row per entry, units in the names; needs `shapegcode[study]`.
 
         Args:
-            what: name of the attribute that is a list, such as "regions" or "cases"; empty: the first of them.
+            what: name of a list attribute, such as "regions" or "cases"; empty: the first one.
 
         Returns:
             The table; columns of nested values have dots in their names.
 
         Raises:
-            ArgumentError: the result has no such list; the message has those that there are.
+            ArgumentError: the result has no such list; the message lists the existing ones.
             ModuleNotFoundError: pandas is not installed.
         """
         import pandas as pd
@@ -195,13 +195,13 @@ class Result(Outcome):
         """Its arrays for xarray, with dimensions and units; needs `shapegcode[study]`.
 
         Args:
-            what: name of the attribute that holds them; empty: the first that has arrays.
+            what: name of the attribute with arrays; empty: the first one.
 
         Returns:
             The arrays.
 
         Raises:
-            ArgumentError: the result has no arrays; the message has those attributes that have.
+            ArgumentError: the result has no arrays; the message lists attributes that have.
             ModuleNotFoundError: xarray is not installed.
         """
         import xarray as xr
@@ -210,7 +210,7 @@ class Result(Outcome):
         parts = {name: found for name, held in holders.items() if (found := _arrays(held))}
         name = _chosen(what, parts, "arrays")
         arrays = parts[name]
-        # They share the dimension that is as long as the times or frequencies; one of length three is the axis.
+        # The common dimension has the length of times or frequencies; a dimension of length three is the axis.
         index = next((key for key in arrays if key.startswith(("times_", "time_", "frequency_", "frequencies_"))), None)
         length = len(arrays[index]) if index is not None else -1
         variables = {}
@@ -239,7 +239,7 @@ def _is_list_of_rows(value: object) -> bool:
 
 
 def _arrays(value: object) -> dict[str, np.ndarray[Any, Any]]:
-    """Arrays among the fields, also those that no JSON holds."""
+    """Arrays among the fields, also those that are not in the JSON."""
     found = {field.name: getattr(value, field.name) for field in _fields(value)}
     return {name: array for name, array in found.items() if isinstance(array, np.ndarray) and array.ndim > 0}
 
@@ -254,6 +254,6 @@ def _chosen(what: str, there: Mapping[str, object], kind: str) -> str:
 
 
 def _unit(name: str) -> str:
-    """Of a plain number, as its name ends; of a nested one by the name that says it."""
+    """Unit by the ending of the name; of a nested name by its innermost part with a unit."""
     parts = reversed(name.split("."))
     return next((unit for part in parts for ending, unit in _UNITS.items() if part.endswith(ending)), "")

@@ -1,6 +1,6 @@
-"""Results read back from what ``--json`` wrote: the inverse of `shapegcode.results.json.plain`, by typed fields.
+"""Read results back from ``--json`` files: the inverse of `shapegcode.results.json.plain`, by typed fields.
 
-What no JSON holds (samples, programs, texts) is missing: who asks for it gets an error that says so.
+Data that are not in the JSON (samples, programs) are missing: access raises an error that says so.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from shapegcode.results.result import Result
 
 
 class NotKept:
-    """Stands for what the JSON does not hold."""
+    """Placeholder for data that are not in the JSON."""
 
     def __init__(self, name: str) -> None:
         self._name = name
 
     def _refuse(self, *_: object) -> typing.NoReturn:
-        raise NotKeptError(f"{self._name}: the JSON of a result does not hold it; run the command again to have it")
+        raise NotKeptError(f"{self._name}: the JSON of a result does not contain it; run the command again")
 
     __bool__ = __call__ = __float__ = __getitem__ = __iter__ = __len__ = _refuse
 
     def __getattr__(self, attribute: str) -> typing.NoReturn:
-        if attribute.startswith("__"):  # asked for by Python itself, such as by copy
+        if attribute.startswith("__"):  # requested by Python itself, such as by copy
             raise AttributeError(attribute)
         self._refuse()
 
@@ -52,41 +52,41 @@ def written_reports(path: str | Path) -> list[dict[str, Any]]:
         with DataFile(path, ArgumentError) as file:
             found = file.json(str(path), file.read(), partial(_no_number, path))
     except UnicodeDecodeError as error:
-        raise ArgumentError(f"{path}: byte {error.start} is not UTF-8: this is no JSON of shapegcode") from None
+        raise ArgumentError(f"{path}: byte {error.start} is not UTF-8: not a JSON file of shapegcode") from None
     except json.JSONDecodeError as error:
         cut = error.pos >= len(error.doc.rstrip()) or "Unterminated" in error.msg
         why = f"the file ends in the middle ({len(error.doc)} characters): it was cut off" if cut else error.msg
         raise ArgumentError(f"{path}: line {error.lineno}, column {error.colno}: {why}") from None
     found = found if isinstance(found, list) else [found]
     if not found:
-        raise ArgumentError(f"{path}: an empty list: there is no result in it")
+        raise ArgumentError(f"{path}: an empty list, without a result")
     for rank, each in enumerate(found, 1):
         if not isinstance(each, dict):
             where = f"entry {rank} of the list" if len(found) > 1 else "the file"
-            raise ArgumentError(f"{path}: {where} is no object: this is not what --json writes")
+            raise ArgumentError(f"{path}: {where} is not an object: not a file of --json")
     return found
 
 
 def _no_number(path: str | Path, word: str) -> typing.NoReturn:
-    raise ArgumentError(f"{path}: {word} is no number in JSON: this is not what --json writes")
+    raise ArgumentError(f"{path}: {word} is not a number in JSON: not a file of --json")
 
 
 def load_result(path: str | Path) -> Result:
     """Read back a result that a command wrote with ``--json``.
 
     Args:
-        path: of the file.
+        path: path of the file.
 
     Returns:
-        The result, with everything that its JSON holds.
+        The result, with all data of its JSON.
 
     Raises:
-        ArgumentError: cut off, no JSON of a result, several results, or of a version that this one cannot read.
+        ArgumentError: truncated, not a JSON of a result, several results, or from an incompatible version.
         OSError: the file cannot be read.
     """
     reports = written_reports(path)
     if len(reports) > 1:
-        raise ArgumentError(f"{path}: holds {len(reports)} results (--program all), and one is asked for")
+        raise ArgumentError(f"{path}: contains {len(reports)} results (--program all), and one is needed")
     try:
         return revived(reports[0])
     except ArgumentError as error:
@@ -117,7 +117,7 @@ def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingPr
     package = importlib.import_module("shapegcode")  # every kind of result is public
     cls = getattr(package, provenance.result) if provenance.result in package.__all__ else None
     if not (isinstance(cls, type) and issubclass(cls, Result)):
-        raise ArgumentError(f"provenance.result = {provenance.result}: not a result that this version knows")
+        raise ArgumentError(f"provenance.result = {provenance.result}: not a result known to this version")
     report = current_keys(cls, report)
     names = {field.name for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
     beside = {*cls.json_extra, "provenance", "plots", "output", "program_address"}
@@ -161,7 +161,7 @@ def _value(hint: Any, data: Any, where: str, bound: Mapping[Any, Any] = types.Ma
 
 def _simple(cls: type, data: Any, where: str) -> Any:
     if cls is float and data is None:
-        return math.nan  # JSON has no word for it
+        return math.nan  # JSON has no NaN
     if cls is float and isinstance(data, int | float) and not isinstance(data, bool):
         return float(data)
     return data if type(data) is cls else _wrong(where, data, _NAMES[cls])
@@ -226,14 +226,14 @@ def _fields(cls: Any, data: Mapping[str, Any], where: str, bound: Mapping[Any, A
 
 
 def _from_properties(cls: Any, data: Mapping[str, Any], where: str) -> Mapping[str, Any]:
-    """Hidden fields that follow from properties in the JSON: of a class with `hidden_from_json(data)`."""
+    """Hidden fields computed from properties in the JSON, for classes with `hidden_from_json(data)`."""
     read = getattr(cls, "hidden_from_json", None)
     if read is None:
         return {}
     try:
         found: Mapping[str, Any] = read(data)
     except (KeyError, TypeError, ValueError) as error:
-        raise ArgumentError(f"{where}: {error} is missing or not what it should be") from None
+        raise ArgumentError(f"{where}: {error} is missing or wrong") from None
     return found
 
 

@@ -1,6 +1,6 @@
-"""Tables, declared once: columns with name, unit, value and digits; for the terminal.
+"""Tables: columns with name, unit, value and digits; for terminal and page.
 
-A table fits 80 columns: numbers stay whole, texts wrap between words, and a column without any entry is left out.
+A table fits 80 columns: numbers are not broken, texts wrap between words, and empty columns are left out.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
     from rich.table import Table as RichTable
 
-NO_BREAK = "\N{NO-BREAK SPACE}"  # holds the words of a cell on one line
+NO_BREAK = "\N{NO-BREAK SPACE}"  # keeps the words of a cell on one line
 _NARROWEST = 12
 
 
@@ -27,15 +27,15 @@ class Column:
 
     Attributes:
         name: heading.
-        unit: behind the heading; empty: none.
-        value: what a cell shows: name of an attribute of the row (dots lead further), or a function of the row.
-        digits: behind the point of numbers; None: as text.
+        unit: unit after the heading; empty: none.
+        value: content of a cell: attribute of the row (dotted names allowed), or a function of the row.
+        digits: decimals of numbers; None: as text.
         text: left-aligned text, which wraps; other columns are right-aligned and never wrapped.
-        left: left-aligned, though never wrapped: a column of names.
-        style: of a cell, as rich names it, from the row; None: plain.
-        link: where a cell of a page leads: as `value`; empty: nowhere.
-        priority: which columns go first where the table is too wide: those of the highest, of these the last one; 0
-            stays, as the first column does.
+        left: left-aligned and never wrapped: a column of names.
+        style: rich style of a cell from the row; None: plain.
+        link: link target of a cell on a page, given as `value`; empty: none.
+        priority: columns with the highest priority are dropped first if the table is too wide, the last one first; 0
+            is never dropped, nor is the first column.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Column:
         """Text of a cell; empty without a value.
 
         Args:
-            row: of the table.
+            row: row of the table.
 
         Returns:
             The text of the cell.
@@ -76,14 +76,14 @@ class Table:
     """A table as data.
 
     Attributes:
-        title: above it; empty: none.
+        title: title above the table; empty: none.
         columns: from left to right.
-        rows: what the columns read, from top to bottom.
-        caption: below it; empty: none.
-        sections: ranks of the rows before which a line is drawn.
-        row_style: of a whole row, as rich names it.
-        caption_style: as rich names it.
-        whole: no column is left out, however narrow the terminal is.
+        rows: input of the columns, from top to bottom.
+        caption: text below the table; empty: none.
+        sections: indices of rows before which a line is drawn.
+        row_style: rich style of a whole row.
+        caption_style: rich style of the caption.
+        whole: leave no column out, even on a narrow terminal.
     """
 
     title: str
@@ -101,11 +101,11 @@ class Table:
         return [[column.heading for column in shown], *([column.cell(row) for column in shown] for row in self.rows)]
 
     def shown(self) -> list[Column]:
-        """The columns that are not empty in every row, as `cells` has them."""
+        """The columns that are not empty in every row, as in `cells`."""
         return [column for column in self.columns if not self.rows or any(column.cell(row) for row in self.rows)]
 
     def __str__(self) -> str:
-        """As on a terminal of 80 columns, without colours."""
+        """The table as on a terminal of 80 columns, without colours."""
         import io
 
         from rich.console import Console
@@ -117,7 +117,7 @@ class Table:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         from rich.text import Text
 
-        # On lines of their own: rich would wrap them at the width of the table.
+        # Separate lines: rich would wrap them at the width of the table.
         if self.title:
             yield Text(self.title, style="bold")
         shown = self.shown()
@@ -126,24 +126,24 @@ class Table:
         if self.caption:
             yield Text(self.caption, style=self.caption_style)
         if left := [column.heading for column in shown if column not in kept]:
-            yield Text(f"left out, as the terminal is too narrow: {', '.join(left)} (--verbose)", style="dim")
+            yield Text(f"left out, because the terminal is too narrow: {', '.join(left)} (--verbose)", style="dim")
 
     def everything(self) -> Table:
-        """The table with every column, however narrow the terminal is."""
+        """The table with every column, even on a narrow terminal."""
         return replace(self, whole=True)
 
     def width(self) -> int:
-        """Characters that the table with every column takes, with texts on one line each."""
+        """Width of the table with every column, in characters, without wrapped texts."""
         return _least_width(self.shown(), self._texts(self.shown()), whole=True)
 
     def _texts(self, shown: Sequence[Column]) -> list[list[str]]:
-        """Cells; a figure with its interval or unit is one word."""
+        """Cells as texts; a figure with interval or unit is kept on one line."""
         cells = [[column.cell(row) for column in shown] for row in self.rows]
         worded = [column.text or column.left for column in shown]
         return [[c if w else c.replace(" ", NO_BREAK) for c, w in zip(row, worded, strict=True)] for row in cells]
 
     def _fitting(self, shown: list[Column], width: int) -> list[Column]:
-        """The columns that stand side by side in a width without a cut word."""
+        """The columns that fit a width without a cut word."""
         kept = list(shown)
         while _least_width(kept, self._texts(kept)) > width:
             free = [rank for rank, column in enumerate(kept) if rank > 0 and column.priority > 0]
@@ -175,12 +175,12 @@ class Table:
 
 
 def _least_and_most(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> tuple[list[int], list[int]]:
-    """How wide each column has to be for its longest word, and for its longest line."""
+    """Width of each column for its longest word, and for its longest line."""
     least, most = [], []
     for rank, column in enumerate(columns):
         parts = [[cells[rank]] if column.left else cells[rank].split(" ") for cells in rows]
         words = [*column.heading.split(), *(word for words in parts for word in words)]
-        # A path may be longer than the terminal is wide, and folds.
+        # A path may exceed the width of the terminal, and is folded.
         least.append(min(max(map(len, words), default=1), 24 if column.text else 60))
         most.append(max([len(column.heading), *(len(cells[rank]) for cells in rows)]))
     return least, most
@@ -193,17 +193,17 @@ def _least_width(columns: Sequence[Column], rows: Sequence[Sequence[str]], *, wh
 
 
 def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int) -> list[int]:
-    """How wide each column is, so that no word is cut; rich shrinks every column alike, and then cuts the last ones."""
+    """Widths of the columns without cut words; rich would shrink all columns alike and cut the last ones."""
     least, most = _least_and_most(columns, rows)
     found = list(least)
     spare = width - (2 * len(columns) - 1) - sum(least)
     for _ in range(-spare):
-        # Too narrow a terminal: long words of texts fold, names and figures stay whole.
+        # Terminal too narrow: long words of texts are folded, names and figures are not.
         texts = [rank for rank, column in enumerate(columns) if column.text and found[rank] > _NARROWEST]
         if texts:
             found[max(texts, key=found.__getitem__)] -= 1
     for _ in range(spare):
-        # A character more for the column with most lines.
+        # One more character for the column with the most lines.
         rank = max(range(len(columns)), key=lambda rank: most[rank] / max(found[rank], 1))
         if found[rank] >= most[rank]:
             break
@@ -212,7 +212,7 @@ def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int
 
 
 def _wrapped(cell: str, width: int) -> str:
-    """In lines that fit; done here, as rich breaks a line at NO_BREAK as well. What is printed has plain spaces."""
+    """Wrap a cell to a width, because rich breaks lines at NO_BREAK too; the result has plain spaces."""
     parts = (textwrap.wrap(part, width, break_on_hyphens=False) or [""] for part in cell.split("\n"))
     return "\n".join(itertools.chain.from_iterable(parts)).replace(NO_BREAK, " ")
 
@@ -223,12 +223,12 @@ def xyz_columns(cell: Callable[[str, Any], object]) -> tuple[Column, ...]:
 
 
 def share_percent(part: float, whole: float) -> str:
-    """A part in percent of the whole, for a cell; empty where there is no whole."""
+    """A part in percent of the whole, for a cell; empty if the whole is 0."""
     return f"{part / whole * 100.0:.1f} %" if whole > 0.0 else ""
 
 
 def warning_table(warnings: Iterable[str]) -> RichTable:
-    """Warnings one below the other; a long one wraps under its own text, not under the word `warning`."""
+    """Warnings below each other; a long one is wrapped with hanging indent."""
     from rich.table import Table as RichTable
     from rich.text import Text
 

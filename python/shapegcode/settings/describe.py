@@ -1,4 +1,4 @@
-"""A settings file written with comments, long or short; its JSON Schema."""
+"""Write a settings file with comments, long or short; its JSON Schema."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _FOUND = ("measured", "dump")
 
 
 def write_toml(machine: TomlTable, remarks: Mapping[str, str], *, short: bool = False) -> str:
-    """A machine as a commented file; *short*: what differs from a default, or of which its origin is known."""
+    """Write a machine as a commented file; *short*: only values that differ from a default or have a known origin."""
     writer = _TomlWriter(dict(remarks), short)
     writer.comment(_SHORT_HEAD if short else _HEAD)
     writer.lines.append("")
@@ -51,14 +51,14 @@ def write_toml(machine: TomlTable, remarks: Mapping[str, str], *, short: bool = 
 
 class _TomlWriter:
     def __init__(self, remarks: dict[str, str], short: bool) -> None:
-        self.remarks = remarks  # that are not yet written
+        self.remarks = remarks  # not yet written
         self.written: dict[str, str] = {}
         self.lines: list[str] = []
         self._short = short
         self._explains = not short
 
     def _add(self, line: str, key: str) -> None:
-        """A line, its remark as the comment behind it: for people, what counts is the table of the origins."""
+        """Add a line with its remark as a comment: for readers; the table of origins is what counts."""
         if remark := self.remarks.pop(key, ""):
             self.written[key] = remark
         self.lines.append(f"{line}  # {remark}" if remark else line)
@@ -70,7 +70,7 @@ class _TomlWriter:
         )  # fmt: skip
 
     def table(self, table: TomlTable, prefix: str) -> None:
-        """Plain keys first, then the tables below, as TOML asks."""
+        """Write plain keys first, then nested tables, as TOML requires."""
         below: list[tuple[str, FieldInfo, Any]] = []
         for name, field in type(table).model_fields.items():
             value, key = getattr(table, name), f"{prefix}{name}"
@@ -90,7 +90,7 @@ class _TomlWriter:
                 self._below(f"[{key}]", field.description or "", value, f"{key}.")
 
     def _below(self, head: str, meaning: str, table: TomlTable, prefix: str) -> None:
-        """A TOML table with its header, if keys remain in it; else nothing."""
+        """Write a nested table with its header, if keys remain in it."""
         before = list(self.lines)
         if self.lines and self.lines[-1]:
             self.lines.append("")
@@ -111,21 +111,21 @@ class _TomlWriter:
         elif not tables and self.remarks.get(key):
             self._add(f"# [[{key}]]", key)
         for number, table in enumerate(tables, start=1):
-            # The first of a list says what the keys of all are.
+            # Only the first table of a list explains the keys.
             self._explains = not self._short and number == 1
             meaning = (item.__doc__ or "").rstrip(".") if number == 1 else ""
             self._below(f"[[{key}]]", meaning, table, f"{key}.{number}.")
         self._explains = not self._short
 
     def _is_kept(self, key: str, table: TomlTable, name: str, field: FieldInfo) -> bool:
-        """Whether the file must hold it, or holds it with a word of where it comes from."""
+        """True if the file must contain the key, or has it with an origin."""
         value = getattr(table, name)
         if field.is_required():
             return True
         remark, assumed = self.remarks.get(key, ""), bool(facts(field).get("assumed"))
         origin = origin_of(remark)
-        # What equals the default goes where nothing is lost: an assumption whose default is marked as one, a statement
-        # without a word of where it comes from whose default is not.
+        # A value equal to the default is left out if no information is lost: an assumption whose default is assumed, a
+        # value without an origin whose default is not.
         kept = {"assumed": not assumed, "inherited": not assumed, "file": bool(remark) or assumed}.get(
             origin, origin in _FOUND
         )
@@ -146,8 +146,8 @@ def toml_schema(model: type[TomlTable], title: str, *, origins: bool = False) ->
 
 
 def _allow_origins(model: type[TomlTable], found: dict[str, Any], defs: dict[str, Any]) -> None:
-    """A table of origins, and beside each value its own; such a value is only checked when the file is read."""
-    defs["Origin"] = {"type": "string", "pattern": ORIGIN_TEXT, "description": "where the value comes from"}
+    """Allow a table of origins, or an origin at each value (such values are checked only on load)."""
+    defs["Origin"] = {"type": "string", "pattern": ORIGIN_TEXT, "description": "origin of the value"}
     stated = {"$ref": "#/$defs/Origin"}
     defs["Origins"] = {"type": "object", "additionalProperties": {"anyOf": [stated, {"$ref": "#/$defs/Origins"}]}}
     both = {"value": {}, ORIGIN: stated}
@@ -165,7 +165,7 @@ def _allow_origins(model: type[TomlTable], found: dict[str, Any], defs: dict[str
             if beside not in value.get("anyOf", ()):
                 text = {key: value.pop(key) for key in ("description", "default") if key in value}
                 entry["properties"][name] = {"anyOf": [*value.get("anyOf", [value]), beside]} | text
-    found["properties"][ORIGIN] = {"$ref": "#/$defs/Origins", "description": "where values come from, by key"}
+    found["properties"][ORIGIN] = {"$ref": "#/$defs/Origins", "description": "origins of values, by key"}
 
 
 def keys_schema(model: type[TomlTable], value: dict[str, Any], kind: str, defs: dict[str, Any]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
-"""A TOML file edited with tomlkit: some entries, or where values come from, change, the rest stays byte for byte.
+"""Edit a TOML file with tomlkit: change some entries or origins, keep the rest byte for byte.
 
-Whoever edits the entries, ``table.value.body``, reads the result again and compares it with what was meant.
+After editing entries, ``table.value.body``, read the result again and compare it with the intention.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ _COMMENTED_TABLE = re.compile(r"#\s*\[\[\s*([^\[\]]+?)\s*\]\]")
 
 
 def parse_exactly(text: str, file: str) -> tomlkit.TOMLDocument:
-    """A TOML file that can be edited so that the rest of it stays byte for byte."""
+    """Parse a TOML file that can be edited without changing any other byte; refuse others."""
     document = tomlkit.parse(text)
     rendered = document.as_string()
     if rendered == text:
         return document
     lines = zip(text.splitlines(), rendered.splitlines(), strict=False)
     number, (line, other) = next((n, pair) for n, pair in enumerate(lines, start=1) if pair[0] != pair[1])
-    raise ArgumentError(f"{file}:{number}: {line.strip()!r} cannot be kept as it is: write it as {other.strip()!r}")
+    raise ArgumentError(f"{file}:{number}: {line.strip()!r} cannot be kept unchanged: write it as {other.strip()!r}")
 
 
 def entry_of(line: str) -> Entry:
-    """A line with a key as an entry, its comment and line end included."""
+    """A line with a key as an entry, with its comment and line end."""
     return tomlkit.parse(line).body[0]
 
 
 def commented_key(entry: Entry) -> str:
-    """The name in a comment ``# name = ...``, which stands for a key that is left out; empty for everything else."""
+    """The name in a comment ``# name = ...`` for a missing key; empty for everything else."""
     return _commented(entry, _COMMENTED_KEY)
 
 
 def commented_table(entry: Entry) -> str:
-    """The name in a comment ``# [[name]]``, which stands for a list without tables; empty for everything else."""
+    """The name in a comment ``# [[name]]`` for a list without tables; empty for everything else."""
     return _commented(entry, _COMMENTED_TABLE)
 
 
@@ -56,7 +56,7 @@ def _commented(entry: Entry, pattern: re.Pattern[str]) -> str:
 
 
 def own_end(entries: list[Entry]) -> int:
-    """One behind the last key, and behind the commented keys that follow it at once: what is there is of others."""
+    """Index after the last key and the commented keys that follow it; later entries belong to other tables."""
     end = max((index + 1 for index, (key, _) in enumerate(entries) if key is not None), default=0)
     for index in range(end, len(entries)):
         if not isinstance(entries[index][1], Comment) or commented_table(entries[index]):
@@ -67,7 +67,7 @@ def own_end(entries: list[Entry]) -> int:
 
 
 def take_tail(table: Table) -> list[Entry]:
-    """Take away what stands behind the last key of a table and of the tables in it: it is of what follows."""
+    """Remove and return entries after the last key of a table and its nested tables: they belong to the next table."""
     entries = table.value.body
     last = next((item for key, item in reversed(entries) if key is not None), None)
     last = last.body[-1] if isinstance(last, AoT) else last
@@ -79,21 +79,21 @@ def take_tail(table: Table) -> list[Entry]:
 
 
 def is_blank(entry: Entry) -> bool:
-    """Whether it is a blank line."""
+    """True for a blank line."""
     return isinstance(entry[1], Whitespace)
 
 
-# --- where values come from -------------------------------------------------------------------------------------------
+# --- origins of values ------------------------------------------------------------------------------------------------
 
 
 def origin_lines(remarks: Mapping[str, str]) -> list[str]:
-    """The table of the origins."""
+    """Lines of the table of origins."""
     lines = [f"{key} = {tomlkit.string(_stated(remark)).as_string()}" for key, remark in remarks.items() if remark]
-    return [f"[{ORIGIN}]  # where values come from: {', '.join(ORIGIN_WORDS.values())}", *lines] if lines else []
+    return [f"[{ORIGIN}]  # origins of values: {', '.join(ORIGIN_WORDS.values())}", *lines] if lines else []
 
 
 def with_origin_table(text: str, remarks: Mapping[str, str] | None = None) -> str:
-    """A file with its origins in a table at its end; the rest stays byte for byte, but for values with an origin."""
+    """Move the origins of a file to a table at its end; otherwise only values with an inline origin change."""
     remarks = remarks_of(text) if remarks is None else remarks
     text = without_origins(text)
     newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
@@ -102,15 +102,15 @@ def with_origin_table(text: str, remarks: Mapping[str, str] | None = None) -> st
 
 
 def without_origins(text: str) -> str:
-    """A file without what it says of where values come from; the rest stays byte for byte."""
+    """Remove the origins from a file; the rest stays byte for byte."""
     plain, stated = take_origins(tomllib.loads(text))
     if stated is None:
         return text
-    # Mostly they are one table at the end: what tomlkit takes a second for is a cut then.
+    # Usually they are one table at the end, which can be cut off; tomlkit would take a second.
     headers = list(_HEADER.finditer(text))
     if headers and headers[-1][1] == ORIGIN:
         head = text[: headers[-1].start()]
-        with contextlib.suppress(tomllib.TOMLDecodeError):  # what looks like a heading stands in a text
+        with contextlib.suppress(tomllib.TOMLDecodeError):  # the apparent heading is inside a string
             if tomllib.loads(head) == plain:
                 return head
     document = tomlkit.parse(text)
@@ -131,7 +131,7 @@ def _unwrap(table: Any) -> None:
 
 
 def with_remarks(text: str, change: Callable[[str, str], str]) -> str:
-    """A file with other provenance of its values; comments that repeat an origin are updated."""
+    """Change the origins in a file, also in comments that repeat them."""
     old = remarks_of(text)
     new = {key: change(key, remark) for key, remark in old.items()}
     lines = []

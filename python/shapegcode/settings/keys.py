@@ -1,13 +1,13 @@
-"""Building blocks of the tables of the machine file: types of values, fields with their metadata, TOML notation; and
-where values come from: the table ``[origin]``, each text begins with a word.
+"""Building blocks of the machine file: types of values, fields with their metadata, TOML notation; and
+origins of values in the table ``[origin]``, where each text begins with a keyword.
 
     [origin]
     axes.x.modes.1.frequency_hz = "measured, 95 %: 46.1 ... 46.3"
     controller.time_constant_s = "parameters: FANUC 1622, 1610"
     controller.block_time_s = "inherited: from VX500: paper 000"
 
-Or beside the value: ``frequency_hz = { value = 46.2, origin = "measured" }``. A comment is for people and says nothing;
-only in files without either form, as they were written before, the first words of the comments count.
+Or at the value: ``frequency_hz = { value = 46.2, origin = "measured" }``. Comments are ignored;
+only in older files without either form the first words of the comments are used.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
 from pydantic.fields import FieldInfo
 
 Origin = Literal["measured", "dump", "inherited", "assumed", "choice", "file", "default"]
-"""Of a value: measured on this machine; read from the control's dump; taken over from another machine; assumed; a
-choice, no property of a machine; stated in the file without a word of where it comes from; left out of the file."""
+"""Origin of a value: measured on this machine; read from the control's dump; inherited from another machine; assumed; a
+choice, not a machine property; set in the file without an origin; not in the file."""
 
 DEFAULT = "default"  # remark of a default that was written into a file
-ORIGIN = "origin"  # name of the table, and of the key beside an inline value
+ORIGIN = "origin"  # name of the table, and of the key next to an inline value
 ORIGIN_WORDS: dict[Origin, str] = {
     "measured": "measured", "dump": "parameters", "inherited": "inherited", "assumed": "assumed", "choice": "choice",
     "default": "default", "file": "stated",
@@ -54,12 +54,12 @@ _VALUE = re.compile(r"(?:\"(?:[^\"\\]|\\.)*\"|'[^']*'|[^#\"'])*")
 
 
 def origin_of(remark: str) -> Origin:
-    """Where a value of a file comes from, by what stands behind it."""
+    """Origin of a value, from its remark."""
     return next((origin for begins, origin in _BEGINNINGS if re.match(begins, remark)), "file")
 
 
 def inherited(name: str, remark: str) -> str:
-    """The remark of a value that is taken over from another machine."""
+    """Remark of a value inherited from another machine."""
     if origin_of(remark) in ("assumed", "choice", "inherited", "default"):
         return remark
     return f"from {name}: {remark}" if remark else f"from {name}"
@@ -67,16 +67,16 @@ def inherited(name: str, remark: str) -> str:
 
 @dataclass(frozen=True)
 class KeyLine:
-    """A line that names a table or a key, or in a comment ``# name = ...`` a key that is left out."""
+    """A line with a table, a key, or a missing key in a comment ``# name = ...``."""
 
     kind: Literal["table", "key", "unset"]
     key: str  # dotted name
-    end: int = 0  # where its remark begins
+    end: int = 0  # start of its remark
     remark: str = ""
 
 
 def take_origins(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """The tables of a file without what they say of where values come from, and that; two for one value are a list."""
+    """Split the tables of a file into values and their origins; two origins of one value become a list."""
     found: dict[str, Any] = {}
     inline: dict[str, Any] = {}
     plain = {name: _plain(value, name, inline) for name, value in data.items() if name != ORIGIN}
@@ -111,24 +111,24 @@ def _note(key: str, origin: Any, found: dict[str, Any]) -> None:
 
 
 def remark_of(stated: str) -> str:
-    """The remark that an origin in a file states: without the word where the note says the same."""
+    """Remark of an origin in a file: without the keyword if the note implies it."""
     word, _, note = stated.partition(": ")
     return note if note and origin_of(note) == origin_of(word) else stated
 
 
 def remarks_of(text: str) -> dict[str, str]:
-    """Where the values of a file come from."""
+    """Origins of the values of a file."""
     stated = take_origins(tomllib.loads(text))[1]
     return remarks_in_comments(text) if stated is None else {key: remark_of(origin) for key, origin in stated.items()}
 
 
 def remarks_in_comments(text: str) -> dict[str, str]:
-    """What stands behind the values of a file that has neither form of origins."""
+    """Comments after the values of a file without origins."""
     return {line.key: line.remark for _, line in lines_of(text) if line and line.remark}
 
 
 def lines_of(text: str) -> Iterator[tuple[str, KeyLine | None]]:
-    """Every line with its end, and what it names; None for every other line."""
+    """Yield every line with its end, and its table or key; None for other lines."""
     table, counts, inside = "", dict[str, int](), 0
     texts = _lines_of_long_texts(text)
     for number, raw in enumerate(text.splitlines(keepends=True)):
@@ -161,7 +161,7 @@ _TEXT = re.compile(r"""(\"{3}(?:\\.|[^\\])*?\"{3,5}|'{3}.*?'{3,5})|"(?:\\.|[^"\\
 
 
 def _lines_of_long_texts(text: str) -> set[int]:
-    """Lines, from 0, of texts in three quotes: nothing in them is a key or a comment."""
+    """Lines, from 0, of triple-quoted strings, which contain no keys or comments."""
     found: set[int] = set()
     for match in _TEXT.finditer(text):
         if match[1]:
@@ -171,12 +171,12 @@ def _lines_of_long_texts(text: str) -> set[int]:
 
 
 def open_brackets(line: str) -> int:
-    """How many more lists begin in a line than end in it; texts and comments do not count."""
+    """Number of opened minus closed brackets in a line, outside of strings and comments."""
     bare = re.sub(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*', "", line)
     return bare.count("[") - bare.count("]")
 
 
-# Numbers are strict: a string or a truth value in place of a number is an error; 3 for 3.0 is not.
+# Numbers are strict: a string or a boolean instead of a number is an error; 3 for 3.0 is not.
 Float = Annotated[float, Strict(), Field(allow_inf_nan=False)]
 Positive = Annotated[float, Strict(), Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Strict(), Field(ge=0, allow_inf_nan=False)]
@@ -192,16 +192,16 @@ _UNITS = {
     "_n_per_um": "N/µm", "_n_per_mm": "N/mm", "_n_per_mm2": "N/mm²", "_gpa": "GPa", "_deg": "degrees",
     "_percent": "%", "_ratio": "1", "_exponent": "1", "_bytes": "bytes", "_kb": "kB", "_baud": "baud",
 }  # fmt: skip
-"""Unit of a key by the end of its name; the longest that fits."""
+"""Unit of a key by the ending of its name; the longest match counts."""
 
 
 _KNOWN = object()
 
 
 def key(meaning: str, *, unit: str = "", fanuc: str = "", assumed: Any = _KNOWN, **field: Any) -> Any:
-    """A pydantic field with what the documentation of a key needs; *unit* only where its name does not end in it.
+    """A pydantic field with the documentation of a key; *unit* only if its name does not end in it.
 
-    *assumed* is a default that nobody measured, in place of ``default``; left out, both make the key mandatory.
+    *assumed*: a default that is an assumption, instead of ``default``; without both the key is mandatory.
     """
     if assumed is not _KNOWN:
         field["default"] = assumed
@@ -216,28 +216,28 @@ class TomlTable(BaseModel):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        """Note the units that the names of the keys say."""
+        """Set the units from the names of the keys."""
         for name, field in cls.model_fields.items():
             noted = field.json_schema_extra
             if isinstance(noted, dict) and noted.get("unit") == "":
                 noted["unit"] = _UNITS[max((end for end in _UNITS if name.endswith(end)), key=len, default="")]
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Refuse it with what to do instead."""
+        """Refuse, and name the alternative."""
         if not name.startswith("_"):
             raise AttributeError(
                 f"{type(self).__name__}.{name} cannot be set: values never change; "
-                f"machine.with_values({{'...{name}': value}}) gives a machine with another one"
+                f"machine.with_values({{'...{name}': value}}) returns a machine with another one"
             )
         super().__setattr__(name, value)
 
 
 class InlineTable(TomlTable):
-    """A table that is written in one line, as the value of a key."""
+    """A table written in one line, as the value of a key."""
 
 
 class PerAxis(InlineTable):
-    """One value per axis. A machine file may give a single number, which then holds for all three."""
+    """One value per axis. A single number in a machine file applies to all three."""
 
     x: NonNegative = key("value of the X axis")
     y: NonNegative = key("value of the Y axis")
@@ -249,7 +249,7 @@ class PerAxis(InlineTable):
 
 
 def _spread(value: object) -> object:
-    """A single number stands for all three axes; a table must name all three."""
+    """Apply a single number to all three axes; a table must contain all three."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return {"x": value, "y": value, "z": value}
     return value
@@ -289,42 +289,42 @@ AxisRatios = Annotated[RatioPerAxis, BeforeValidator(_spread, json_schema_input_
 
 @dataclass(frozen=True)
 class KeyInfo:
-    """One key of the machine file with what the documentation says of it."""
+    """Documentation of one key of the machine file."""
 
     # dotted name; ``axes.x.modes.1.frequency_hz`` for values, ``axes.<x|y|z>`` and ``modes[]`` in the documentation of
     # the format
     key: str
-    unit: str  # unit, "1" for a ratio, empty where there is none
+    unit: str  # unit, "1" for a ratio, empty if there is none
     default: str  # default as written in TOML, or "required", or "not set"
-    meaning: str  # what it is
+    meaning: str  # its meaning
     fanuc: str  # numbers of the FANUC parameters that correspond to it, or empty
-    assumed: bool  # True where the default is an assumption and not a known value
+    assumed: bool  # True if the default is an assumption
 
 
 @dataclass(frozen=True)
 class KeyValue:
-    """One value of loaded settings, with what the documentation says of its key."""
+    """One value of loaded settings, with the documentation of its key."""
 
     key: str  # dotted name, ``axes.x.modes.1.frequency_hz``
     value: str  # the value as TOML, "not set" for an optional key without one
-    unit: str  # unit, "1" for a ratio, empty where there is none
-    # where it comes from: "measured" on this machine, "dump" of the control's parameters, "inherited" from another
-    # machine, "assumed", "choice" (no property of a machine), "file" (the file states it, and does not say why),
-    # "default" (the file leaves it out)
+    unit: str  # unit, "1" for a ratio, empty if there is none
+    # its origin: "measured" on this machine, "dump" of the control's parameters, "inherited" from another
+    # machine, "assumed", "choice" (no property of a machine), "file" (set in the file without an origin),
+    # "default" (not in the file)
     origin: Origin
-    assumed: bool  # True where the value is an assumption, in the file or as a default
-    meaning: str  # what it is
+    assumed: bool  # True if the value is an assumption, in the file or as a default
+    meaning: str  # its meaning
     fanuc: str  # numbers of the FANUC parameters that correspond to it, or empty
-    remark: str = ""  # what stands behind the value in the file
+    remark: str = ""  # comment after the value in the file
 
     @property
     def unmeasured(self) -> bool:
-        """Whether nobody measured or looked it up on this machine: it is assumed or inherited."""
+        """True if it is unverified: assumed or inherited."""
         return self.assumed or self.origin == "inherited"
 
 
 def facts(field: FieldInfo | None) -> dict[str, Any]:
-    """What `key` noted of a field."""
+    """Metadata of a field from `key`."""
     extra = field.json_schema_extra if field is not None else None
     return dict(extra) if isinstance(extra, dict) else {}
 
@@ -349,7 +349,7 @@ def _as_table(annotation: Any) -> type[TomlTable] | None:
 
 
 def key_info(field: FieldInfo, key: str) -> KeyInfo:
-    """What the documentation says of a field; *key* is its dotted name."""
+    """Documentation of a field; *key* is its dotted name."""
     noted = facts(field)
     default = "required" if field.is_required() else "not set" if field.default is None else toml(field.default)
     unit, fanuc = noted.get("unit", ""), noted.get("fanuc", "")
@@ -371,7 +371,7 @@ def values_of(
         else:
             info = key_info(field, key)
             remark = (remarks or {}).get(key, "")
-            # A key without a value can have a remark that says why: "assumed: not limited", "not measured: rigid".
+            # A key without a value can have a remark with the reason: "assumed: not limited", "not measured: rigid".
             says_why = not value and (value is not None or remark.startswith("assumed"))
             origin = origin_of(remark) if from_file or (remark and says_why) else "default"
             assumed = origin == "assumed" or (info.assumed and origin == "default")
@@ -391,7 +391,7 @@ def toml(value: object) -> str:
         is_whole = math.isfinite(value) and value == int(value) and abs(value) < 1e15
         return f"{value:.1f}" if is_whole else repr(value)
     if isinstance(value, str):
-        # JSON strings are TOML basic strings, but for DEL, which TOML wants escaped.
+        # JSON strings are TOML basic strings, except that TOML requires DEL to be escaped.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list | tuple):
         return "[" + ", ".join(toml(item) for item in value) + "]"
@@ -402,5 +402,5 @@ def toml(value: object) -> str:
 
 
 def toml_key(key: str) -> str:
-    """A key in TOML notation: in quotes where it must be."""
+    """A key in TOML notation, quoted if necessary."""
     return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key)

@@ -1,4 +1,4 @@
-"""Reading a TOML file of settings as its model: every problem at once, each with its line; values changed by key."""
+"""Read a TOML settings file as its model: all problems at once, each with its line; change values by key."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file, toml_tables
 from shapegcode.settings.keys import InlineTable, TomlTable, facts, lines_of, table_type, toml, toml_key
 
 MAX_PROBLEMS = 100
-_LONGEST_NAME = 200  # that is compared with known ones
+_LONGEST_NAME = 200  # for the comparison with known names
 _KNOWN = "; known here: "
 
 
 class KeyProblem(ValueError):
-    """What a validator raises of a key that does not fit another one: found again in the file by its name."""
+    """Raised by a validator for a key that contradicts another one; located in the file by its name."""
 
     def __init__(self, key: str, value: object, limit: str) -> None:
         self.key = key
@@ -33,7 +33,7 @@ class KeyProblem(ValueError):
 
 
 def syntax_problem(message: str, text: str) -> Problem:
-    """Line and column of a TOML syntax error, which tomllib has only in its message."""
+    """Problem with line and column of a TOML syntax error, parsed from tomllib's message."""
     found = re.search(r"\s*\(at line (\d+), column (\d+)\)$", message)
     if found:
         return Problem("", "", f"{message[: found.start()]} (column {found[2]})", int(found[1]))
@@ -42,15 +42,15 @@ def syntax_problem(message: str, text: str) -> Problem:
 
 
 def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, Any], text: str) -> tuple[Problem, ...]:
-    """Pydantic's errors as problems of the file: dotted keys, TOML values, limits with units."""
+    """Convert pydantic's errors to problems of the file: dotted keys, TOML values, limits with units."""
     problems: list[Problem] = []
-    listed: set[str] = set()  # keys of a table, with the first unknown one
+    listed: set[str] = set()  # tables whose keys were listed with the first unknown one
     details = error.errors(include_url=False)
     for detail in details[:MAX_PROBLEMS]:
         location, value = _locate(detail["loc"], data, detail["type"])
         if detail["type"] == "too_short" and isinstance(value, list) and len(value) >= detail["ctx"]["min_length"]:
-            continue  # short only of its bad items, which are listed themselves
-        # A list counts from 0 in pydantic, from 1 for people.
+            continue  # too short only without its bad items, which are listed themselves
+        # A list counts from 0 in pydantic, from 1 for users.
         key = ".".join(str(part + 1) if isinstance(part, int) else toml_key(part) for part in location)
         limit = _limit(detail["type"], detail.get("ctx", {}), detail["msg"])
         cause = detail.get("ctx", {}).get("error")
@@ -77,7 +77,7 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
 
 
 def further_problems(count: int) -> tuple[Problem, ...]:
-    """Note that there are more than `MAX_PROBLEMS` problems; finding the line of each takes time."""
+    """A problem that counts those beyond `MAX_PROBLEMS`, whose lines are not searched."""
     more = count - MAX_PROBLEMS
     return (Problem("", "", f"{more} further problems are not listed"),) if more > 0 else ()
 
@@ -100,7 +100,7 @@ _LIMITS = {
     **dict.fromkeys(("tuple_type", "list_type"), "must be a list"),
     "value_error": "{error}",
 }
-"""What a value must be, in words, by pydantic's kind of the error."""
+"""Rule for a value as text, by pydantic's kind of error."""
 
 
 def _limit(kind: str, context: Mapping[str, Any], message: str) -> str:
@@ -146,13 +146,13 @@ def field_of(root: type[TomlTable], location: Sequence[int | str]) -> FieldInfo 
 
 
 def _unit_remark(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
-    # The keys x, y, z of a PerAxis have the unit of the key above them.
+    # The keys x, y, z of a PerAxis have the unit of the parent key.
     unit = facts(field_of(root, location)).get("unit") or facts(field_of(root, location[:-1])).get("unit")
     return f" (unit: {unit})" if unit and unit != "1" else ""
 
 
 def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
-    """The known key that an unknown one most likely stands for."""
+    """Hint with the known key most similar to an unknown one."""
     parent = tuple(part for part in location[:-1] if not isinstance(part, int))
     field = field_of(root, parent)
     model = root if not parent else table_type(field) if field is not None else None
@@ -163,7 +163,7 @@ def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
     return f"; did you mean {close[0]}?" if close else f"{_KNOWN}{', '.join(model.model_fields)}"
 
 
-@lru_cache(maxsize=1)  # every problem of a file asks
+@lru_cache(maxsize=1)  # used for every problem of a file
 def _first_lines(text: str) -> dict[tuple[str, str], int]:
     found: dict[tuple[str, str], int] = {}
     for number, (_, line) in enumerate(lines_of(text), start=1):
@@ -173,7 +173,7 @@ def _first_lines(text: str) -> dict[tuple[str, str], int]:
 
 
 def line_of(key: str, text: str) -> int | None:
-    """Line of a dotted key in a text of the plain layout ``[table]`` / ``key = value``; None if not found there."""
+    """Line of a dotted key in a text of the plain layout ``[table]`` / ``key = value``; None if not found."""
     lines, parts = _first_lines(text), key.split(".")
     names = [("key", ".".join(parts[:count])) for count in range(1, len(parts) + 1)]
     return min((lines[name] for name in (*names, ("table", key)) if name in lines), default=None)
@@ -201,7 +201,7 @@ def parsed(text: str, source: str, error: type[FileError]) -> dict[str, Any]:
 
 
 def validated(model: type[_Model], data: dict[str, Any], source: str, text: str, error: type[FileError]) -> _Model:
-    """The tables of a file as their model; *source* names it in messages, *text* gives them line numbers."""
+    """The tables of a file as their model; *source* names it in messages, *text*: for line numbers."""
     try:
         return model.model_validate(data)
     except ValidationError as bad:
@@ -216,12 +216,12 @@ def loaded(model: type[_Model], path: str | Path, error: type[FileError]) -> _Mo
 
 # --- values changed by their dotted keys ------------------------------------------------------------------------------
 
-# A part of a dotted key: in quotes where it holds a dot itself.
+# A part of a dotted key: quoted if it contains a dot.
 _PART = re.compile(r'"([^"]*)"|([^."]+)')
 
 
 def with_values(settings: _Model, values: Mapping[str, object], source: str, error: type[FileError]) -> _Model:
-    """The settings with other values; what was a default stays one."""
+    """Copy the settings with other values; defaults stay defaults."""
     data = _plain(settings)
     for key, value in values.items():
         *tables, last = parts = _parts(key)
@@ -245,7 +245,7 @@ def with_values(settings: _Model, values: Mapping[str, object], source: str, err
 
 
 def missing_row(settings: TomlTable, key: str) -> str:
-    """Why a dotted key names no entry of a list: there it must be a number from 1 to as many as there are."""
+    """Problem of a dotted key with a wrong list index, which counts from 1; empty without one."""
     held: Any = settings
     parts = _parts(key)
     for rank, name in enumerate(parts):
@@ -267,7 +267,7 @@ def _parts(key: str) -> list[str]:
 
 
 def _plain(value: Any) -> Any:
-    """What a file says of a value, in the dictionaries and lists of a TOML file."""
+    """Contents of a value in a file, as dictionaries and lists of TOML."""
     if isinstance(value, TomlTable):
         fields = {name: getattr(value, name) for name in value.model_fields_set}
         return {name: _plain(held) for name, held in fields.items() if held is not None}
@@ -281,7 +281,7 @@ def _is_row(name: str, rows: list[Any] | tuple[Any, ...]) -> bool:
 
 
 def _below(held: Any, name: str) -> Any:
-    """What the loaded settings hold under a name, defaults as well; None where there is nothing."""
+    """Value of the loaded settings under a name, with defaults; None if there is none."""
     if isinstance(held, Mapping):
         return held.get(name)
     if isinstance(held, list | tuple):
@@ -290,9 +290,9 @@ def _below(held: Any, name: str) -> Any:
 
 
 def _entry(table: Any, name: str, held: Any) -> Any:
-    """A table of the file by its name, made where the file leaves it out; None where there can be none."""
+    """A table of the file by its name, created if missing; None if there cannot be one."""
     if isinstance(table, dict):
-        # A value that is a table goes as a whole: its other keys must not be lost.
+        # A value that is a table is copied as a whole, to keep its other keys.
         whole = held is not None and (isinstance(held, InlineTable) or not isinstance(held, TomlTable))
         return table.setdefault(name, _plain(held) if whole else {})
     return table[int(name) - 1] if isinstance(table, list) else None

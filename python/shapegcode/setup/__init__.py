@@ -1,1 +1,1 @@
-"""The first machine file of a shop: questions, what each answer changes, and a short file of what was answered."""
+"""The first machine file of a shop: questions, effect of each answer, and a short file with the answers."""

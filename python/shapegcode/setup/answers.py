@@ -1,4 +1,4 @@
-"""What a shop is asked about its machine: the questions in their order, and the file that can hold the answers.
+"""Questions about a machine in their order, and the file of answers.
 
     name = "VMC-3"
     rapid_mm_per_min = 24000
@@ -6,7 +6,7 @@
     dnc_baud = 9600
     modes = { x = "46:0.02", y = "taps/y.csv", z = "rigid" }
 
-Every question may stay open: its key is left out, and the machine file then claims nothing of it.
+Every question may be left open: without its key the machine file has no value for it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _LIKELY = {
     "max_feed_mm_per_min": (100.0, 500_000.0, "unit: mm/min; 24 m/min are 24000"),
     "max_acceleration_mm_s2": (50.0, 100_000.0, "unit: mm/s²; 3 m/s² are 3000, 1 g is 9810"),
 }
-"""Range of an axis: a value outside of it is in another unit."""
+"""Plausible range of an axis value: outside of it the unit is wrong."""
 _MODE = re.compile(r"\s*\d+(\.\d*)?\s*(:\s*\d*\.?\d+)?\s*")
 
 
@@ -46,7 +46,7 @@ class AnswersError(FileError):
 
 
 class ModesAnswer(InlineTable):
-    """What is known of the vibration of each axis."""
+    """Known vibration modes of each axis."""
 
     x: Text = key('X: a tap test\'s file, "FREQUENCY:DAMPING" in Hz, "rigid", or "unknown"', default="unknown")
     y: Text = key("Y: likewise", default="unknown")
@@ -77,18 +77,18 @@ class Answers(TomlTable):
     least_increment_mm: Annotated[Positive, Field(le=0.1)] | None = key("What is the least increment?", default=None)
     delivery: Delivery | None = key("How does a program get to the machine?", default=None)
     dnc_baud: Annotated[int, Strict(), Field(ge=110, le=10_000_000)] | None = key(
-        "At which speed does the line feed it?", default=None
+        "What is the speed of the line?", default=None
     )
     program_memory_kb: Annotated[Positive, Field(le=1e9)] | None = key("How large is the program memory?", default=None)
-    look_ahead: LookAhead | None = key("By which code does a look-ahead mode go on?", default=None)
-    contour_um: Positive | None = key("How far may the contour leave the path?", default=None)
+    look_ahead: LookAhead | None = key("Which code switches the look-ahead mode on?", default=None)
+    contour_um: Positive | None = key("What is the contour tolerance?", default=None)
     modes: ModesAnswer = key("What is known about its vibration?", default={})
 
     @field_validator("name")
     @classmethod
     def _plain(cls, answer: str) -> str:
         if not re.fullmatch(r"[\x20-\x7e]{1,60}", answer) or not answer.strip():
-            raise ValueError("must be 1 to 60 plain ASCII characters, as it goes into the header of programs")
+            raise ValueError("must be 1 to 60 plain ASCII characters, since it is written into the header of programs")
         return answer
 
     @model_validator(mode="after")
@@ -104,10 +104,10 @@ class Answers(TomlTable):
         return self
 
     def stem_from(self, folder: Path) -> Answers:
-        """The same with its files looked for in a folder.
+        """Resolve the file names relative to a folder.
 
         Args:
-            folder: of the file of answers.
+            folder: folder of the file of answers.
 
         Returns:
             New answers.
@@ -118,7 +118,7 @@ class Answers(TomlTable):
 
 
 def is_mode(answer: str) -> bool:
-    """Whether an answer on vibration is a frequency in Hz, with or without a damping ratio."""
+    """True if an answer on vibration is a frequency in Hz, with or without a damping ratio."""
     return _MODE.fullmatch(answer) is not None
 
 
@@ -133,16 +133,16 @@ def _file_in(folder: Path, answer: str) -> str:
 
 
 def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
-    """Answers from a file (TOML, or JSON where its name ends so) or from a mapping.
+    """Read answers from a file (TOML, or JSON by its ending) or a mapping.
 
     Args:
-        source: the file, whose folder relative names of files refer to; or the answers by key.
+        source: the file, to whose folder relative file names refer; or the answers by key.
 
     Returns:
         The answers.
 
     Raises:
-        AnswersError: an unknown key, a value of another kind, or one that is missing; every problem with its line.
+        AnswersError: an unknown key, a wrong type, or a missing value; every problem with its line.
         OSError: the file cannot be read.
     """
     if isinstance(source, Mapping):
@@ -164,7 +164,7 @@ def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
 
 
 def _with_files(answers: Answers, source: str, text: str) -> Answers:
-    """The same, if its files are there."""
+    """Return the answers if their files exist."""
     named = {"dump": answers.dump} if answers.dump is not None else {}
     for axis, answer in answers.modes.model_dump().items():
         if answer not in ("rigid", "unknown") and not is_mode(answer):
@@ -183,24 +183,24 @@ def _of_modes(modes: ModesAnswer) -> str:
     answer = modes.model_dump()
     unknown = "".join(axis.upper() for axis in "xyz" if answer[axis] == "unknown")
     if not unknown:
-        return "Shaping is for the modes that you say; where an axis is rigid, nothing is shaped for it."
+        return "The shaper is designed for these modes; rigid axes are ignored."
     are = "is tapped it is" if len(unknown) == 1 else "are tapped they are"
-    return f"Until {', '.join(unknown)} {are} taken as rigid, and every verdict says so."
+    return f"Until {', '.join(unknown)} {are} simulated as rigid, and every verdict says so."
 
 
 EXPLAINED: Mapping[str, Callable[[Any], str]] = {
     "name": lambda _: "It is written in the header of every program.",
     "control": lambda answer: {
-        "fanuc": "A parameter file of it can be read; look-ahead is switched by G05.1 or G08.",
+        "fanuc": "Its parameter file can be read; look-ahead is switched by G05.1 or G08.",
         "linuxcnc": "Its INI file can be read; programs are written in its dialect and simulated with its planner.",
-    }.get(answer, "Programs are written as FANUC controls read them: try one above the part first."),
+    }.get(answer, "Programs are written for FANUC controls: try one above the part first."),
     "dump": lambda answer: (
         "Limits and other parameters of motion are read from it; it has no vibration modes."
         if answer
-        else "Limits and time constants are then what you say, or assumed and marked so."
+        else "Limits and time constants are then your answers, or assumed and marked so."
     ),
     "rapid_mm_per_min": lambda answer: (
-        "The time of rapids follows from it."
+        "It determines the time of rapids."
         if answer
         else "24 m/min are assumed, as usual for a machining centre: the time of rapids is a guess."
     ),
@@ -213,33 +213,31 @@ EXPLAINED: Mapping[str, Callable[[Any], str]] = {
         else "0.3 g is assumed, as usual for a machining centre: measure it with `shapegcode characterize`."
     ),
     "least_increment_mm": lambda answer: (
-        "Ends of blocks are rounded to it: the finer, the less shaping loses."
-        if answer
-        else "0.001 mm is assumed (IS-B)."
+        "Block ends are rounded to it: a finer one gives better shaping." if answer else "0.001 mm is assumed (IS-B)."
     ),
     "delivery": lambda answer: {
         "memory": "Emitted programs must fit into the memory; convert checks that.",
-        "dnc": "Blocks cannot come faster than the line carries them.",
-        "data server": "Size and speed of the line hold nothing back.",
-        None: "Nothing is held back for it.",
+        "dnc": "Blocks cannot arrive faster than the line transmits them.",
+        "data server": "Size and line speed are not limited.",
+        None: "No limit is assumed.",
     }[answer],
     "dnc_baud": lambda answer: (
-        f"{answer / 11:.0f} characters, or some {answer / 11 / 25:.0f} short blocks a second: convert warns where that "
+        f"{answer / 11:.0f} characters, or some {answer / 11 / 25:.0f} short blocks a second: convert warns if that "
         f"is too slow, and `--baud {answer}` fits the program to it."
         if answer
         else "Whether blocks arrive in time cannot be checked: set controller.dnc_baud before you run a shaped program."
     ),
     "program_memory_kb": lambda answer: "A larger program gets a warning." if answer else "256 kB are assumed.",
     "look_ahead": lambda answer: (
-        "The mode goes off before each shaped cut and on again behind it."
+        "The mode is switched off before each shaped cut and on after it."
         if answer not in (None, "none")
         else "No code is written: the mode must be off while a shaped program runs."
     ),
     "contour_um": lambda answer: (
-        "Shaping may not leave the path further: tighter costs time at corners."
+        "Larger deviations are not allowed: a smaller tolerance costs time at corners."
         if answer
-        else "20 µm hold, for roughing; finishing wants less."
+        else "20 µm apply, for roughing; finishing needs less."
     ),
     "modes": _of_modes,
 }
-"""What an answer changes, in one sentence, by the name of the question; called with the answer."""
+"""Effect of an answer in one sentence, by the name of the question; called with the answer."""

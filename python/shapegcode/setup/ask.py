@@ -1,4 +1,4 @@
-"""The questions about a machine at a terminal; `answers` has them and what each answer changes."""
+"""Ask the questions about a machine at a terminal; `answers` defines them."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from shapegcode.setup.build import dump_lacks_rapids, dump_problem, tap_problem
 _UNKNOWN, _BACK = "unknown", "<"
 _TITLES = {
     _UNKNOWN: "not known yet",
-    _BACK: "(back to the question before)",
+    _BACK: "(back to the previous question)",
     "fanuc": "FANUC (0i, 16i, 18i, 21i, 30i, 31i, 32i)",
     "linuxcnc": "LinuxCNC",
-    "other": "another one that reads programs as FANUC does",
-    "memory": "it is loaded into the memory",
-    "dnc": "a line feeds it while it runs (DNC)",
+    "other": "another one that reads FANUC programs",
+    "memory": "loaded into the memory",
+    "dnc": "sent over a line while it runs (DNC)",
     "data server": "from a data server, a memory card or a network",
-    "none": "there is none, or it is never on",
+    "none": "none, or never on",
     "G05.1": "G05.1 Q1 (AI contour control, AI advanced preview control: 0i, 30i)",
     "G08": "G08 P1 (advanced preview control)",
 }
 _UNITS = {"m/min": ("mm/min", 1000.0), "m/s²": ("mm/s²", 1000.0), "MB": ("kB", 1024.0), "mm": ("µm", 1000.0)}
-"""What people say for a unit, and how much of it that is."""
+"""Usual spellings of units, with their factors."""
 _OF_AXES = ("rapid_mm_per_min", "max_feed_mm_per_min", "max_acceleration_mm_s2")
 _FILES = {
     "dump": "parameter file, such as CNC-PARA.TXT, or LinuxCNC's INI file",
@@ -42,12 +42,12 @@ _TYPED_MODES = {
 _VIBRATION = {
     "file": "tapped: I have the record of a tap test",
     "known": "from a data sheet or an earlier test: I know frequency and damping",
-    "rigid": "taken as rigid: no vibration of it counts",
+    "rigid": "rigid: no significant vibration",
 }
 
 
 def ask_all() -> Answers:
-    """Ask every question that the answers before it leave open; `<` goes back to the one before."""
+    """Ask every question that previous answers leave open; `<` goes back to the previous one."""
     given: dict[str, Any] = {}
     asked: list[str] = []
     questions = [name for name in Answers.model_fields if name != "modes"] + [f"modes.{axis}" for axis in "xyz"]
@@ -73,13 +73,13 @@ def ask_all() -> Answers:
 
 
 def _alone(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """An answer with what it needs beside it."""
+    """An answer with the other answers that it needs."""
     needed = {"delivery", "dnc_baud"} if name == "dnc_baud" else {name}
     return {key: given[key] for key in needed if key in given}
 
 
 def _left_out(given: Mapping[str, Any]) -> Iterator[str]:
-    """Questions that the answers so far make needless."""
+    """Yield questions that are unnecessary after the answers so far."""
     if given.get("control") == "other":
         yield "dump"
     if given.get("control") == "linuxcnc":
@@ -95,7 +95,7 @@ def _left_out(given: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _asked(name: str, given: Mapping[str, Any]) -> Any:
-    """One answer; None: not known yet."""
+    """Ask one question; None: not known yet."""
     field = Answers.model_fields[name]
     question = field.description or ""
     if choices := _choices(field.annotation):
@@ -108,14 +108,14 @@ def _asked(name: str, given: Mapping[str, Any]) -> Any:
 
 
 def _chosen(question: str, titles: Mapping[str, str]) -> str:
-    """Ask for one of a few answers; the first is `not known yet`, the last goes back."""
+    """Ask to choose an answer; the first is `not known yet`, the last goes back."""
     shown = {_UNKNOWN: _TITLES[_UNKNOWN], **titles, _BACK: _TITLES[_BACK]}
     choices = [questionary.Choice(title, value) for value, title in shown.items()]
     return str(questionary.select(question, choices=choices).unsafe_ask())
 
 
 def _typed(question: str, kind: str, check: Callable[[str], bool | str]) -> str:
-    """One line, which is checked when Enter is pressed: asked again until it does. Empty: not known yet."""
+    """Ask for one line, checked at Enter and repeated until it is valid. Empty: not known yet."""
 
     def checked(text: str) -> bool | str:
         return text.strip() in ("", _BACK) or check(text)
@@ -126,18 +126,18 @@ def _typed(question: str, kind: str, check: Callable[[str], bool | str]) -> str:
 
 
 def _unit(name: str) -> str:
-    """Of a question; empty: it has none."""
+    """Unit of a question; empty: none."""
     return str(facts(Answers.model_fields[name]).get("unit", ""))
 
 
 def _choices(annotation: Any) -> list[str]:
-    """Of a question with a few answers; empty for every other one."""
+    """Choices of a question; empty if it has none."""
     words = [each for option in (annotation, *get_args(annotation)) for each in get_args(option)]
     return list(dict.fromkeys(each for each in words if isinstance(each, str)))
 
 
 def _parsed(name: str, typed: str) -> Any:
-    """A text, a number, or one number for each axis; a unit may stand behind."""
+    """Parse a text, a number, or one number per axis, with an optional unit."""
     text = typed.strip()
     if not text:
         return None
@@ -161,7 +161,7 @@ def _parsed(name: str, typed: str) -> Any:
 
 
 def _problem(name: str, typed: str, given: Mapping[str, Any]) -> bool | str:
-    """True, or what is wrong with an answer; the question is then asked again."""
+    """True, or the problem of an answer; the question is then repeated."""
     try:
         value = _parsed(name, typed)
     except ValueError:
@@ -177,14 +177,14 @@ def _problem(name: str, typed: str, given: Mapping[str, Any]) -> bool | str:
 
 
 def _of_file(file: str, problem: Callable[[str], str]) -> bool | str:
-    """True, or what is wrong with a file."""
+    """True, or the problem of a file."""
     return problem(file).replace("\n", "; ") or True if Path(file).is_file() else f"{file}: no such file"
 
 
 def _vibration(axis: str) -> str | None:
-    """Of an axis: tapped, known, rigid; None: not known yet. Nothing is taken from another machine."""
+    """Ask for the modes of an axis: tapped, known, rigid; None: not known yet."""
     while True:
-        kind = _chosen(f"{axis.upper()}: tapped, from a data sheet, or taken as rigid?", _VIBRATION)
+        kind = _chosen(f"{axis.upper()}: tapped, from a data sheet, or rigid?", _VIBRATION)
         if kind not in _TYPED_MODES:
             return None if kind == _UNKNOWN else kind
         reply = _typed(*_TYPED_MODES[kind], _tap if kind == "file" else _mode)

@@ -1,4 +1,4 @@
-"""A short machine file from answers, with their provenance; everything else is a default."""
+"""Make a short machine file from answers, with their provenance; everything else is a default."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ _LIMITS = ("max_feed_mm_per_min", "rapid_mm_per_min", "max_acceleration_mm_s2")
 
 
 def set_up(answers: Answers) -> MachineSetup:
-    """The machine that a shop describes.
+    """Make the machine file of a shop from its answers.
 
     Args:
-        answers: what it says.
+        answers: the answers of the shop.
 
     Returns:
-        The machine, its short file, and what is still open.
+        The machine, its short file, and the open questions.
 
     Raises:
-        MachineError: a value that a machine file could not have, or a dump that cannot be read.
-        ArgumentError, RecordError: a tap test without a mode that it supports.
+        MachineError: a value that is invalid in a machine file, or a dump that cannot be read.
+        ArgumentError, RecordError: a tap test without a supported mode.
         OSError: a file cannot be read.
     """
     machine, notes = _started(answers)
@@ -59,7 +59,7 @@ def set_up(answers: Answers) -> MachineSetup:
         frequencies = ", ".join(f"{mode.frequency_hz.value:g} Hz" for mode in found.modes)
         notes.append(f"{axis.upper()}: {frequencies} from {answer}")
     machine = Machine.from_toml(text, answers.name)
-    # Name and kind of control go into words that have no origin.
+    # Name and kind of control are stored in keys without an origin.
     named = {key for name, key in _IN_WORDS.items() if getattr(answers, name) != Answers.model_fields[name].default}
     return MachineSetup(
         machine=answers.name,
@@ -73,7 +73,7 @@ def set_up(answers: Answers) -> MachineSetup:
 
 
 def _started(answers: Answers) -> tuple[Machine, list[str]]:
-    """The machine of the dump, or one that has what every machine file must have."""
+    """The machine of the dump, or one with only the required keys."""
     rigid = "".join(axis for axis, answer in answers.modes.model_dump().items() if answer == "rigid")
     if answers.dump is not None and answers.control == "linuxcnc":
         ini = read_ini(answers.dump, name=answers.name)
@@ -87,7 +87,7 @@ def _started(answers: Answers) -> tuple[Machine, list[str]]:
 
 
 def _imported(answers: Answers, rigid: str) -> ParameterImport:
-    """The machine of the parameter file; limits that it does not contain are answered, or assumed and marked so."""
+    """The machine of the parameter file; missing limits are from the answers, or assumed and marked so."""
     dump = answers.dump
     assert dump is not None
     try:
@@ -107,7 +107,7 @@ def _imported(answers: Answers, rigid: str) -> ParameterImport:
 
 
 def dump_problem(file: str, control: str | None = None) -> str:
-    """What is wrong with a parameter file, before the other questions are asked."""
+    """Problem of a parameter file, checked before the other questions; empty: none."""
     try:
         _started(Answers.model_validate({"dump": file, "control": control}))
     except (FileError, ArgumentError, OSError) as error:
@@ -116,7 +116,7 @@ def dump_problem(file: str, control: str | None = None) -> str:
 
 
 def dump_lacks_rapids(file: str) -> bool:
-    """Whether the rapid rates are a question though there is a parameter file."""
+    """True if the rapid rates must be asked for although there is a parameter file."""
     try:
         import_parameters(file)
     except MachineError as error:
@@ -125,7 +125,7 @@ def dump_lacks_rapids(file: str) -> bool:
 
 
 def tap_problem(file: str) -> str:
-    """What is wrong with the record of a tap test, before the other questions are asked."""
+    """Problem of the record of a tap test, checked before the other questions; empty: none."""
     try:
         found = identify(file)
     except (ShapegcodeError, OSError) as error:
@@ -134,7 +134,7 @@ def tap_problem(file: str) -> str:
 
 
 def _plain(answers: Answers) -> Machine:
-    """Limits of the answers; the others are assumed, and marked so."""
+    """A machine with the limits of the answers; the others are assumed and marked so."""
     rapid, feed, acceleration = answers.rapid_mm_per_min, answers.max_feed_mm_per_min, answers.max_acceleration_mm_s2
     axes: dict[str, Any] = {}
     remarks = {}
@@ -160,7 +160,7 @@ def _plain(answers: Answers) -> Machine:
 
 
 def _answered_values(answers: Answers) -> Iterator[tuple[str, tuple[object, str]]]:
-    """Key of the machine file, value and remark of all answers but limits and parameter file."""
+    """Yield key, value and remark of all answers except limits and parameter file."""
     yield "name", (answers.name, "")
     if answers.dump is not None:
         yield "description", (f"read from {Path(answers.dump).name}; set up by answers", "")
@@ -184,7 +184,7 @@ def _answered_values(answers: Answers) -> Iterator[tuple[str, tuple[object, str]
         yield "tolerance.contour_um", (answers.contour_um, f"choice, {_ANSWERED}")
     for axis, answer in answers.modes.model_dump().items():
         if answer == "rigid":
-            yield f"axes.{axis}.rigid", (True, f"{_ANSWERED}: no mode counts")
+            yield f"axes.{axis}.rigid", (True, f"{_ANSWERED}: no significant mode")
         elif is_mode(answer):
             frequency, damping = mode_of(answer)
             mode = {"frequency_hz": frequency, "damping_ratio": damping}
@@ -194,7 +194,7 @@ def _answered_values(answers: Answers) -> Iterator[tuple[str, tuple[object, str]
 
 
 def _for_axes(machine: Machine, remarks: dict[str, str]) -> dict[str, str]:
-    """Remarks of the keys that the machine has; modes from answers are in separate tables."""
+    """Remarks of existing keys; modes from answers are in separate tables."""
     held = {value.key for value in machine.values()}
     found = {key: remark for key, remark in remarks.items() if key in held and remark}
     for axis, table in zip("xyz", machine.axes.as_tuple(), strict=True):
@@ -203,16 +203,16 @@ def _for_axes(machine: Machine, remarks: dict[str, str]) -> dict[str, str]:
             found.setdefault(f"{stem}.modes.{number}.frequency_hz", _ANSWERED)
             found.setdefault(f"{stem}.modes.{number}.damping_ratio", "assumed: not answered")
         if not table.modes and not table.rigid:
-            found[f"{stem}.modes"] = "not known: tap it, or say that it is rigid"
+            found[f"{stem}.modes"] = "not known: tap it, or declare it rigid"
     return found
 
 
 def _open(machine: Machine) -> Iterator[OpenQuestion]:
-    """Parameters without an answer to which a verdict may be sensitive: axes without modes first."""
+    """Yield parameters without an answer that may affect a verdict: axes without modes first."""
     for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True):
         if not axis.modes and not axis.rigid:
             command = f"shapegcode identify TAP.csv --axis {letter} --update MACHINE"
-            yield OpenQuestion(f"axes.{letter}.modes", "none", "taken as rigid until it is tapped", command)
+            yield OpenQuestion(f"axes.{letter}.modes", "none", "simulated as rigid until it is tapped", command)
     for value in machine.values():
         if value.origin == "assumed" and not value.key.endswith(".modes"):
             unit = "" if value.unit == "1" else value.unit

@@ -1,4 +1,4 @@
-"""A machine that was set up by answers: its short file, and what is still open."""
+"""Result of the setup: the short machine file, and the open questions."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from shapegcode.results.table import Column, Table
 class OpenQuestion:
     """A value that is not known yet."""
 
-    key: str  # of the machine file
-    value: str  # that holds until then, with its unit
-    why: str  # where it comes from
-    command: str  # that finds it; empty: none does
+    key: str  # key of the machine file
+    value: str  # value used until then, with its unit
+    why: str  # its origin
+    command: str  # command that determines it; empty: none
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -25,13 +25,13 @@ class MachineSetup(Result):
     """A machine file made from answers.
 
     Attributes:
-        machine: its name.
+        machine: name of the machine.
         answered: keys that were answered.
         imported: keys that came from a dump of the control or from tap tests.
-        open: values that nobody said, axes without modes first.
-        notes: what was read from which file.
-        warnings: none as a rule.
-        file: that was written; empty: none was.
+        open: values without an answer, axes without modes first.
+        notes: values read from files.
+        warnings: usually none.
+        file: the file written; empty: none.
         text: the machine file.
     """
 
@@ -46,12 +46,12 @@ class MachineSetup(Result):
 
     @property
     def ok(self) -> bool:
-        """The machine can be used: always, as one that cannot is refused."""
+        """Always true: a machine that cannot be used is refused."""
         return True
 
     @property
     def answer(self) -> str:
-        """How many values are known, and which are not."""
+        """Number of known values, and axes with unknown vibration."""
         count = len(self.answered)
         sentence = f"{self.machine}: {count} value{'' if count == 1 else 's'} answered, {len(self.imported)} imported"
         unknown = [each.key.split(".")[1].upper() for each in self.open if each.key.endswith(".modes")]
@@ -65,7 +65,7 @@ class MachineSetup(Result):
         return f"{command} ranks the unknown values by their effect on your program."
 
     def tables(self) -> list[Table]:
-        """The values that are not known; axes with the same text share a row."""
+        """The unknown values; axes with the same text share a row."""
         shared: dict[tuple[str, str, str], list[str]] = {}
         for each in self.open:
             found = re.fullmatch(r"(axes\.)([xyz])(\..*)", each.key)

@@ -1,1 +1,1 @@
-"""What a machine that is not known exactly does to a program: sampled machines, quantiles, what decides."""
+"""Studies with uncertain machine parameters: sampled machines, quantiles, influence of each value."""

@@ -1,7 +1,7 @@
 """The shortest program that stays within tolerance with a given probability: block period, family, tolerance, feed on
 arcs.
 
-All choices are converted where they are not too many; else SciPy's differential evolution says which ones.
+All combinations are converted if there are not too many; else SciPy's differential evolution selects them.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from shapegcode.studies.varied import (
     varied_values,
 )
 
-USUAL_DRAWS = 256  # Machines on which a choice is simulated, if nothing else is stated
-USUAL_CONVERSIONS = 300  # Conversions at most, if nothing else is stated
+USUAL_DRAWS = 256  # Default number of machines per combination
+USUAL_CONVERSIONS = 300  # Default maximum of conversions
 
-_FRESH = 4  # times as many draws confirm a choice: the best of many has had luck
-_UNLIKELY_S = 1e6  # a candidate that is not likely enough costs more than any program takes
+_FRESH = 4  # times as many new samples confirm a choice: the best of many may be best by chance
+_UNLIKELY_S = 1e6  # cost of a candidate with too low a probability, above any cycle time
 _NO_TEXT_S = 1e9
 
 
@@ -55,30 +55,30 @@ def optimize(
     shape_all: bool = False,
     on_progress: Callable[[float], None] = lambda _share: None,
 ) -> Optimum:
-    """Choose block period, family, tolerance and feed on arcs for the shortest time that is likely enough to be good.
+    """Choose block period, family, tolerance and arc feed for the shortest time with the required probability.
 
     >>> found = sg.optimize("part.nc", machine, {"axes.x.modes.1.frequency_hz": sg.normal(46, 2)}, probability=0.99)
     >>> sg.convert("part.nc", machine.with_values(found.values))
 
     Args:
-        program: what is converted, or its file.
-        machine: as its file has it; its tolerances are those that count, whatever tolerance is aimed at.
-        vary: what the machine that simulates may differ in, as for `study`.
+        program: the program to convert, or its file.
+        machine: the machine; its tolerances count, whatever tolerance is planned.
+        vary: uncertain values of the simulated machine, as for `study`.
         choose: values to choose from, by key; None: see `shapegcode.studies.optimize.usual_choices`.
-        probability: of staying within tolerance.
-        n: machines on which a choice is simulated; four times as many fresh ones confirm it.
-        most: conversions at most.
-        seed: the same one gives the same result.
+        probability: required probability of staying within tolerance.
+        n: machines on which a combination is simulated; four times as many new ones confirm it.
+        most: maximum number of conversions.
+        seed: equal seeds give equal results.
         shape_all: see `convert`.
-        on_progress: called with the share of the conversions that is done.
+        on_progress: called with the finished ratio of the conversions.
 
     Returns:
-        What to set, and the choices that were converted.
+        The settings, and the converted combinations.
 
     Raises:
-        ArgumentError: a probability outside 0 to 1, nothing to vary or to choose, or a value that the converter would
-            know.
-        MachineError: a key that there is none, or a draw that a machine file could not have.
+        ArgumentError: a probability outside 0 to 1, nothing to vary or to choose, or a value that only the converter
+            sees.
+        MachineError: an unknown key, or a sampled value that is invalid in a machine file.
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.
     """
@@ -90,7 +90,7 @@ def optimize(
     choices = checked_choices(usual_choices(machine) if choose is None else choose, [each.key for each in varied])
     for each in varied:
         if each.known:
-            raise ArgumentError(f"vary: {each.key}: the converter would know it: it belongs into choose")
+            raise ArgumentError(f"vary: {each.key}: the converter reads it: put it into choose")
     samples = [sampled_columns(varied, n, "sobol", seed, indices=False)]
     if n > (largest := MAX_DRAWS // _FRESH):
         raise ArgumentError(f"n = {n}: must be at most {largest}: {_FRESH} times as many confirm a choice")
@@ -132,7 +132,7 @@ class _Choosing:
         self, program: Program | str, machine: Machine, choices: Choices,
         rows: Sequence[tuple[Mapping[str, object], ...]], probability: float, shape_all: bool,
     ) -> None:  # fmt: skip
-        # The shortest time is looked for: no price stands in its way.
+        # The price is lifted, since the shortest time is searched for.
         self._program, self._machine, self._choices, self._rows = program, machine.with_values(ANY_PRICE), choices, rows
         self._probability, self._shape_all = probability, shape_all
         self._replays: dict[Ranks, Replay] = {}
@@ -158,7 +158,7 @@ class _Choosing:
         return float(within(np.array(simulate_all(replay, job, None))).mean())
 
     def simulated(self, ranks: Ranks) -> Candidate:
-        """A candidate with its probability; it is confirmed where that is enough."""
+        """A candidate with its probability, confirmed if it is high enough."""
         found = self.converted(ranks)
         if found.time_s is not None and found.within is None:
             share = self._share(self._replays[ranks], 0)
@@ -167,7 +167,7 @@ class _Choosing:
         return found
 
     def cost(self, ranks: Ranks) -> float:
-        """For the evolution: time, and much more where it is not likely enough."""
+        """Cost for the evolution: cycle time, much larger if the probability is too low."""
         found = self.converted(ranks)
         if found.time_s is None:
             return _NO_TEXT_S
@@ -199,7 +199,7 @@ _WHOLE = 1e-6
 
 
 def usual_choices(machine: Machine) -> dict[str, tuple[object, ...]]:
-    """Block period, family, tolerance that is aimed at, and feed on arcs."""
+    """Default choices: block period, family, planned tolerance, and arc feed."""
     controller = machine.controller
     least = max(1, math.ceil(controller.block_time_s / controller.interpolation_period_s - _WHOLE))
     ticks = sorted({least, least + 1, least + 2, math.ceil(1.5 * least), 2 * least})
@@ -212,7 +212,7 @@ def usual_choices(machine: Machine) -> dict[str, tuple[object, ...]]:
 
 
 def checked_choices(choices: Choices, varied: Sequence[str]) -> Choices:
-    """The choices, if they are such."""
+    """Validate the choices."""
     if not choices:
         raise ArgumentError("choose: nothing to choose: give a list of values for one key or more")
     check_keys("choose", choices)
@@ -228,11 +228,11 @@ def checked_choices(choices: Choices, varied: Sequence[str]) -> Choices:
 
 
 class _EnoughError(Exception):
-    """As many were tried as may be."""
+    """The maximum number of conversions is reached."""
 
 
 def search(choices: Choices, most: int, seed: int, cost: Callable[[Ranks], float]) -> Iterator[Ranks]:
-    """Combinations worth a conversion: all of them, or as many as differential evolution gets to."""
+    """Yield combinations to convert: all of them, or those tried by differential evolution."""
     from scipy.optimize import Bounds, differential_evolution
 
     sizes = [len(values) for values in choices.values()]

@@ -1,6 +1,6 @@
-"""The pictures of ``shapegcode study``: what decides (tornado), and measures over the value that decides (bands).
+"""The pictures of ``shapegcode study``: influence of each value (tornado), measures over the first one (bands).
 
-That of ``shapegcode optimize``: time and probability of the choices.
+The picture of ``shapegcode optimize``: time and probability of the combinations.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ def plots_of(study: MachineStudy | Optimum) -> dict[str, Plot]:
 
 
 def plot_tornado(study: MachineStudy, ax: Axes | None = None) -> Axes:
-    """Which value decides? A bar for each, from the least to the largest median share of the limit over it.
+    """Plot the influence of each value: bars from smallest to largest median ratio to the limit over its range.
 
     Args:
-        study: what was found.
+        study: the study.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -42,7 +42,7 @@ def plot_tornado(study: MachineStudy, ax: Axes | None = None) -> Axes:
     rows = study.parameter_sensitivity[:_BARS]
     panel = plot.axes(
         ax, size_inch=(9.0, 1.6 + 0.4 * len(rows)),
-        title=f"What decides the verdict: {Path(study.program).name} on {study.machine}",
+        title=f"Influence on the verdict: {Path(study.program).name} on {study.machine}",
     )  # fmt: skip
     whole = study.quantity(SHARE)
     for place, row in enumerate(rows):
@@ -58,15 +58,15 @@ def plot_tornado(study: MachineStudy, ax: Axes | None = None) -> Axes:
     _name_rows(panel, [row.key for row in rows])
     low, high = min(row.low for row in rows), max(1.0, *(row.high for row in rows))
     panel.set_xlim(low - 0.15 * (high - low), high + 0.15 * (high - low))
-    panel.set_xlabel("share of the limit, median (grey: of all draws)")
+    panel.set_xlabel("ratio to the limit, median (grey: of all samples)")
     return panel
 
 
 def plot_choices(found: Optimum, ax: Axes | None = None) -> Axes:
-    """How long does each of the shortest choices take, and how likely is it good? The one to take has the full colour.
+    """Plot cycle time and probability of the shortest combinations; the best one has the full colour.
 
     Args:
-        found: the choices.
+        found: the result of `optimize`.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -86,15 +86,15 @@ def plot_choices(found: Optimum, ax: Axes | None = None) -> Axes:
     _name_rows(panel, [", ".join(each.value for each in row.values) for row in rows])
     panel.set_xlim(0.0, 1.5 * max(1.0, 1e3 * (times_s[-1] - times_s[0])))
     panel.set_ylabel(", ".join(each.key.rpartition(".")[2] for each in rows[0].values), fontsize=8)
-    panel.set_xlabel("time above that of the shortest in ms (bold: the one to take)")
+    panel.set_xlabel("time above that of the shortest in ms (bold: the best)")
     return panel
 
 
 def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
-    """Plot a measure over the most important value: median, and the band that holds 90 % of the samples.
+    """Plot a measure over the most important value: median, and the band that contains 90 % of the samples.
 
     Args:
-        study: what was found.
+        study: the study.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -104,7 +104,7 @@ def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
     curves = [bins for bins in study.curves if bins.key == key and bins.measure != SHARE][:_PANELS]
     curves = curves or [bins for bins in study.curves if bins.key == key]
     panels = plot.column(
-        ax, len(curves), size_inch=(8.0, 1.0 + 2.1 * len(curves)), part="median, and the band that holds 90 %",
+        ax, len(curves), size_inch=(8.0, 1.0 + 2.1 * len(curves)), part="median, and the band that contains 90 %",
         title=f"{study.n} machines: {Path(study.program).name} on {study.machine}",
     )  # fmt: skip
     for panel, bins in zip(panels, curves, strict=True):

@@ -1,4 +1,4 @@
-"""A converted text simulated on other machines: converted once, simulated as often as one likes, on all processors."""
+"""Simulate an emitted program on other machines: converted once, simulated any number of times, on all processors."""
 
 from __future__ import annotations
 
@@ -29,27 +29,27 @@ MEASURES: Mapping[str, str] = {
     "residual_x_um": "residual vibration X",
     "residual_y_um": "residual vibration Y",
     "residual_z_um": "residual vibration Z",
-    "peak_um": "vibration while it moves, worst axis",
-    "contour_um": "contour error that is judged",
+    "peak_um": "vibration in motion, worst axis",
+    "contour_um": "judged contour error",
     "command_um": "contour error of the command",
     "response_um": "contour error of the machine table",
     "cutting_time_s": "time of the shaped cuts",
     "time_s": "cycle time",
     "original_residual_um": "residual vibration of the original",
-    "original_contour_um": "contour error of the original's table",
-    SHARE: "largest share of a limit",
+    "original_contour_um": "contour error of the machine table with the original",
+    SHARE: "largest ratio to a limit",
 }
 """Measures of each sample, with their meaning."""
 DEFAULT_MEASURES = ("residual_um", "contour_um", "time_s")
 
 CONTOURS = frozenset({"contour_um", "command_um", "response_um"})
-"""Where none of these is wanted, the share of the limit is that of the residual vibration alone."""
+"""If none of these is measured, the ratio to the limit is that of the residual vibration alone."""
 _WHOLE_RUN = frozenset({*CONTOURS, "peak_um", "cutting_time_s"})
 _FULL = 1.0
 
 
 def checked_measures(measure: Sequence[str]) -> tuple[str, ...]:
-    """What is measured; the share of the limit is always among it."""
+    """Validate the measures; the ratio to the limit is always added."""
     for name in measure:
         if name not in MEASURES:
             raise ArgumentError(f"measure = {name!r}: must be one of {', '.join(MEASURES)}")
@@ -58,7 +58,7 @@ def checked_measures(measure: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _SimulatedPart:
-    """A shaped region: what was programmed, what was emitted, what it is judged by."""
+    """A shaped region: programmed path, emitted blocks, limits."""
 
     region: _core.Region
     blocks: _core.Path
@@ -67,14 +67,14 @@ class _SimulatedPart:
 
 
 class Replay:
-    """A text that was converted for a machine, ready to be simulated on others."""
+    """A program that was converted for a machine, ready to be simulated on others."""
 
     def __init__(
         self, machine: Machine, original: Program, emitted: Program, parts: Sequence[tuple[int, int, int]],
         limits: Sequence[RegionLimits], time_s: float,
     ) -> None:  # fmt: skip
-        """Read back: `parts` has the rank of each region in the original, its first and last line in the text; `time_s`
-        is the cycle time of the text on the machine for which it was converted."""
+        """Prepare the regions: `parts` has index in the original, first and last emitted line of each; `time_s`
+        is the cycle time on the machine for which it was converted."""
         self.machine, self._original, self._emitted, self._extents = machine, original, emitted, tuple(parts)
         self.time_s = time_s
         regions = [original.regions[index] for index, _, _ in parts]
@@ -82,7 +82,7 @@ class Replay:
             _SimulatedPart(region, emitted.core.cutting_path(first, last), _core.ContourTracker(region.path), limit)
             for region, (_, first, last), limit in zip(regions, parts, limits, strict=True)
         ]
-        # What the text takes beyond what its own blocks say, such as where no header marks them.
+        # Time in addition to the computed one, such as for blocks without a header.
         self._beyond_s = time_s - MachineModel(machine).cycle_time_s(emitted.core)
 
     @classmethod
@@ -108,7 +108,7 @@ class Replay:
         return cls(machine, original, found.emitted, extents, limits, found.cycle_time_s.emitted)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """As bytes and numbers, for another process."""
+        """Pickle as bytes and numbers, for another process."""
         limits = [part.limits for part in self._parts]
         numbers = tuple((tuple(each.residual_um.tolist()), each.contour_um, each.target) for each in limits)
         texts = self._original.source, self._original.expanded_text, self._emitted.text
@@ -116,18 +116,18 @@ class Replay:
 
     @property
     def contour_limit_um(self) -> float:
-        """The smallest that is allowed."""
+        """Smallest contour limit of all cuts, µm."""
         return min(part.limits.contour_um for part in self._parts)
 
     @property
     def residual_limit_um(self) -> float:
-        """The smallest that is allowed of any axis that may vibrate."""
+        """Smallest residual limit of any axis, µm."""
         return min(float(part.limits.residual_um.min()) for part in self._parts)
 
     def simulate(
         self, machine: Machine, wanted: Collection[str], *, override: float = _FULL, times: bool = True
     ) -> dict[str, float]:
-        """Simulate the text."""
+        """Simulate the program on a machine; measures by name."""
         model = MachineModel(machine)
         found = dict.fromkeys(wanted, 0.0)
         for part in self._parts:
@@ -147,7 +147,7 @@ class Replay:
         path, offset = part.region.path, model.offset(part.region)
         contour = not CONTOURS.isdisjoint(wanted)
         command = contour and (part.limits.target == "command" or "command_um" in wanted)
-        # What oscillates at the end was excited shortly before.
+        # Vibration at the end was excited shortly before.
         last_s = model.vibration_memory_s if _WHOLE_RUN.isdisjoint(wanted) else 0.0
         run = model.simulate_emitted(
             part.blocks, path, override=override, offset=offset, tracker=part.tracker, contour=contour,
@@ -175,10 +175,10 @@ class Replay:
         return {name: value for name, value in measured.items() if name in wanted}
 
 
-OVERRIDE = "times.feed_override_percent"  # Where it is varied, the blocks are simulated at it
+OVERRIDE = "times.feed_override_percent"  # if varied, the blocks are simulated at this override
 
-_AT_ONCE = 64  # draws of a task at most: long enough to be worth one
-_SIMULATED_S = 900.0  # of motion in a task: short enough to tell how far it is, and to be stopped
+_AT_ONCE = 64  # maximum number of samples per task
+_SIMULATED_S = 900.0  # of motion in a task: short enough for progress and stopping
 _KEPT_TEXTS = 4
 
 
@@ -186,24 +186,24 @@ _KEPT_TEXTS = 4
 class SamplesJob:
     """Some samples of one program."""
 
-    name: str  # of the machine, in messages
-    rows: tuple[Mapping[str, object], ...]  # values of the machine that simulates, by key, a row for each draw
-    draws: tuple[int, ...]  # their numbers
-    wanted: tuple[str, ...]  # what is measured
+    name: str  # name of the machine, in messages
+    rows: tuple[Mapping[str, object], ...]  # values of the simulated machine, by key, one row per sample
+    draws: tuple[int, ...]  # numbers of the samples
+    wanted: tuple[str, ...]  # measures
     times: bool  # see `Replay.simulate`
 
     def simulate(self, replay: Replay) -> list[list[float]]:
-        """Simulate them."""
+        """Simulate the samples; one list of measures per sample."""
         found = []
         for row, draw in zip(self.rows, self.draws, strict=True):
-            machine = sampled_machine(replay.machine, row, f"{self.name}, draw {draw}")
+            machine = sampled_machine(replay.machine, row, f"{self.name}, sample {draw}")
             override = machine.times.feed_override_percent / 100.0 if OVERRIDE in row else 1.0
             measured = replay.simulate(machine, self.wanted, override=override, times=self.times)
             found.append([measured[name] for name in self.wanted])
         return found
 
     def parts(self, motion_s: float) -> Iterator[SamplesJob]:
-        """The same in tasks."""
+        """Split the job into tasks."""
         size = max(1, min(_AT_ONCE, int(_SIMULATED_S / max(motion_s, 1e-3))))
         for at in range(0, len(self.rows), size):
             rows, draws = self.rows[at : at + size], self.draws[at : at + size]
@@ -234,7 +234,7 @@ def _replay(
     toml: str, source: str, original: bytes, emitted: bytes, extents: tuple[tuple[int, int, int], ...],
     limits: tuple[tuple[tuple[float, ...], float, Any], ...], time_s: float,
 ) -> Replay:  # fmt: skip
-    """A replay that was pickled: a worker reads an emitted program once for all its samples."""
+    """Unpickle a replay: a worker reads an emitted program once for all its samples."""
     machine = Machine.from_toml(toml)
     read = Program.from_text(original, machine, source=source)
     shaped = Program.from_text(emitted, machine, source=source, emitted=True)

@@ -1,4 +1,4 @@
-"""What a study found: quantiles, probability of staying within tolerance, what decides; the best of some choices."""
+"""Results of a study: quantiles, probability of staying within tolerance, influences; the best combination."""
 
 from __future__ import annotations
 
@@ -27,46 +27,46 @@ _UNITS = {"_um": "µm", "_s": "s"}
 
 @dataclass(frozen=True)
 class VariedKey:
-    """What was varied."""
+    """A varied value."""
 
     key: str  # dotted name in the machine file
-    value: str  # what the file says
-    unit: str  # of its values
-    drawn_from: str  # in words
-    known: bool  # the text was converted for each value
+    value: str  # value in the file
+    unit: str  # unit of its values
+    drawn_from: str  # its distribution, as text
+    known: bool  # the program was converted for each value
 
 
 @dataclass(frozen=True)
 class Quantity:
     """A measure over all samples."""
 
-    name: str  # of the measure, with its unit
-    nominal: float  # on the machine as the file has it
-    mean: float  # of all draws
-    p5: float  # below it lie 5 %; and so the others
+    name: str  # name of the measure, with its unit
+    nominal: float  # value on the machine of the file
+    mean: float  # mean of all samples
+    p5: float  # 5 % quantile; likewise the others
     p25: float  # likewise
     p50: float  # the median
     p75: float  # likewise
     p95: float  # likewise
     p99: float  # likewise
-    largest: float  # of all draws
+    largest: float  # maximum of all samples
 
     @property
     def unit(self) -> str:
-        """As the name ends."""
+        """Unit, by the ending of the name."""
         return next((unit for ending, unit in _UNITS.items() if self.name.endswith(ending)), "")
 
 
 @dataclass(frozen=True)
 class ParameterInfluence:
-    """What a value does to the verdict."""
+    """Influence of a value on the verdict."""
 
-    key: str  # of the value
-    low: float  # least share of the limit, median of the draws in one bin of the value
-    high: float  # largest
-    low_at: str  # value at which it is least
-    high_at: str  # value at which it is largest
-    first: float | None = None  # Sobol index of first order of the share; None: not asked for
+    key: str  # key of the value
+    low: float  # smallest ratio to the limit, median of the samples in one bin of the value
+    high: float  # largest ratio, likewise
+    low_at: str  # value at the smallest ratio
+    high_at: str  # value at the largest ratio
+    first: float | None = None  # first-order Sobol index of the ratio; None: not requested
     total: float | None = None  # total Sobol index
     first_error: float | None = None  # half of the 95 % interval of the first, by resampling
     total_error: float | None = None  # likewise
@@ -80,30 +80,30 @@ def _with_error(value: float | None, error: float | None) -> str:
 class RefusedDraws:
     """Samples that could not be simulated, because there is no emitted program for them."""
 
-    values: str  # that the converter was given, in words
-    draws: int  # how many
-    why: str  # in words
+    values: str  # values of the conversion, as text
+    draws: int  # number of samples
+    why: str  # the reason
 
 
 @dataclass(frozen=True)
 class BinQuantiles:
     """A measure over the samples in one bin of a value."""
 
-    at: float  # median of the value; of a list the rank
-    name: str  # of the bin
-    low: float  # 5 % of the measure lie below it
-    median: float  # half of it
-    high: float  # 95 %
+    at: float  # median of the value; for a list the index
+    name: str  # name of the bin
+    low: float  # 5 % quantile of the measure
+    median: float  # median
+    high: float  # 95 % quantile
 
 
 @dataclass(frozen=True)
 class Bins:
     """A measure over one value, bin by bin."""
 
-    key: str  # of the value
-    measure: str  # of which
+    key: str  # key of the value
+    measure: str  # name of the measure
     bins: tuple[BinQuantiles, ...]  # in the order of the values
-    numbers: bool  # the values are numbers; else choices
+    numbers: bool  # true for numbers; false for choices
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -111,23 +111,23 @@ class MachineStudy(Result):
     """A program simulated on many sampled machines (Monte Carlo).
 
     Attributes:
-        program: its name.
-        machine: that was varied.
+        program: name of the program.
+        machine: the varied machine.
         sampling: "sobol", "lhs" or "grid".
-        seed: of the draws.
-        n: draws that were simulated.
-        conversions: texts that were made for them.
-        varied: what was varied.
-        within: share of the draws that stay within every limit.
-        within_interval: of the probability that this estimates, 95 %; of a grid it means nothing.
-        at_least: what the probability should be.
-        quantities: measures over all draws.
-        parameter_sensitivity: values by what they do to the verdict, the one that decides first.
+        seed: seed of the samples.
+        n: number of simulated samples.
+        conversions: number of programs converted for them.
+        varied: the varied values.
+        within: ratio of samples that stay within every limit.
+        within_interval: 95 % interval of the estimated probability; meaningless for a grid.
+        at_least: the required probability.
+        quantities: measures over all samples.
+        parameter_sensitivity: values by influence on the verdict, most influential first.
         curves: measures over each value, for pictures.
-        refused: draws without a text.
+        refused: samples without an emitted program.
         warnings: caution, before you run.
         limits_um: smallest limit of each measure that has one.
-        draws: values by key and measures by name, one row for each draw.
+        draws: values by key and measures by name, one row per sample.
     """
 
     json_extra: ClassVar[dict[str, Any]] = dict(Result.json_extra)
@@ -152,21 +152,21 @@ class MachineStudy(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether enough samples stay within tolerance."""
+        """True if enough samples stay within tolerance."""
         return self.within >= self.at_least
 
     @property
     def answer(self) -> str:
-        """How likely it stays within tolerance, and what decides that."""
+        """Probability of staying within tolerance, and the most influential value."""
         low, high = self.within_interval
         sure = "" if self.sampling == "grid" else f" (95 % interval {low * 100:.1f} to {high * 100:.1f} %)"
         what = "of the grid stays" if self.sampling == "grid" else "of the machines stay"
-        most = f"; {self.parameter_sensitivity[0].key} decides" if self.parameter_sensitivity else ""
-        return f"{self.within * 100:.1f} % {what} within tolerance{sure}, asked for {self.at_least * 100:g} %{most}"
+        most = f"; {self.parameter_sensitivity[0].key} has most influence" if self.parameter_sensitivity else ""
+        return f"{self.within * 100:.1f} % {what} within tolerance{sure}, required {self.at_least * 100:g} %{most}"
 
     @property
     def next_step(self) -> str:
-        """To measure what decides, or to convert."""
+        """Measure the most influential value, or convert."""
         if self.ok:
             sure = "it stays within tolerance in spite of the uncertainties"
             return f"convert {self.program} for {self.machine}: {sure}."
@@ -174,15 +174,15 @@ class MachineStudy(Result):
             return "see why samples were refused."
         key, low_at = self.parameter_sensitivity[0].key, self.parameter_sensitivity[0].low_at
         if next(each.known for each in self.varied if each.key == key):
-            least = f"choose {key} where the share of the limit is least ({low_at})"
+            least = f"choose {key} where the ratio to the limit is smallest ({low_at})"
             return f"{least}, or by shapegcode optimize with the same file."
-        return f"measure {key} more closely, or let shapegcode optimize choose a more robust shaper."
+        return f"measure {key} more precisely, or let shapegcode optimize choose a more robust shaper."
 
     def quantity(self, name: str) -> Quantity:
-        """A measure.
+        """Quantiles of a measure.
 
         Args:
-            name: of it.
+            name: name of the measure.
 
         Returns:
             Its quantiles.
@@ -193,7 +193,7 @@ class MachineStudy(Result):
         return {each.name: each for each in self.quantities}[name]
 
     def key_figures(self) -> tuple[Figure, ...]:
-        """How likely, and the 95 % quantile of each measure beside the machine as it stands in its file."""
+        """Probability, and the 95 % quantile of each measure with its value for the machine file."""
         figures = [Figure("stay within tolerance", "%", None, self.within * 100, 1, None, "", "within", 100.0)]
         for rank, each in enumerate(self.quantities):
             keys = f"quantities.{rank}.nominal", f"quantities.{rank}.p95"
@@ -202,7 +202,7 @@ class MachineStudy(Result):
         return tuple(figures)
 
     def tables(self) -> list[Table]:
-        """Quantiles, what decides, what was refused."""
+        """Tables of quantiles, influences, and refused samples."""
         measures = (
             Column("measure", value="name", left=True, priority=0),
             Column("file", value="nominal", digits=3),
@@ -217,16 +217,16 @@ class MachineStudy(Result):
         )  # fmt: skip
         deciding = (
             Column("value", value="key", left=True, priority=0),
-            Column("share of limit", value=lambda row: f"{row.low:.2f} to {row.high:.2f}"),
+            Column("ratio to limit", value=lambda row: f"{row.low:.2f} to {row.high:.2f}"),
             Column("least at", value="low_at", priority=2),
             Column("largest at", value="high_at"),
             Column("first order", value=lambda row: _with_error(row.first, row.first_error), priority=2),
             Column("total", value=lambda row: _with_error(row.total, row.total_error)),
         )
         tables = [
-            Table(f"{self.n} draws, {self.conversions} conversion{'s' * (self.conversions != 1)}", measures,
+            Table(f"{self.n} samples, {self.conversions} conversion{'s' * (self.conversions != 1)}", measures,
                   self.quantities),
-            Table("what decides the verdict: median share of the limit over each value", deciding,
+            Table("influence on the verdict: median ratio to the limit over each value", deciding,
                   self.parameter_sensitivity),
         ]  # fmt: skip
         if self.refused:
@@ -239,17 +239,17 @@ class MachineStudy(Result):
         return self._drawn_beside()
 
     def to_xarray(self, what: str = "") -> xr.Dataset:
-        """Every draw: its values as coordinates, its measures as variables; needs `shapegcode[study]`.
+        """Every sample: its values as coordinates, its measures as variables; needs `shapegcode[study]`.
 
         Args:
-            what: "draws", or "quantities" for the quantiles; empty: the draws.
+            what: "draws" for the samples, or "quantities" for the quantiles; empty: the samples.
 
         Returns:
             The Dataset, with units; its dimension is `draw`, or `percent`.
 
         Raises:
             ArgumentError: another word.
-            NotKeptError: the study was read back from its JSON, which has no draws.
+            NotKeptError: the study was read back from its JSON, which has no samples.
             ModuleNotFoundError: xarray is not installed.
         """
         import xarray as xr
@@ -269,7 +269,7 @@ class MachineStudy(Result):
         if what not in ("", "draws"):
             raise ArgumentError(f"{what}: must be draws or quantities")
         if not self.draws:
-            raise NotKeptError("the draws of a study are not in its JSON: run it again, or keep --csv")
+            raise NotKeptError("the samples of a study are not in its JSON: run it again, or keep --csv")
         keys = {each.key for each in self.varied}
         units = {each.key: each.unit for each in self.varied} | {each.name: each.unit for each in self.quantities}
         measured: dict[str, Any] = {}
@@ -280,7 +280,7 @@ class MachineStudy(Result):
         return xr.Dataset(measured, coords=coordinates, attrs=about)
 
     def csv_lines(self) -> Iterator[str]:
-        """One line for each draw.
+        """Yield one line per sample.
 
         Yields:
             Header and lines.
@@ -295,7 +295,7 @@ _SHOWN = 12
 
 @dataclass(frozen=True)
 class ChosenValue:
-    """A key of the machine file and what was chosen."""
+    """A key of the machine file with its chosen value."""
 
     key: str  # dotted name
     value: str  # as TOML
@@ -303,14 +303,14 @@ class ChosenValue:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A combination that was converted.
+    """A converted combination.
 
     Attributes:
-        values: what was chosen.
-        time_s: cycle time; None: there is no text.
-        within: share of the draws that stay within tolerance; None: not simulated, as there is a shorter one.
-        checked: the same of fresh draws, four times as many; None: not simulated.
-        why: there is no text.
+        values: the chosen values.
+        time_s: cycle time; None: no emitted program.
+        within: ratio of samples within tolerance; None: not simulated, because there is a shorter one.
+        checked: the same for four times as many new samples; None: not simulated.
+        why: reason without an emitted program.
     """
 
     values: tuple[ChosenValue, ...]
@@ -330,16 +330,16 @@ class Optimum(Result):
     """The shortest program that stays within tolerance with the requested probability.
 
     Attributes:
-        program: its name.
-        machine: that was varied.
-        probability: of staying within tolerance that was asked for.
-        draws: machines on which a candidate is simulated; four times as many fresh ones confirm it.
-        best: the candidate; None: none is likely enough.
-        as_it_is: the machine file without a choice; None: it has no text.
-        candidates: all that were converted, the shortest first.
-        combinations: how many there are to choose from.
+        program: name of the program.
+        machine: the varied machine.
+        probability: required probability of staying within tolerance.
+        draws: machines on which a candidate is simulated; four times as many new ones confirm it.
+        best: the best candidate; None: none has the required probability.
+        as_it_is: the machine file without a choice; None: no emitted program.
+        candidates: all converted ones, shortest first.
+        combinations: number of possible combinations.
         warnings: caution, before you run.
-        machine_words: the machine as a command names it behind -m.
+        machine_words: the machine as argument of -m.
     """
 
     program: str
@@ -355,40 +355,40 @@ class Optimum(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether there is one."""
+        """True if there is a best candidate."""
         return self.best is not None
 
     @property
     def values(self) -> dict[str, Any]:
-        """What to set: `machine.with_values(found.values)`; nothing where none is likely enough."""
+        """The settings, for `machine.with_values(found.values)`; empty without a best candidate."""
         chosen = () if self.best is None else self.best.values
         return {each.key: tomllib.loads(f"value = {each.value}")["value"] for each in chosen}
 
     @property
     def answer(self) -> str:
-        """What to set, how long it takes, how likely it is good."""
+        """Settings, cycle time and probability of a good part."""
         if self.best is None or self.best.time_s is None:
             asked = f"{self.probability * 100:g} % of the machines"
             return f"none of {len(self.candidates)} choices stays within tolerance on {asked}"
         was_s = None if self.as_it_is is None else self.as_it_is.time_s
-        before = "" if was_s is None else f" (as the file has it {was_s:.3f} s)"
+        before = "" if was_s is None else f" (with the file's settings {was_s:.3f} s)"
         checked = self.best.checked or 0.0
         return (
             f"{self.best.words}: {self.best.time_s:.3f} s{before}, within tolerance on {checked * 100:.1f} % of the "
-            f"machines, asked for {self.probability * 100:g} %"
+            f"machines, required {self.probability * 100:g} %"
         )
 
     @property
     def next_step(self) -> str:
-        """To convert with it."""
+        """The command that converts with the best settings."""
         if self.best is None:
-            return "measure what decides (shapegcode study), widen the tolerance, or ask for less."
+            return "measure the most influential value (shapegcode study), widen the tolerance, or require less."
         words = [word for each in self.best.values for word in ("--set", f"{each.key}={each.value}")]
         program = shlex.quote(self.program)
         return f"shapegcode convert {program} -m {self.machine_words} {shlex.join(words)} -o shaped.nc"
 
     def key_figures(self) -> tuple[Figure, ...]:
-        """Time and probability of the best one."""
+        """Time and probability of the best candidate."""
         if self.best is None or self.best.time_s is None:
             return ()
         was = None if self.as_it_is is None else self.as_it_is.time_s
@@ -399,12 +399,12 @@ class Optimum(Result):
         )  # fmt: skip
 
     def plots(self) -> Mapping[str, Plot]:
-        """Time and probability of the shortest choices; nothing where none has a text."""
+        """Time and probability of the shortest combinations; empty without any emitted program."""
         return self._drawn_beside() if self.shown else {}
 
     @property
     def shown(self) -> tuple[Candidate, ...]:
-        """The shortest candidates that have a text."""
+        """The shortest candidates with an emitted program."""
         return tuple(each for each in self.candidates[:_SHOWN] if each.time_s is not None)
 
     def tables(self) -> list[Table]:
@@ -422,6 +422,6 @@ class Optimum(Result):
             Column("why not", value="why", text=True, priority=2),
         )
         more = len(self.candidates) - _SHOWN
-        caption = f"and {more} more, all slower or without a text" if more > 0 else ""
+        caption = f"and {more} more, all slower or without an emitted program" if more > 0 else ""
         title = f"choices by time: {len(self.candidates)} of {self.combinations} converted"
         return [Table(title, columns, self.candidates[:_SHOWN], caption)]

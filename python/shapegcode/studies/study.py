@@ -68,34 +68,34 @@ def study(
     scheduler: Cluster | str | None = None,
     on_progress: Progress = lambda _stage, _share: None,
 ) -> MachineStudy:
-    """Simulate a program on machines whose values are sampled, and compute how likely it stays within tolerance.
+    """Simulate a program on machines with sampled values, and compute the probability of staying within tolerance.
 
-    The program is converted once, for the machine file. A mode, a drive, a filter, a time of `vary` is that of the
-    machine on which it is simulated. A value that only the converter reads, or one that is `known`,
-    gives a program for each.
+    The program is converted once, for the machine file. A mode, drive, filter or time in `vary` is changed only in the
+    simulated machine. For a value that only the converter reads, or one that is `known`,
+    the program is converted for each value.
 
     >>> sg.study("part.nc", machine, {"axes.x.modes.1.frequency_hz": sg.normal(46, 2)}, n=10_000)
 
     Args:
-        program: what is simulated, or its file.
-        machine: as its file has it.
-        vary: what each key is sampled from: `normal`, `lognormal`, `uniform`, or a list of values. Modes count from 1.
-        n: how many draws.
+        program: the program, or its file.
+        machine: the machine, its file, or a built-in name.
+        vary: distribution of each key: `normal`, `lognormal`, `uniform`, or a list of values. Modes count from 1.
+        n: number of samples.
         sampling: "sobol", "lhs" (latin hypercube) or "grid".
-        measure: what is measured, see `shapegcode.studies.replay.MEASURES`.
-        seed: the same one gives the same draws.
-        indices: Sobol indices by SALib; draws are then Saltelli's design, at most `n`.
-        at_least: probability of staying within tolerance that is asked for.
+        measure: measures, see `shapegcode.studies.replay.MEASURES`.
+        seed: equal seeds give equal samples.
+        indices: Sobol indices by SALib; samples are then Saltelli's design, at most `n`.
+        at_least: required probability of staying within tolerance.
         shape_all: see `convert`.
-        scheduler: Dask's address, or a `Cluster`; "local": one of this machine; None: threads of this process.
-        on_progress: called with what is being done, and the share of it that is done.
+        scheduler: Dask's address, or a `Cluster`; "local": one on this computer; None: threads of this process.
+        on_progress: called with the stage and its finished ratio.
 
     Returns:
-        Quantiles, probability, what decides; `to_xarray()` has every draw.
+        Quantiles, probability, influences; `to_xarray()` has every sample.
 
     Raises:
         ArgumentError: nothing to vary, n below 1, another sampling or measure, or nothing that could be simulated.
-        MachineError: a key that there is none, or a draw that a machine file could not have: key, value, limit.
+        MachineError: an unknown key, or a sampled value that is invalid in a machine file: key, value, limit.
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.
     """
@@ -117,7 +117,7 @@ def study(
 
 
 def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> None:
-    """Make the machines with the lowest and the highest value of each key, before anything is converted."""
+    """Before any conversion, make the machines with the lowest and the highest value of each key."""
     for each, column in zip(varied, columns, strict=True):
         if isinstance(each.distribution, Listed):
             ends = {toml(value): index for index, value in enumerate(column)}.values()
@@ -126,7 +126,7 @@ def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> 
             ends = {"low": int(numbers.argmin()), "high": int(numbers.argmax())}.values()
         for index in ends:
             row = {one.key: values[index] for one, values in zip(varied, columns, strict=True)}
-            sampled_machine(machine, row, f"{machine.name}, draw {index + 1}")
+            sampled_machine(machine, row, f"{machine.name}, sample {index + 1}")
 
 
 @dataclass(frozen=True)
@@ -171,12 +171,12 @@ class _StudyRun:
         return {each.key: column[index] for each, column in pairs if each.known == known}
 
     def _text(self, draws: tuple[int, ...], values: Mapping[str, object]) -> _Text:
-        machine = sampled_machine(self.machine, values, f"{self.machine.name}, draw {draws[0] + 1}")
+        machine = sampled_machine(self.machine, values, f"{self.machine.name}, sample {draws[0] + 1}")
         try:
             return _Text(draws, values, Replay.of(self.program, machine, shape_all=self.shape_all))
         except (ArgumentError, DesignError) as error:
             if not values:
-                raise  # there is no other text
+                raise  # there is no other program
             return _Text(draws, values, None, str(error))
 
     def _simulate(self, text: _Text, before: int) -> None:
@@ -198,7 +198,7 @@ class _StudyRun:
         self.measured[list(text.draws)] = simulate_all(text.replay, job, self.pool, tell)
 
     def _simulate_nominal(self, texts: Sequence[_Text]) -> None:
-        """Simulate the program that is converted for the machine file, on that machine."""
+        """Simulate the program converted for the machine file on that machine."""
         try:
             held = next((text.replay for text in texts if not text.values), None)
             replay = held or Replay.of(self.program, self.machine, shape_all=self.shape_all)
@@ -218,11 +218,11 @@ def _result(
     columns = [[column[index] for index in kept] for column in run.columns]
     measured = {name: run.measured[kept, rank] for rank, name in enumerate(run.wanted)}
     shares = measured[SHARE]
-    # A draw without a text is none that stays within tolerance.
+    # A sample without an emitted program counts as out of tolerance.
     good = int(within(shares).sum())
     whole = indices and not refused
-    warnings = [f"{run.count - len(kept)} of {run.count} draws have no text: they count as out of tolerance"]
-    warnings += ["no Sobol indices: they need every draw"] if indices else []
+    warnings = [f"{run.count - len(kept)} of {run.count} samples have no program: they count as out of tolerance"]
+    warnings += ["no Sobol indices: they need every sample"] if indices else []
     alone = CONTOURS.isdisjoint(run.wanted)
     alone_warnings = ["no contour is measured: within tolerance means its residual vibration alone"] if alone else []
     replays = [text.replay for text in texts if text.replay is not None]
@@ -311,7 +311,7 @@ def _bin(at: float, name: str, values: FloatArray) -> BinQuantiles:
 def parameter_sensitivity(
     varied: Sequence[Varied], columns: Sequence[Sequence[object]], shares: FloatArray, *, indices: bool, seed: int
 ) -> tuple[ParameterInfluence, ...]:
-    """Which value moves the share of the limit most."""
+    """Influence of each value on the ratio to the limit, largest first."""
     found = _indices(varied, shares, seed) if indices else {}
     rows = []
     for each, column in zip(varied, columns, strict=True):
@@ -324,7 +324,7 @@ def parameter_sensitivity(
 
 
 def _indices(varied: Sequence[Varied], shares: FloatArray, seed: int) -> dict[str, tuple[float, ...]]:
-    """First-order and total index of each value by SALib, and their errors; none where nothing changes the share."""
+    """First-order and total index of each value by SALib, and their errors; empty if the ratio is constant."""
     sobol = salib("analyze")
     if float(np.ptp(shares)) == 0.0:
         return {}

@@ -1,4 +1,4 @@
-"""The file of a study (STUDY.toml): program, machine, what is varied, what can be chosen.
+"""The file of a study (STUDY.toml): program, machine, varied values, settings to choose.
 
 program = "part.nc"
 machine = "mine.toml"
@@ -39,11 +39,11 @@ _DOTTED = re.compile(r"^(\s*)([\w-]+(?:\.[\w-]+)+)(\s*=)", re.MULTILINE)
 
 
 class StudyFileError(FileError):
-    """A file of a study that cannot be used; the message lists every problem."""
+    """A study file that cannot be used; the message lists every problem."""
 
 
 def _as_table(value: object) -> object:
-    """A list of choices as what it stands for."""
+    """Convert a list of choices to its table."""
     if isinstance(value, list):
         return {"one_of": value}
     if not isinstance(value, dict):
@@ -54,7 +54,7 @@ def _as_table(value: object) -> object:
 
 
 class DrawnValue(InlineTable):
-    """What a value is sampled from."""
+    """Distribution of a value."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -63,14 +63,14 @@ class DrawnValue(InlineTable):
     )
 
     mean: Float | None = key("mean of a normal distribution", default=None)
-    sd: Positive | None = key("its standard deviation, in the unit of the value", default=None)
+    sd: Positive | None = key("standard deviation, in the unit of the value", default=None)
     percent: Positive | None = key(
         "standard deviation in percent: of the mean, or factor about the median", default=None
     )
     median: Positive | None = key("median of a lognormal distribution", default=None)
     low: Float | None = key("lowest value of a uniform distribution", default=None)
     high: Float | None = key("highest value", default=None)
-    one_of: Annotated[tuple[Any, ...], Field(min_length=1)] | None = key("choices, each as likely", default=None)
+    one_of: Annotated[tuple[Any, ...], Field(min_length=1)] | None = key("choices, equally likely", default=None)
     known: Bool | None = key("the program is converted for each value", default=None)
 
     @model_validator(mode="after")
@@ -82,7 +82,7 @@ class DrawnValue(InlineTable):
         return self
 
     def distribution(self) -> Distribution:
-        """The distribution that it says."""
+        """The distribution of these parameters."""
         if self.model_fields_set - {"known"} not in map(set, _KINDS):
             raise ArgumentError(_GIVE)
         if self.one_of is not None:
@@ -100,7 +100,7 @@ _LEAVES = frozenset(DrawnValue.model_fields)
 
 
 def _flat(given: Mapping[str, object], above: tuple[str, ...] = ()) -> Iterator[tuple[str, object]]:
-    """Tables below tables as dotted keys; what stands for a value of the machine file stays whole."""
+    """Flatten nested tables to dotted keys, except tables that are values of the machine file."""
     for name, entry in given.items():
         parts = (*above, *name.split("."))
         if isinstance(entry, dict) and entry and not entry.keys() & _LEAVES and not _is_value(parts):
@@ -110,7 +110,7 @@ def _flat(given: Mapping[str, object], above: tuple[str, ...] = ()) -> Iterator[
 
 
 def _is_value(parts: Sequence[str]) -> bool:
-    """Whether these are the parts of a key of the machine file that holds no table."""
+    """True if these are the parts of a key of the machine file that is not a table."""
     table: type[TomlTable] | None = Machine
     field = None
     for part in parts:
@@ -132,28 +132,28 @@ Measure = Annotated[Text, Field(json_schema_extra={"enum": list(MEASURES)})]
 
 
 class StudyFile(TomlTable):
-    """What is simulated on which machines."""
+    """Contents of the study file."""
 
-    program: Text = key("the program, beside this file")
+    program: Text = key("the program, relative to this file")
     machine: Text | None = key(
-        "machine file beside this one, or a built-in machine; left out: that of -m", default=None
+        "machine file, relative to this file, or a built-in machine; left out: that of -m", default=None
     )
     n: Annotated[int, Strict(), Field(ge=1, le=MAX_DRAWS)] | None = key(
-        f"how many draws; left out: 1000, and {USUAL_DRAWS} for each choice of optimize", default=None
+        f"number of samples; left out: 1000, and {USUAL_DRAWS} per combination of optimize", default=None
     )
-    sampling: Literal["sobol", "lhs", "grid"] = key("how they are spread, of study", default="sobol")
-    measure: tuple[Measure, ...] = key("what is measured, of study", default=DEFAULT_MEASURES)
-    seed: Annotated[int, Strict(), Field(ge=0)] = key("of the random numbers", default=0)
-    indices: Bool = key("Sobol indices too, of study; needs shapegcode[study]", default=False)
-    at_least: Annotated[Positive, Field(le=1)] = key("probability of staying within tolerance", default=0.95)
+    sampling: Literal["sobol", "lhs", "grid"] = key("sampling method of study", default="sobol")
+    measure: tuple[Measure, ...] = key("measures of study", default=DEFAULT_MEASURES)
+    seed: Annotated[int, Strict(), Field(ge=0)] = key("seed of the random numbers", default=0)
+    indices: Bool = key("Sobol indices of study; needs shapegcode[study]", default=False)
+    at_least: Annotated[Positive, Field(le=1)] = key("required probability of staying within tolerance", default=0.95)
     shape_all: Bool = key("shape every region, see convert --shape-all", default=False)
     most: Annotated[int, Strict(), Field(ge=1, le=_MAX_CONVERSIONS)] = key(
-        "conversions at most, of optimize", default=USUAL_CONVERSIONS
+        "maximum number of conversions of optimize", default=USUAL_CONVERSIONS
     )
     vary: Values = key("the distribution from which each key of the machine file is sampled")
     choose: Lists | None = key(
-        "values that optimize chooses from, by key of the machine file; left out: block periods, families, tolerances "
-        "that are aimed at, feeds on arcs",
+        "values from which optimize chooses, by key of the machine file; left out: block periods, families, planned "
+        "tolerances, arc feeds",
         default=None,
     )
 
@@ -194,13 +194,13 @@ def study_schema(title: str) -> dict[str, Any]:
 
 
 def load_study(path: str | Path) -> StudyFile:
-    """Read the file of a study; the files that it names are looked for beside it.
+    """Read a study file; its file names are relative to its folder.
 
     Args:
-        path: of the file.
+        path: path of the file.
 
     Returns:
-        What it says.
+        The contents.
 
     Raises:
         StudyFileError: not TOML, or wrong keys or values; every problem is listed.
@@ -217,7 +217,7 @@ def load_study(path: str | Path) -> StudyFile:
                     raise StudyFileError(str(path), (twice,))
                 flat[name] = entry
             data[table] = flat
-    # In quotes, as they are said in messages, so that these find their lines.
+    # In quotes, as in messages, so that their lines are found.
     quoted = _DOTTED.sub(r'\1"\2"\3', text)
     found = validated(StudyFile, data, str(path), quoted, StudyFileError)
     beside = Path(path).parent

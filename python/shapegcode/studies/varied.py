@@ -1,6 +1,6 @@
-"""Which values are varied: what each is sampled from, and whether the converter knows of it.
+"""Varied values: their distributions, and whether the converter knows them.
 
-What only the converter reads needs another program; all else is of the machine on which the program is simulated.
+A value that only the converter reads needs another program; others change only the simulated machine.
 """
 
 from __future__ import annotations
@@ -28,27 +28,27 @@ Unit = FloatArray
 
 @dataclass(frozen=True)
 class Distribution:
-    """What a value is sampled from."""
+    """Distribution of a sampled value."""
 
-    words: str  # for people
-    quantile: Callable[[Unit], Unit] = field(compare=False)  # the values below which these shares of all lie
+    words: str  # as shown
+    quantile: Callable[[Unit], Unit] = field(compare=False)  # inverse distribution function
     # the program is converted for each value; False: it is converted for the value of the machine file, and only
-    # the machine that simulates it has the other one; None: False where a machine may differ from its file
+    # the simulated machine has the other one; None: False if a machine may differ from its file
     known: bool | None = None
 
     def at(self, shares: Unit) -> list[object]:
-        """The values below which these shares of all lie."""
+        """Quantiles at these ratios."""
         return list(map(float, self.quantile(shares)))
 
 
 @dataclass(frozen=True)
 class Listed(Distribution):
-    """One of some values, each as likely."""
+    """One of some values, equally likely."""
 
     values: tuple[object, ...] = ()
 
     def at(self, shares: Unit) -> list[object]:
-        """The values below which these shares of all lie."""
+        """Quantiles at these ratios."""
         count = len(self.values)
         return [self.values[min(int(share * count), count - 1)] for share in shares]
 
@@ -56,7 +56,7 @@ class Listed(Distribution):
 def _normal_quantile(shares: Unit) -> Unit:
     from scipy.special import ndtri
 
-    # A sequence may hold 0, whose quantile is none.
+    # A sequence may contain 0, whose quantile is infinite.
     tiny = 0.5 / 2**32
     return np.asarray(ndtri(np.clip(shares, tiny, 1.0 - tiny)))
 
@@ -64,7 +64,7 @@ def _normal_quantile(shares: Unit) -> Unit:
 def normal(
     mean: float, sd: float | None = None, *, percent: float | None = None, known: bool | None = None
 ) -> Distribution:
-    """A value that is known with a standard deviation.
+    """Normal distribution of a value known with a standard deviation.
 
     >>> sg.normal(46, 2)             # 46 ± 2 Hz
     >>> sg.normal(46, percent=5)     # 46 Hz ± 5 %
@@ -72,7 +72,7 @@ def normal(
     Args:
         mean: in the unit of the key.
         sd: standard deviation, likewise.
-        percent: standard deviation in percent of the mean, in place of it.
+        percent: standard deviation in percent of the mean, instead.
         known: see `Distribution`.
 
     Returns:
@@ -88,11 +88,11 @@ def normal(
 
 
 def lognormal(median: float, percent: float, *, known: bool | None = None) -> Distribution:
-    """A value above zero that is known to a factor, such as a damping ratio.
+    """Lognormal distribution of a value known to a factor, such as a damping ratio.
 
     Args:
         median: in the unit of the key.
-        percent: by how much it is larger one standard deviation above the median; below, it is smaller by the same
+        percent: increase at one standard deviation above the median; below, it is smaller by the same
             factor.
         known: see `Distribution`.
 
@@ -110,7 +110,7 @@ def lognormal(median: float, percent: float, *, known: bool | None = None) -> Di
 
 
 def uniform(low: float, high: float, *, known: bool | None = None) -> Distribution:
-    """A value of which nothing is known but its limits.
+    """Uniform distribution of a value of which only the limits are known.
 
     Args:
         low: the lowest.
@@ -129,17 +129,17 @@ def uniform(low: float, high: float, *, known: bool | None = None) -> Distributi
 
 
 def listed(values: Sequence[object] | npt.NDArray[Any], *, known: bool | None = None) -> Listed:
-    """One of some values, each as likely; a plain list means the same.
+    """One of some values, equally likely; a plain list means the same.
 
     Args:
-        values: as a machine file may have them.
+        values: values as in a machine file.
         known: see `Distribution`.
 
     Returns:
         The distribution.
 
     Raises:
-        ArgumentError: no list, or an empty one.
+        ArgumentError: not a list, or an empty one.
     """
     if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray) or getattr(values, "ndim", 1) == 0:
         raise ArgumentError(f"{values!r}: must be a list of values")
@@ -167,9 +167,9 @@ def _spread(sd: float | None, percent: float | None, whole: float) -> float:
     return _number(name, given) * (1.0 if percent is None else whole / 100.0)
 
 
-Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]  # what each key is sampled from
+Vary = Mapping[str, Distribution | Sequence[object] | npt.NDArray[Any]]  # distribution of each key
 
-# A machine may differ from its file in these, and they are read when blocks are simulated.
+# Values in which a machine may differ from its file, and which are read when blocks are simulated.
 _SIMULATED = re.compile(
     r"axes\.[xyz]\.(modes|rigid|drive\..+|rapid_mm_per_min)"
     r"|axes\.[xyz]\.modes\.\d+\.(frequency_hz|damping_ratio|participation|(frequency_over|moves|excited_by)(\..+)?)"
@@ -178,38 +178,38 @@ _SIMULATED = re.compile(
     r"|shaping\.part_mass_kg|times\..+"
 )
 _SWINGS = re.compile(r"axes\.[xyz]\.(modes|rigid|drive)\b.*|shaping\.part_mass_kg")
-# The file may leave out the table that holds it; `with_values` has the last word.
+# The table with it may be missing in the file; `with_values` decides.
 _OPTIONAL = re.compile(r"axes\.[xyz]\.(modes|drive)(\.|$)")
 _TICK = "controller.interpolation_period_s"
 
 
 @dataclass(frozen=True)
 class Varied:
-    """A key of the machine file and what its values are sampled from."""
+    """A varied key of the machine file with its distribution."""
 
     key: str  # dotted name
     distribution: Distribution  # of the values
-    known: bool  # the converter knows each value; else only the machine that simulates the text has it
-    value: str  # what the file says, as TOML
+    known: bool  # the converter knows each value; False: only the simulated machine has it
+    value: str  # value in the file, as TOML
     unit: str  # of the values
 
     @property
     def changes_times(self) -> bool:
-        """Whether a program may take another time with it."""
+        """True if it may change the time of a program."""
         return not _SWINGS.fullmatch(self.key)
 
 
 def check_keys(name: str, given: object) -> None:
-    """Refuse what does not go by keys of the machine file."""
+    """Refuse arguments that are not mappings by keys of the machine file."""
     if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
-        problem = f"{name} = {given!r}: must go by keys of the machine file"
+        problem = f"{name} = {given!r}: must be a mapping by keys of the machine file"
         raise ArgumentError(f'{problem}, such as {{"axes.x.modes.1.frequency_hz": ...}}')
 
 
 def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
-    """What is varied, checked against the keys that there are."""
+    """Validate the varied values against the keys of the machine."""
     if not vary:
-        raise ArgumentError("vary: nothing is varied: name at least one key of the machine file")
+        raise ArgumentError("vary: nothing is varied: give at least one key of the machine file")
     check_keys("vary", vary)
     held = {value.key: value for value in machine.values()}
     found = []
@@ -224,7 +224,7 @@ def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
             raise MachineError(machine.name, (Problem(key, "", wrong),))
         simulated = _SIMULATED.fullmatch(key) is not None
         if distribution.known is False and not simulated:
-            raise ArgumentError(f"vary: {key}: known = false: only the converter reads it, so that it must be known")
+            raise ArgumentError(f"vary: {key}: known = false: only the converter reads it, so it must be known")
         known = not simulated if distribution.known is None else distribution.known
         found.append(Varied(key, distribution, known, at.value if at else "not set", at.unit if at else ""))
     return tuple(found)
@@ -234,24 +234,24 @@ def sampled_machine(machine: Machine, values: Mapping[str, object], source: str)
     """A machine with sampled values."""
     if not values:
         return machine
-    # A control of another period executes the same blocks; that their period is a multiple is the converter's care.
+    # A control with another period executes the same blocks; only the converter requires a multiple of it.
     freed = {"emission.block_period_s": None} if _TICK in values and "emission.block_period_s" not in values else {}
     return machine.with_values({**freed, **values}, source=source)
 
 
 SAMPLINGS = ("sobol", "lhs", "grid")
 
-MAX_DRAWS = 1_000_000  # Of a study: further ones say nothing more, and fill the memory
+MAX_DRAWS = 1_000_000  # of a study: more add no information and fill the memory
 
 Columns = list[list[object]]
 
 
 def sampled_columns(varied: Sequence[Varied], n: int, sampling: str, seed: int, *, indices: bool) -> Columns:
-    """The values of all samples."""
+    """Columns of the values of all samples."""
     if sampling not in SAMPLINGS:
         raise ArgumentError(f"sampling = {sampling!r}: must be one of {', '.join(SAMPLINGS)}")
     if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MAX_DRAWS:
-        raise ArgumentError(f"n = {n!r}: must be a whole number of draws, 1 or more and at most {MAX_DRAWS}")
+        raise ArgumentError(f"n = {n!r}: must be a whole number of samples, 1 or more and at most {MAX_DRAWS}")
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise ArgumentError(f"seed = {seed!r}: must be a whole number, 0 or more")
     if indices and sampling != "sobol":
@@ -267,7 +267,7 @@ def _sequence(dimensions: int, n: int, sampling: str, seed: int) -> FloatArray:
 
     if sampling == "lhs":
         return np.asarray(qmc.LatinHypercube(dimensions, rng=np.random.default_rng(seed)).random(n))
-    # The beginning of a sequence of a power of two, which is what SciPy asks for.
+    # The start of a sequence of a power of two, as SciPy requires.
     power = math.ceil(math.log2(n)) if n > 1 else 0
     return np.asarray(qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(power))[:n]
 
@@ -277,7 +277,7 @@ def _grid(varied: Sequence[Varied], n: int) -> Columns:
     free = sum(not isinstance(each.distribution, Listed) for each in varied)
     if listed > n:
         raise ArgumentError(f"n = {n}: the lists alone have {listed} combinations: give n = {listed} or more")
-    # The root by counting: floating point would make 2 of the cube root of 27.
+    # Integer root by counting: floating point would give 2 for the cube root of 27.
     level = 1
     while free and listed * (level + 1) ** free <= n:
         level += 1
@@ -288,13 +288,13 @@ def _grid(varied: Sequence[Varied], n: int) -> Columns:
 
 
 def index_problem(varied: Sequence[Varied]) -> dict[str, Any]:
-    """What SALib calls a problem: the unit cube."""
+    """The unit cube as a problem of SALib."""
     count = len(varied)
     return {"num_vars": count, "names": [each.key for each in varied], "bounds": [[0.0, 1.0]] * count}
 
 
 def salib(part: str) -> Any:
-    """Its module `sobol` of a part."""
+    """Import the module `sobol` of a part of SALib."""
     try:
         return importlib.import_module(f"SALib.{part}.sobol")
     except ModuleNotFoundError as error:

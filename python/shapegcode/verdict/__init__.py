@@ -1,1 +1,1 @@
-"""Programs simulated under operating conditions and judged: every cut, shaped or left unchanged."""
+"""Verdict of programs: every cut, shaped or left unchanged, simulated in all operating conditions."""

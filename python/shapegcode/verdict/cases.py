@@ -1,6 +1,6 @@
-"""Operating conditions: what a controller, its operator and a drifting machine may do to an emitted program.
+"""Operating conditions of an emitted program: block timing, feed override, look-ahead, underrun, shifted modes.
 
-Those inside the band that the machine file states (table `[verdict]`) decide; the others are shown.
+Those within the range of the machine file (table `[verdict]`) decide; the others are only shown.
 """
 
 from __future__ import annotations
@@ -35,23 +35,23 @@ _QUANTITIES = {"command": "contour error of the command", "response": "contour e
 class Case:
     """One operating condition of the emitted program."""
 
-    name: str  # in words, unique
-    block_end: str | None  # "ceil" or "carry"; None where look-ahead plans the blocks anew
-    counts: bool  # it lies in the stated band
+    name: str  # shown name, unique
+    block_end: str | None  # "ceil" or "carry"; None if look-ahead replans the blocks
+    counts: bool  # it is within the range of the machine file
     override: float = 1.0  # feed override, 1 = 100 %
-    # the mode that is off its frequency ("x.1": first of the X axis, as in the machine file), "all", or None
+    # the shifted mode ("x.1": first of the X axis, as in the machine file), "all", or None
     mode: str | None = None
-    shift: float = 0.0  # by how many of its stated uncertainties, -1 or +1
-    look_ahead: bool = False  # the controller's look-ahead stays on
+    shift: float = 0.0  # in units of its uncertainty, -1 or +1
+    look_ahead: bool = False  # the controller's look-ahead is left on
     starved_s: float = 0.0  # time for which the block buffer is empty once; 0: never
 
     @property
     def nominal(self) -> bool:
-        """As the program is meant to run, under either rule of block timing."""
+        """True for the intended operation, with either rule of block timing."""
         return self.override == 1.0 and self.mode is None and not self.look_ahead and self.starved_s == 0.0
 
     def needs_contour(self, target: Target) -> bool:
-        """Whether the contour has to be measured in this case: a mode that is off changes nothing of the command."""
+        """True if the contour must be measured in this case: a shifted mode does not change the command."""
         if self.mode is None:
             return True
         return self.counts and (self.override != 1.0 or target == "response")
@@ -69,32 +69,32 @@ class CaseFigures:
 
 @dataclass(frozen=True)
 class RegionLimits:
-    """What a region is judged by."""
+    """Limits of a region."""
 
-    residual_um: FloatArray  # per axis, (3,)
-    contour_um: float  # of the targeted deviation
-    target: Target = "command"  # which deviation: of the command, or of the table (response)
+    residual_um: FloatArray  # limit per axis, (3,)
+    contour_um: float  # limit of the target's deviation
+    target: Target = "command"  # target: the command, or the machine table (response)
 
 
 @dataclass(frozen=True)
 class LimitCheck:
-    """A figure of a case beside its limit, missed or not."""
+    """A figure of a case and its limit."""
 
-    figure: str  # what it is
-    value_um: float  # how much
-    limit_um: float  # how much is allowed
-    decimals: int = 2  # digits that are worth reading
+    figure: str  # its name
+    value_um: float  # its value
+    limit_um: float  # its limit
+    decimals: int = 2  # significant decimals
 
     @property
     def share(self) -> float:
-        """Of the limit; infinite where nothing is allowed."""
+        """Ratio to the limit; infinite if the limit is 0."""
         if self.limit_um > 0.0:
             return self.value_um / self.limit_um
         return math.inf if self.value_um > 0.0 else 0.0
 
     @property
     def is_missed(self) -> bool:
-        """Whether the figure is over its limit."""
+        """True if the figure exceeds its limit."""
         return self.value_um > self.limit_um * (1.0 + 1e-9)
 
     def __str__(self) -> str:
@@ -102,7 +102,7 @@ class LimitCheck:
 
 
 def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]]]]:
-    """Key of every mode that states an uncertainty, with the names and shifts of its cases."""
+    """Key of every mode with an uncertainty, with the names and shifts of its cases."""
     found = []
     for axis, table in zip("XYZ", machine.axes.as_tuple(), strict=True):
         for number, mode in enumerate(table.modes, start=1):
@@ -119,12 +119,12 @@ def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]
 
 
 def stated_cases(machine: Machine) -> list[Case]:
-    """The conditions in which a program of this machine is simulated; the nominal ones come first (ceil, carry).
+    """Operating conditions of the verdict for a machine; the nominal ones come first (ceil, carry).
 
-    Overrides from 50 to 120 % and at the ends of the band (none where the override is locked); each mode, and all of
-    them, up and down by their stated uncertainty with as little damping as they state; both together at the corners of
-    the band; the look-ahead mode left on (for a controller that has one); and a block buffer that runs empty once. A
-    control whose planner cannot be switched off runs all of them by it, and stops in time where its buffer runs empty.
+    Overrides from 50 to 120 % and at the ends of the range (none if the override is locked); each mode, and all of
+    them, shifted up and down by their uncertainty with the lowest damping; both together at the corners of
+    the range; the look-ahead mode left on (for a controller that has one); and a block buffer that runs empty once. A
+    control whose planner cannot be switched off uses it in all of them, and stops in time if its buffer runs empty.
     """
     band, kind = machine.verdict, machine.controller.kind
     low, high = band.override_percent
@@ -137,7 +137,7 @@ def stated_cases(machine: Machine) -> list[Case]:
     def at_override(percent: float) -> Case:
         return Case(f"override {percent:g} %", own, low <= percent <= high, override=percent / 100.0)
 
-    turns = machine.emission.override != "lock"  # an override that is switched off has no effect
+    turns = machine.emission.override != "lock"  # a disabled override has no effect
     ends = sorted({low, high} - {100.0}) if turns else []
     cases += [at_override(percent) for percent in sorted({*_OVERRIDES_PERCENT, *ends} - {100.0}) if turns]
     modes = _uncertain_modes(machine)
@@ -162,7 +162,7 @@ def stated_cases(machine: Machine) -> list[Case]:
 
 
 def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[LimitCheck]:
-    """Every judged figure of a region in one case, beside its limit: residuals, and the targeted deviation."""
+    """Check the figures of a region in one case against their limits: residuals, and the target's deviation."""
     check = [
         LimitCheck(f"residual vibration {axis}", float(now), float(limit))
         for axis, now, limit in zip("XYZ", figures.residual_mm * 1e3, limits.residual_um, strict=True)
@@ -176,7 +176,7 @@ def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[LimitCheck]
 def region_misses(
     cases: Sequence[Case], figures: Sequence[CaseFigures | None], limits: RegionLimits
 ) -> list[tuple[str, LimitCheck]]:
-    """Every figure of a cut that leaves its limit in a condition that counts: the worst condition of each, in words."""
+    """Figures of a cut beyond their limits in conditions that count, each in its worst condition, as text."""
     worst: dict[str, tuple[LimitCheck, Case]] = {}
     for case, simulated in zip(cases, figures, strict=True):
         for check in judge_region(simulated, limits) if case.counts and simulated is not None else ():
@@ -190,11 +190,11 @@ def region_misses(
 
 
 _NUMBER = re.compile(r"(\d) (%|ms\b|s\b|mm\b|Hz\b|µm\b)")
-_SWINGS_UM = 0.005  # an axis that nowhere reaches this has no column
+_SWINGS_UM = 0.005  # an axis below this everywhere has no column
 
 
 def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table:
-    """What every case leaves, whether it counts, and which one decides."""
+    """Table of operating conditions: figures, whether it counts, and which one decides."""
     columns = (
         Column("condition", value=lambda case: unbroken(case.name), text=True),
         *(
@@ -220,7 +220,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
 
 
 def unbroken(text: str) -> str:
-    """Keep a number on the line of its unit."""
+    """Keep a number and its unit on one line."""
     return _NUMBER.sub(rf"\1{NO_BREAK}\2", text)
 
 
@@ -242,26 +242,26 @@ def _style(case: CaseVerdict, worst: bool) -> str:
     return "dim" if not case.counts else f"bold {colour}".strip() if worst else colour
 
 
-# An operating condition that was simulated: its figures; how much longer all blocks take in it than at 100 %, before
-# any filter, where only their end was simulated, else 0.
+# A simulated operating condition: its figures; time by which all blocks are longer than at 100 %, before
+# filters, if only the end was simulated, else 0.
 SimulatedCase = tuple[_core.SimulationFigures, float]
 
 
 @dataclass(frozen=True)
 class CaseSimulation:
-    """Simulates one emitted region; every method is a task of its own."""
+    """Simulates one emitted region; every method is a separate task."""
 
-    blocks: _core.Path  # what was emitted
-    path: _core.Path  # what was programmed
+    blocks: _core.Path  # emitted blocks
+    path: _core.Path  # programmed path
     model: MachineModel  # the machine for the core
-    cases: Sequence[Case]  # in which it is simulated
-    target: Target  # what the contour tolerance is about
-    offset: Offset  # from the region's positions to the machine's
+    cases: Sequence[Case]  # operating conditions
+    target: Target  # target of the contour tolerance
+    offset: Offset  # from positions of the region to machine positions
     tracker: _core.ContourTracker  # of the programmed path
-    increment_mm: float  # least increment of the text
+    increment_mm: float  # least increment of the program
 
     def nominal(self, rule: _core.BlockEnd) -> _core.SimulationFigures:
-        """Simulate the blocks at 100 %; with the control's own block timing also an underrun where it excites most."""
+        """Simulate the blocks at 100 %; with the control's own block timing also an underrun at the worst position."""
         own = rule == self.model.own_rule
         return self.model.simulate_emitted(
             self.blocks, self.path, rule, offset=self.offset,
@@ -277,24 +277,24 @@ class CaseSimulation:
         return self.model.simulate_planned(self.blocks, self.path, offset=self.offset, tracker=self.tracker)
 
     def _beside(self, case: Case) -> bool:
-        """Whether the contour of a case is computed in addition to the nominal case."""
+        """True if the contour of a case is computed with the nominal case."""
         return case.override != 1.0 and case.mode is None and self.model.bounds_deviations
 
     def _whole(self, case: Case) -> bool:
         if self.model.always_plans and case.override != 1.0:
             return True
-        # Behind feed drives each would take a quarter of a conversion: what is only shown makes do with the residual.
+        # With feed drives each would take a quarter of a conversion: cases that are only shown have the residual only.
         spared = case.override != 1.0 and not case.counts and self.model.machine.verdict.plant != "modal"
         return case.needs_contour(self.target) and not spared and not self._beside(case)
 
     def groups(self) -> list[list[Case]]:
-        """Overrides and shifted modes: those simulated in full each by itself, the short ones in one task."""
+        """Groups of overrides and shifted modes: one task for each full simulation, one for all short ones."""
         others = [case for case in self.cases if case.override != 1.0 or case.mode is not None]
         whole = [[case] for case in others if self._whole(case)]
         return [*whole, [case for case in others if not self._whole(case)]]
 
     def others(self, cases: Sequence[Case]) -> dict[str, SimulatedCase]:
-        """A group of them by the name of their case."""
+        """Simulate a group of cases; results by name."""
         simulated = {}
         for case in cases:
             whole = self._whole(case)
@@ -306,7 +306,7 @@ class CaseSimulation:
             )  # fmt: skip
             cut_s = 0.0
             if not whole and case.override != 1.0:
-                # That at 100 % is taken off it: worked out here, where others need not wait for it.
+                # The time at 100 % is subtracted: computed here, where no other task waits for it.
                 cut_s = self._cut_s(case.override) - self._own_cut_s
             simulated[case.name] = run, cut_s
         return simulated
@@ -324,7 +324,7 @@ class CaseSimulation:
         planned: _core.SimulationFigures | None,
         others: Mapping[str, SimulatedCase],
     ) -> tuple[CaseFigures, ...]:
-        """One entry per case, of what the tasks gave."""
+        """Combine the results of the tasks, one entry per case."""
         by_rule = {rule.name: run for rule, run in zip(self.model.block_rules, nominal, strict=True)}
         own = by_rule[self.model.own_rule.name]
         figures = []
@@ -340,7 +340,7 @@ class CaseSimulation:
 
     def _other(self, case: Case, simulated: SimulatedCase, own: _core.SimulationFigures) -> CaseFigures:
         (run, cut_s), whole = simulated, self._whole(case)
-        if case.override == 1.0:  # the set-points are those of the nominal case, only the table is another
+        if case.override == 1.0:  # the set-points are those of the nominal case, only the response differs
             response = Deviation.of([run.response]) if whole else None
             return CaseFigures(run.residual_mm, Deviation.of([own.command]), response, own.duration_s)
         if whole:
@@ -354,7 +354,7 @@ class CaseSimulation:
 
 
 def case_figures(run: _core.SimulationFigures, *, contour: bool = True, response: bool = True) -> CaseFigures:
-    """What a simulation showed."""
+    """Figures of a simulation."""
     if not contour:
         return CaseFigures(run.residual_mm, None, None, run.duration_s)
     followed = Deviation.of([run.response]) if response else None
@@ -362,7 +362,7 @@ def case_figures(run: _core.SimulationFigures, *, contour: bool = True, response
 
 
 def _starved(run: _core.SimulationFigures, waited_s: float) -> CaseFigures:
-    """The worst of all positions of the underrun; behind the region the vibration is mostly that without one."""
+    """Worst figures over all positions of the underrun; the residual is mostly that without one."""
     runs: list[_core.SimulationFigures | _core.StarvedFigures] = [run, *run.starved]
     return CaseFigures(
         np.max([each.residual_mm for each in runs], axis=0),

@@ -1,4 +1,4 @@
-"""The parts of a conversion's result: what was simulated, per case and per region, beside its limits."""
+"""Parts of a conversion's result: figures per case and per region, with their limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from shapegcode.program import Program
 from shapegcode.results.json import OldNames, sparse
 from shapegcode.results.outcome import ContourError, Pair, Tracks, Xyz
 
-_LEAST_BETTER = 0.3  # share by which a figure must fall to count as a benefit
+_LEAST_BETTER = 0.3  # relative reduction of a figure that counts as a benefit
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Placed:
 
 @dataclass(frozen=True)
 class BlockCount:
-    """How many blocks a program has."""
+    """Number of blocks of a program."""
 
     read: int  # of the original, expanded
-    emitted: int  # shaped ones that replace its regions
+    emitted: int  # shaped blocks that replace its regions
 
 
 @dataclass(frozen=True)
@@ -56,23 +56,23 @@ class FollowingShapers:
     """Shapers along an axis, with which modes vary."""
 
     axis: str  # "x", "y" or "z"
-    position_mm: tuple[float, ...]  # where each of them holds exactly (machine coordinates)
-    times_s: tuple[tuple[float, ...], ...]  # taps of each
-    amplitudes: tuple[tuple[float, ...], ...]  # likewise
-    worst_residual: float  # largest share of a vibration that is left anywhere along the axis
+    position_mm: tuple[float, ...]  # position at which each is exact (machine coordinates)
+    times_s: tuple[tuple[float, ...], ...]  # impulse times of each
+    amplitudes: tuple[tuple[float, ...], ...]  # impulse amplitudes of each
+    worst_residual: float  # largest residual ratio along the axis
 
 
 @dataclass(frozen=True)
 class UsedShaper:
-    """The design of a conversion."""
+    """The shaper of a conversion."""
 
-    times_s: tuple[float, ...]  # of the taps
-    amplitudes: tuple[float, ...]  # of the taps
+    times_s: tuple[float, ...]  # of the impulses
+    amplitudes: tuple[float, ...]  # of the impulses
     family: str  # name of its family
-    duration_s: float  # of the longest shaper that acts
-    per_axis: tuple[GridTaps, ...]  # those of X, Y, Z that are used instead (`--per-axis`); else empty
-    per_axis_duration_s: float | None  # how long such ones would be; null: not shorter, or not looked for
-    # those that follow an axis; only where modes vary with its position
+    duration_s: float  # of the longest active shaper
+    per_axis: tuple[GridTaps, ...]  # shapers of X, Y, Z used instead (`--per-axis`); else empty
+    per_axis_duration_s: float | None  # duration with such shapers; null: not shorter, or not computed
+    # shapers that follow an axis; only if modes vary with its position
     following: FollowingShapers | None = field(default=None, metadata=sparse())
 
 
@@ -81,12 +81,12 @@ class AppliedLimits:
     """The tolerances of the machine file that were applied."""
 
     contour_um: float  # largest deviation from the programmed path
-    contour_target: str  # of what: "response" or "command"
-    residual_ratio: float  # of the original's residual vibration
+    contour_target: str  # its target: "response" or "command"
+    residual_ratio: float  # ratio to the original's residual vibration
     residual_floor_um: float  # residual vibration below this passes
     residual_floor_increments: float  # likewise, in least increments
-    feed_excess_ratio: float  # share by which the set-points may run faster than programmed
-    plant: str  # behind which the programs were simulated, "modal" or "feed-drive"
+    feed_excess_ratio: float  # ratio by which the set-points may be faster than programmed
+    plant: str  # plant of the simulation, "modal" or "feed-drive"
     program_time_percent: float  # largest increase of the program's time
     cut_time_percent: float  # largest increase of the time of one cut
 
@@ -96,46 +96,46 @@ class OverrideResidual:
     """Residual vibration of the emitted program at another feed override."""
 
     override: float  # ratio, 0.9 = 90 %
-    residual_um: Xyz[float]  # largest of all regions
+    residual_um: Xyz[float]  # maximum over all regions
 
 
 @dataclass(frozen=True)
 class FrequencyResidual:
-    """Residual vibration of the emitted program where every mode is off."""
+    """Residual vibration of the emitted program with every mode frequency shifted."""
 
-    shift: float  # by how many of their stated uncertainties, -1 or +1
-    residual_um: Xyz[float]  # largest of all regions
+    shift: float  # in units of their uncertainty, -1 or +1
+    residual_um: Xyz[float]  # maximum over all regions
 
 
 @dataclass(frozen=True)
 class CaseVerdict(OldNames):
-    """The emitted program in one case: residual and the figure nearest to its limit."""
+    """Verdict in one case: residual, and the figure closest to its limit."""
 
-    name: str  # in words, unique
-    block_end: str | None  # "ceil" or "carry"; null where look-ahead plans the blocks anew
+    name: str  # shown name, unique
+    block_end: str | None  # "ceil" or "carry"; null if look-ahead replans the blocks
     override: float  # feed override, 1 = 100 %
-    mode: str | None  # that is off: "x.1" as in the machine file, "all", or null
-    shift: float  # by how many of its stated uncertainties, -1 or +1
-    look_ahead: bool  # the controller's look-ahead stays on
-    underrun_ms: float  # how long the block buffer is empty once (buffer underrun); 0: never
-    counts: bool  # it lies in the band that the machine file states
-    residual_um: Xyz[float]  # largest of all regions
-    contour_error_um: Tracks[float | None]  # largest of all regions; null where it was not measured
-    time_s: float | None  # of all cuts; null where those left unchanged were not simulated
+    mode: str | None  # shifted mode: "x.1" as in the machine file, "all", or null
+    shift: float  # in units of its uncertainty, -1 or +1
+    look_ahead: bool  # the controller's look-ahead is left on
+    underrun_ms: float  # duration of one buffer underrun; 0: none
+    counts: bool  # it is within the range of the machine file
+    residual_um: Xyz[float]  # maximum over all regions
+    contour_error_um: Tracks[float | None]  # maximum over all regions; null if not measured
+    time_s: float | None  # of all cuts; null if those left unchanged were not simulated
     within: bool  # every region keeps its limits
-    figure: str  # which figure takes the largest share of its limit
+    figure: str  # the figure that is largest relative to its limit
     value_um: float  # that figure
     limit_um: float  # its limit
-    share_of_limit: float | None  # their ratio; null where nothing is allowed
-    lines: tuple[int, int]  # of the region that has it, first and last
-    # largest deviation towards the workpiece; only where its side is known
+    share_of_limit: float | None  # their ratio; null if the limit is 0
+    lines: tuple[int, int]  # first and last line of the region with this figure
+    # largest deviation towards the workpiece; only if its side is known
     gouge_um: Tracks[float | None] | None = field(default=None, metadata=sparse())
     # largest deviation away from it; likewise
     excess_um: Tracks[float | None] | None = field(default=None, metadata=sparse())
 
 
 def worst_counted(cases: Sequence[CaseVerdict]) -> CaseVerdict | None:
-    """The case that decides: of those that count the one with the largest share of a limit; None without cases."""
+    """The deciding case: of those that count, the one with the largest ratio to a limit; None without cases."""
     counted = [case for case in cases if case.counts]
     shares = [math.inf if case.share_of_limit is None else case.share_of_limit for case in counted]
     return counted[shares.index(max(shares))] if counted else None
@@ -143,16 +143,16 @@ def worst_counted(cases: Sequence[CaseVerdict]) -> CaseVerdict | None:
 
 @dataclass(frozen=True)
 class FeedExcess:
-    """Where the emitted blocks are fastest against the feed that is programmed at the same position of the path.
+    """Largest ratio of the emitted speed to the programmed feed at the same position of the path.
 
-    The speed is that of the set-points along their own path, over one, four or sixteen shortest blocks, less two
-    increments by which rounding may lengthen it; positions are matched by path length, not by time.
+    The speed is that of the set-points along their own path, averaged over one, four or sixteen shortest blocks; two
+    increments are subtracted, by which rounding may lengthen them. Positions are matched by path length, not by time.
     """
 
     ratio: float  # speed over programmed feed; 1: as programmed
-    speed_mm_per_min: float  # of the set-points
-    programmed_mm_per_min: float  # at the same place
-    line: int  # that programs this feed, of the original
+    speed_mm_per_min: float  # speed of the set-points
+    programmed_mm_per_min: float  # feed at the same position
+    line: int  # line of the original that programs this feed
 
     def __str__(self) -> str:
         return (
@@ -163,23 +163,23 @@ class FeedExcess:
 
 @dataclass(frozen=True)
 class RegionVerdict:
-    """One cut as programmed and as emitted, beside its limits."""
+    """One cut as programmed and as emitted, with its limits."""
 
-    lines: tuple[int, int]  # of the original, first and last
-    emitted_lines: tuple[int, int]  # of the emitted program
+    lines: tuple[int, int]  # first and last line of the original
+    emitted_lines: tuple[int, int]  # likewise of the emitted program
     time_s: Pair[float]  # until the set-points rest
-    # maximum of |table - command| while they rest; emitted: worse rule of block timing
+    # maximum of |table - command| while they rest; emitted: with the worse rule of block timing
     residual_vibration_um: Pair[Xyz[float]]
-    residual_limit_um: Xyz[float]  # what the emitted one is judged by
-    contour_error_um: float  # of the emitted program, of what the tolerance is about
+    residual_limit_um: Xyz[float]  # limit of the emitted one
+    contour_error_um: float  # of the emitted program, for the target of the tolerance
     original_contour_error_um: float  # likewise of the original
-    # where shaped blocks run fastest against the programmed feed; null for a cut left unchanged
+    # largest ratio of speed to programmed feed; null for a cut left unchanged
     feed_excess: FeedExcess | None
-    misses: tuple[str, ...]  # every tolerance that it leaves, in words
-    worse: tuple[str, ...] = ()  # those of them in which it is worse than the original
+    misses: tuple[str, ...]  # every missed tolerance, as text
+    worse: tuple[str, ...] = ()  # missed tolerances in which it is worse than the original
 
     def is_benefit(self, contour_limit_um: float, least_gain_um: float) -> bool:
-        """Whether a figure that missed its limit, or vibrates, falls by the least gain and by 30 % or to the limit."""
+        """True if a missed figure or a vibration falls by the least gain, and by 30 % or to its limit."""
         pairs = [(self.original_contour_error_um, self.contour_error_um, contour_limit_um, contour_limit_um)]
         residual = self.residual_vibration_um
         pairs += [
@@ -198,45 +198,45 @@ class RegionVerdict:
 class ProgramFigures:
     """Every cut of a program, as programmed and as emitted, shaped or left unchanged.
 
-    Emitted figures of shaped cuts are the worse of both rules of block timing.
+    Emitted figures of shaped cuts are for the worse rule of block timing.
     """
 
     # maximum of |table - command| from the instant at which the set-points rest
     residual_vibration_um: Pair[Xyz[float]]
     peak_vibration_um: Pair[Xyz[float]]  # maximum of |table - command| before that instant
     contour_error_um: Tracks[Pair[ContourError]]  # distance to the programmed path of command and table
-    # maximum of |table - command| behind a rapid that a cut follows; it is held to no limit
+    # maximum of |table - command| after a rapid before a cut; no limit applies
     rapid_vibration_um: Pair[Xyz[float]]
     orbit_error_percent: tuple[float, ...]  # per arc: area between emitted command and arc over the area of its sector
     override_residual: tuple[OverrideResidual, ...]  # residual vibration of the shaped cuts at 80, 90, 110 and 120 %
-    # with every mode off by its uncertainty; empty where none states one
+    # with every mode shifted by its uncertainty; empty if there is none
     frequency_residual: tuple[FrequencyResidual, ...]
-    slowed_blocks: int  # emitted blocks that step an axis by more than the corner limit of the look-ahead
-    # where the emitted blocks run fastest against the programmed feed; null where nothing was shaped
+    slowed_blocks: int  # emitted blocks whose speed step of an axis exceeds the corner limit of the look-ahead
+    # largest ratio of emitted speed to programmed feed; null if nothing was shaped
     feed_excess: FeedExcess | None
-    # the operating conditions in which the emitted program was simulated; those that do not count are of the shaped
-    # cuts alone
+    # the simulated operating conditions; those that do not count include only the shaped
+    # cuts
     cases: tuple[CaseVerdict, ...]
-    worst_case: CaseVerdict | None  # the one that decides; null without cuts
+    worst_case: CaseVerdict | None  # the deciding one; null without cuts
     regions: tuple[RegionVerdict, ...]  # the shaped cuts, in the order of the program
     unchanged: tuple[RegionVerdict, ...]  # the cuts left unchanged, likewise
 
     @property
     def all_cuts(self) -> list[RegionVerdict]:
-        """Shaped or left unchanged, in the order of the program."""
+        """All cuts, shaped or left unchanged, in program order."""
         return sorted([*self.regions, *self.unchanged], key=lambda cut: cut.lines)
 
     @property
     def within_tolerance(self) -> bool:
-        """Whether every cut, shaped or left unchanged, keeps its limits in every operating condition that counts."""
+        """True if every cut, shaped or left unchanged, keeps its limits in every operating condition that counts."""
         return self.shaped_cuts_within and not any(cut.misses for cut in self.unchanged)
 
     @property
     def shaped_cuts_within(self) -> bool:
-        """Whether the shaped cuts alone do."""
+        """True if the shaped cuts keep their limits."""
         return not any(cut.misses for cut in self.regions)
 
     def region_time_s(self) -> Pair[float]:
-        """All cuts together, until the set-points rest."""
+        """Time of all cuts, until the set-points rest."""
         cuts = self.all_cuts
         return Pair(math.fsum(cut.time_s.original for cut in cuts), math.fsum(cut.time_s.emitted for cut in cuts))

@@ -1,4 +1,4 @@
-"""The verdict on an emitted program: simulate its regions in every condition, compare them with the limits, sum up."""
+"""Verdict of an emitted program: simulate its regions in every condition, compare with the limits, summarise."""
 
 from __future__ import annotations
 
@@ -46,18 +46,18 @@ from shapegcode.verdict.figures import (
 
 _T = TypeVar("_T")
 
-OVERRIDES = (0.8, 0.9, 1.1, 1.2)  # of `override_residual`; the cases have more
-_HASTE = 0.9  # of its time: a region that takes less cuts faster than programmed
-_WORSE, _WORSE_UM = 1.001, 0.05  # than the original's by more than this, ratio and µm: beyond the last digits
+OVERRIDES = (0.8, 0.9, 1.1, 1.2)  # for `override_residual`; there are more cases
+_HASTE = 0.9  # ratio of times below which a region is faster than programmed
+_WORSE, _WORSE_UM = 1.001, 0.05  # ratio and µm: differences from the original beyond the last digits
 Step = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class RegionFigures:
-    """One cut simulated: as programmed, and as emitted in every operating condition of the verdict."""
+    """Simulations of one cut: as programmed, and as emitted in every operating condition of the verdict."""
 
-    original: _core.SimulationFigures  # the programmed path under the controller's own motion
-    # shaped blocks under both rules of block end (ceil, carry); a cut left unchanged once
+    original: _core.SimulationFigures  # the programmed path with the controller's own motion
+    # shaped blocks with both rules of block end (ceil, carry); one entry for a cut left unchanged
     emitted: tuple[_core.SimulationFigures, ...]
     # one entry per operating condition; None: not simulated for a cut left unchanged
     cases: tuple[CaseFigures | None, ...]
@@ -66,7 +66,7 @@ class RegionFigures:
 
     @property
     def feed_excess(self) -> FeedExcess | None:
-        """Where shaped blocks run fastest against the programmed feed, in the worse rule; None: not shaped."""
+        """Largest ratio of speed to programmed feed, with the worse rule; None: not shaped."""
         if not self.is_shaped:
             return None
         worst = max((run.feed_excess for run in self.emitted), key=lambda each: each.ratio)
@@ -74,12 +74,12 @@ class RegionFigures:
 
     @property
     def emitted_s(self) -> float:
-        """Until the set-points rest, the slower of both rules."""
+        """Time until the set-points rest, with the slower rule."""
         return max(run.duration_s for run in self.emitted)
 
     @property
     def gain_um(self) -> float:
-        """What shaping gained: the larger fall of the two figures, the emitted one in the worse rule."""
+        """Gain of shaping: the larger reduction of the two figures, emitted with the worse rule."""
         after = np.max([_figures_um(run) for run in self.emitted], axis=0)
         return max(0.0, float(np.max(np.asarray(_figures_um(self.original)) - after)))
 
@@ -90,7 +90,7 @@ def _figures_um(simulated: _core.SimulationFigures) -> tuple[float, float]:
 
 
 def most_to_gain_um(original: _core.SimulationFigures) -> float:
-    """The most that shaping can gain: what is there."""
+    """Upper bound of the gain of shaping: the figures of the original."""
     return max(_figures_um(original))
 
 
@@ -98,22 +98,22 @@ def most_to_gain_um(original: _core.SimulationFigures) -> float:
 class PendingSimulations:
     """The running simulations of one emitted region."""
 
-    simulation: CaseSimulation  # whose tasks they are
-    nominal: Sequence[Future[_core.SimulationFigures]]  # under both rules of block end
+    simulation: CaseSimulation  # the simulation with these tasks
+    nominal: Sequence[Future[_core.SimulationFigures]]  # with both rules of block end
     planned: Future[_core.SimulationFigures | None]  # with the look-ahead left on
     others: Sequence[Future[dict[str, SimulatedCase]]]  # the other cases, in groups
     slowed: Future[int]  # blocks that the look-ahead limits would slow
 
 
 class Judge:
-    """Simulates emitted regions in every case and holds them against the machine's tolerances."""
+    """Simulates emitted regions in every operating condition and compares them with the tolerances."""
 
     def __init__(self, model: MachineModel, cases: Sequence[Case] | None = None) -> None:
         self._machine, self._model = model.machine, model
-        # In the order of `RegionFigures.cases`; rules of block timing: the controller's own, and in that of `emitted`.
+        # Cases in the order of `RegionFigures.cases`; block rules: the controller's own, and in the order of `emitted`.
         self.cases = stated_cases(model.machine) if cases is None else list(cases)
         self.own_rule, self.rules = model.own_rule, model.block_rules
-        # What the contour tolerance is about.
+        # Target of the contour tolerance.
         self.target: Target = "response" if model.machine.shaping.contour == "response" else "command"
 
     def measure(
@@ -124,7 +124,7 @@ class Judge:
         pool: Executor,
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
-        """Simulate every emitted region beside its original: `begin` and `figures`."""
+        """Simulate every emitted region and its original: `begin` and `figures`."""
         trackers = [_core.ContourTracker(place.region.path) for place in placed]
         return self.figures(self.begin(emitted, placed, trackers, pool), originals, on_step)
 
@@ -133,7 +133,7 @@ class Judge:
     ) -> list[PendingSimulations]:
         """Start the simulation of every emitted region."""
         limits = self._model.limits()
-        if self._model.always_plans:  # what its planner slows is part of every simulation
+        if self._model.always_plans:  # slowing by its planner is part of every simulation
             limits.corner_speed_difference_mm_per_s = limits.max_feed_mm_per_s = [math.inf] * 3
         running = []
         for place, tracker in zip(placed, trackers, strict=True):
@@ -158,9 +158,9 @@ class Judge:
         originals: Sequence[Future[_core.SimulationFigures]],
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
-        """What the simulations show."""
+        """Collect the results of the simulations."""
         results: list[RegionFigures] = []
-        # A program may be one long region: what moves is the number of its simulations.
+        # A program may be one long region: progress is measured in simulations.
         done = count(1)
         total = sum(len(each.nominal) + len(each.others) + 3 for each in running)
 
@@ -177,7 +177,7 @@ class Judge:
         return results
 
     def contour_um(self, figures: RegionFigures, *, turned: bool = True) -> float:
-        """Largest deviation that the tolerance is about, µm, over the cases that count and a lower feed can cure."""
+        """Largest deviation of the target, µm, over the cases that count and that a lower feed can improve."""
         deviations = [
             simulated.command if self.target == "command" else simulated.response
             for case, simulated in zip(self.cases, figures.cases, strict=True)
@@ -192,7 +192,7 @@ class Judge:
     def verdicts(
         self, figures: Sequence[RegionFigures], placed: Sequence[Placed], block_period_s: float
     ) -> tuple[RegionVerdict, ...]:
-        """Every cut beside its limits."""
+        """Verdict of every cut against its limits."""
         pairs = zip(figures, placed, strict=True)
         return tuple(self._verdict(region, place, block_period_s) for region, place in pairs)
 
@@ -249,12 +249,12 @@ class Judge:
         return largest_xyz_um(each.residual_mm for each in simulated if each is not None)
 
     def deciding(self, figures: Sequence[RegionFigures], placed: Sequence[Placed]) -> tuple[int, int] | None:
-        """Lines of the cut that comes nearest to a limit in a condition that counts; None: there is no cut."""
+        """Lines of the cut closest to a limit in a condition that counts; None without cuts."""
         worst = worst_counted(self._case_verdicts(figures, placed))
         return None if worst is None else worst.lines
 
     def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
-        """Limit of a region: its residual compared with that of the original as programmed, in every case."""
+        """Limits of a region, the same in every case; that of the residual is relative to the original's."""
         tolerance, floor_um = self._machine.tolerance, residual_floor_um(place.region, self._machine)
         limit_um = np.maximum(tolerance.residual_ratio * (figures.original.residual_mm * 1e3), floor_um)
         return RegionLimits(limit_um, tolerance.contour_um, self.target)
@@ -304,7 +304,7 @@ class Judge:
 
 
 def residual_floor_um(region: _core.Region, machine: Machine) -> float:
-    """Residual vibration that passes whatever the original has."""
+    """Residual vibration that passes in any case, µm."""
     increment_um = least_increment_mm(machine, region.exit.units) * 1e3
     return max(machine.tolerance.residual_floor_um, machine.tolerance.residual_floor_increments * increment_um)
 
@@ -352,10 +352,10 @@ def _largest(deviations: Iterable[Deviation | None]) -> Deviation | None:
 
 
 def _haste(figures: RegionFigures, place: Placed, block_period_s: float) -> list[str]:
-    """The miss of a region that runs faster than programmed.
+    """The miss of a region that is faster than programmed.
 
-    At feeds so slow that an increment lasts several blocks, F words of its resolution do not meet their ticks. A rapid
-    may take longer than its replacement, and an original longer than its feeds say: neither makes that too fast.
+    At feeds so slow that an increment takes several blocks, F words cannot represent whole periods. A rapid
+    may take longer than its replacement, and an original longer than its feeds require: neither means too fast.
     """
     was_s, now_s = figures.original.duration_s, figures.emitted_s
     if now_s >= _HASTE * was_s or now_s >= _HASTE * place.region.path.programmed_time_s:
@@ -401,11 +401,11 @@ def judge_program(
 def simulate_unchanged(
     judge: Judge, model: MachineModel, mine: _core.Region, region: _core.Region, original: _core.SimulationFigures
 ) -> RegionFigures:
-    """A cut left unchanged in every operating condition that counts for it.
+    """Simulate a cut left unchanged in every operating condition that counts for it.
 
-    Rules of block timing, a buffer underrun and look-ahead left on concern shaped blocks alone: there it is as it is
-    meant to run. Other feed overrides and uncertain modes are simulated where they count. Arcs are those that are
-    emitted.
+    Block timing, buffer underrun and look-ahead left on affect shaped blocks only: there the nominal result is
+    used. Other feed overrides and uncertain modes are simulated where they count. Arcs are the
+    emitted ones.
     """
     path, offset = mine.path, model.offset(region)
     same = path.moves_as(region.path)
@@ -431,7 +431,7 @@ def simulate_unchanged(
 
 
 def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
-    """Vibration that rapids leave where a cut follows: maximum of |table - command| once their set-points rest."""
+    """Residual vibration of rapids before cuts, µm: maximum of |table - command| once their set-points rest."""
     found: dict[tuple[float, ...], FloatArray] = {}
     for start_mm, end_mm in _rapids_before_cuts(program):
         key = tuple(np.round(end_mm - start_mm, 9))
@@ -447,7 +447,7 @@ def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
 
 
 def _rapids_before_cuts(program: Program) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Start and end of every rapid that nothing but functions and dwells lies between it and a cut."""
+    """Start and end of every rapid with only functions and dwells between it and the next cut."""
     moves = program.core.other_moves
     last: _core.Segment | None = None
     regions = program.regions
@@ -477,7 +477,5 @@ def unshaped_regions(
 
     found = [region for region in emitted.regions if not is_shaped(region)]
     if len(found) != len(expected):
-        raise RoundTripError(
-            f"the emitted program has {len(found)} cuts beside the shaped ones, expected {len(expected)}"
-        )
+        raise RoundTripError(f"the emitted program has {len(found)} unshaped cuts, expected {len(expected)}")
     return found

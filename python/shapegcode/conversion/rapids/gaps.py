@@ -1,4 +1,4 @@
-"""Rapids between two cuts: which can become a shaped cutting move, why the others cannot, and what time they take."""
+"""Rapids between two cuts: candidates for shaped cutting moves, reasons against the others, and times."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NO_CUT = "no cut follows"
 OFF_GRID = "its end lies between two increments, and the program changes between G20 and G21"
 BLOCK_SKIP = "the modal state depends on the block-skip switch"
 
-# Nothing behind these needs a table at rest: the operator or the tool changer comes first.
+# After these no settled table is needed: the operator or the tool changer comes first.
 _ENDING_CODES = {0, 1, 2, 6, 30}
 _BLOCK = re.compile(r"(?:[A-Z][+-]?[0-9]*\.?[0-9]*)+")
 _WORD = re.compile(r"([A-Z])([+-]?[0-9]*\.?[0-9]*)")
@@ -46,14 +46,14 @@ _UNCHANGED = (
 
 @dataclass(frozen=True, eq=False)
 class Rapid:
-    """One rapid of a text."""
+    """One rapid of a program."""
 
-    line: int  # in the text, from 1
+    line: int  # line in the program, from 1
     start_mm: FloatArray  # where it starts, (3,), as far as it is known
     end_mm: FloatArray  # where it ends, (3,)
-    region: _core.Region | None  # the move as something that can be written; None: it must stay
-    reason: str  # why it must stay
-    head: str  # its N word and its comments, empty if it has none
+    region: _core.Region | None  # the move as a region that can be written; None: left unchanged
+    reason: str  # why it is left unchanged
+    head: str  # its N word and comments; may be empty
 
     @property
     def travel_mm(self) -> FloatArray:
@@ -63,9 +63,9 @@ class Rapid:
 
 @dataclass(frozen=True)
 class Gap:
-    """What happens between two cuts, in order."""
+    """The steps between two cuts, in order."""
 
-    steps: tuple[Rapid | float, ...]  # rapids, and the seconds that anything else lasts
+    steps: tuple[Rapid | float, ...]  # rapids, and durations of other steps, s
     cut_follows: bool  # a cut follows, so the vibration must have settled at its end
 
     @property
@@ -75,7 +75,7 @@ class Gap:
 
 
 def find_gaps(program: Program, machine: Machine) -> list[Gap]:
-    """Rapids of an emitted text, gathered between its cuts."""
+    """Collect the rapids of an emitted program between its cuts."""
     core = program.core
     moves = core.other_moves
     functions = core.functions
@@ -129,7 +129,7 @@ class _Reader:
             for kind, index, line in core.steps
             if kind == MOVE and moves[index][1] <= 0.0 and moves[index][0].kind == _core.SegmentKind.rapid
         }
-        # The reader gives no move where it does not know the path.
+        # The reader returns no move if the path is unknown.
         taken = {line for kind, _, line in core.steps if kind == MOVE}
         for region in core.regions:
             taken.update(range(region.first_line, region.last_line + 1))
@@ -160,7 +160,7 @@ class _Reader:
         return Rapid(line, start_mm, end_mm, region, "", number + "".join(_COMMENT.findall(source)))
 
     def _unmeasured(self, line: int) -> Rapid | None:
-        """A rapid whose travel is not known: it counts, but takes no time."""
+        """A rapid of unknown travel: it is counted with zero time."""
         after = self._states[line]
         if after.motion != 0 or after.cycle != 80 or self._start_known(line):
             return None
@@ -192,7 +192,7 @@ class _Reader:
         return ""
 
     def _feed_mm_per_s(self, travel_mm: FloatArray, units: int) -> float:
-        """Largest cutting feed along a travel, a whole F word: of each axis for itself, of the fastest tangentially."""
+        """Largest cutting feed along a travel as a whole F word: limited by each axis and by the fastest one."""
         share = np.abs(travel_mm) / np.linalg.norm(travel_mm)
         moved = share > 0.0
         along = float((self._largest_mm_per_s[moved] / share[moved]).min())
@@ -201,7 +201,7 @@ class _Reader:
 
 
 def _words(source: str) -> list[tuple[str, str]] | None:
-    """Words of a block that holds nothing but a number, axis words and codes that a rapid may carry; else None."""
+    """Words of a block that has only a number, axis words and codes permitted for a rapid; else None."""
     block = _COMMENT.sub("", source).upper()
     block = "".join(block.split())
     if not _BLOCK.fullmatch(block):
@@ -214,7 +214,7 @@ def _words(source: str) -> list[tuple[str, str]] | None:
 
 
 def _may_be_rapid(text: bytes) -> bool:
-    """Whether a block has axis words and no code that gives them another meaning than travel."""
+    """True if a block has axis words and no code that changes their meaning."""
     block = _COMMENT.sub("", text.decode("latin-1")).upper()
     if not any(letter in block for letter in "XYZ"):
         return False
@@ -227,7 +227,7 @@ NO_GAIN = "no time gained"
 
 @dataclass
 class Choice:
-    """A rapid that may be replaced, and what is known of it."""
+    """A rapid that may be replaced, with its data."""
 
     rapid: Rapid
     region: _core.Region
@@ -241,12 +241,12 @@ class Choice:
 
     @property
     def extra_bytes(self) -> int:
-        """What the replacement adds to the text."""
+        """Bytes added by the replacement."""
         return len(self.text) - (self.region.text_end - self.region.text_begin)
 
 
 class OpenGap:
-    """A gap in which rapids may be replaced, and what that does to the time until the next cut can begin."""
+    """A gap in which rapids may be replaced, with the effect on the time until the next cut can start."""
 
     def __init__(self, gap: Gap, plant: RapidPlant, pool: Executor, least_gain_s: float) -> None:
         self._plant = plant
@@ -281,24 +281,24 @@ class OpenGap:
         return self._plant.ready_s(steps, self._region)
 
     def saved_s(self) -> float:
-        """What the replacements that are left save, s."""
+        """Time that the remaining replacements save, s."""
         flags = [bool(choice.text) for choice in self.choices]
         return self._before_s - self._ready_s(flags) if any(flags) else 0.0
 
     def extra_bytes(self) -> int:
-        """What they add to the text."""
+        """Bytes that the remaining replacements add."""
         return sum(choice.extra_bytes for choice in self.choices if choice.text)
 
     def drop(self, reason: str, kept: Counter[str], condition: Callable[[Choice], bool]) -> None:
-        """Keep the rapids that meet a condition."""
+        """Leave the rapids unchanged that meet a condition."""
         for choice in self.choices:
             if condition(choice) and choice.text:
                 choice.text = b""
                 kept[reason] += 1
 
     def drop_useless(self, kept: Counter[str]) -> None:
-        """Keep every rapid without whose replacement the next cut begins as soon; the earlier ones first."""
-        # All together first: of two rapids that ring equally long, replacing one alone gains nothing.
+        """Leave every rapid unchanged whose replacement does not start the next cut sooner; earlier ones first."""
+        # All together first: of two rapids with equal settling times, replacing one alone gains nothing.
         flags = [bool(choice.text) for choice in self.choices]
         ready_s = self._ready_s(flags)
         for k in range(len(flags)):
@@ -315,27 +315,27 @@ class OpenGap:
         self.drop(NO_GAIN, kept, lambda _choice: not next(chosen))
 
 
-_LONGEST_WAIT_S = 30.0  # a vibration that takes longer counts as settled then: nobody waits so long
-_LAG_MEMORY = 20.0  # time constants of the servo loop beyond which the past does not count
+_LONGEST_WAIT_S = 30.0  # a longer vibration counts as settled then
+_LAG_MEMORY = 20.0  # time constants of the servo loop after which earlier motion is ignored
 
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """One step between two cuts, in time."""
+    """Times of one step between two cuts."""
 
     motion_s: float  # until the set-points rest, s
-    arrival_s: float  # wait for in-position behind them, s
+    arrival_s: float  # wait for in-position after them, s
     settling_s: float  # from the end of the set-points until the table stays within the band, s
     command_mm: FloatArray  # set-points, one per period, (n, 3); a pause has one
 
     @property
     def clock_s(self) -> float:
-        """What the control takes: motion and wait for in-position."""
+        """Time of the control: motion and wait for in-position."""
         return self.motion_s + self.arrival_s
 
     @property
     def settled_s(self) -> float:
-        """Time until the axes have arrived and the vibration has settled."""
+        """Time until the axes are in position and the vibration has settled."""
         return self.motion_s + max(self.arrival_s, self.settling_s)
 
 
@@ -363,7 +363,7 @@ def settling_time_s(
 
 
 class RapidPlant:
-    """Rapids as the controller and the modes of a machine make them."""
+    """Simulates rapids with the controller and the modes of a machine."""
 
     def __init__(self, model: MachineModel) -> None:
         machine = model.machine
@@ -371,11 +371,11 @@ class RapidPlant:
         self.model = model.ordinary.model
         self.band_mm = machine.tolerance.residual_floor_um * 1e-3
         self._moving = any(mode.frequency_over is not None for axis in machine.axes.as_tuple() for mode in axis.modes)
-        self.longest_memory_s = model.vibration_memory_s or math.inf  # what moved longer ago no longer counts, s
+        self.longest_memory_s = model.vibration_memory_s or math.inf  # earlier motion is ignored, s
         self._known: dict[tuple[float, ...], Timing] = {}
 
     def rapid(self, rapid: Rapid) -> Timing:
-        """A rapid as the original makes it. Where its region is not known, its modes are the nominal ones."""
+        """Simulate a rapid of the original; if its region is unknown, with the nominal modes."""
         travel = rapid.travel_mm
         key = tuple(np.round(travel, 9))
         if not self._moving and key in self._known:
@@ -390,7 +390,7 @@ class RapidPlant:
         return self._machine_model.simulate_rapid(rapid.start_mm, rapid.end_mm, self._options(rapid.region))
 
     def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:
-        """The replacement as the text has it: the slower of both rules of block end; `stops_s`: dwells before it."""
+        """Simulate a replacement with the slower rule of block timing; `stops_s`: dwells before it."""
         period = self.model.period_s
         offset = self._machine_model.offset(region)
         runs = []
@@ -409,11 +409,11 @@ class RapidPlant:
         return max(runs, key=lambda run: run.settled_s)
 
     def pause(self, seconds: float) -> Timing:
-        """What moves no axis: a dwell, an M function."""
+        """A step without motion: a dwell, an M function."""
         return Timing(seconds, 0.0, 0.0, np.zeros((1, 3)))
 
     def ready_s(self, steps: Sequence[Timing], region: _core.Region) -> float:
-        """Time of steps one after the other until the table has settled behind all of them together, s."""
+        """Time of consecutive steps until the table has settled after all of them, s."""
         period = self.model.period_s
         clock_s = math.fsum(step.clock_s for step in steps)
         parts: list[FloatArray] = []
@@ -424,7 +424,7 @@ class RapidPlant:
                 break
             wait = round(step.clock_s / period) + 1 - len(step.command_mm)
             samples = np.concatenate([step.command_mm, np.repeat(step.command_mm[-1:], wait, axis=0)])
-            samples = samples + (end - samples[-1])  # where positions are not known, pieces do not join by themselves
+            samples = samples + (end - samples[-1])  # join pieces whose positions are unknown
             parts.append(samples[:-1] if parts else samples)
             end = samples[0]
             after_s += step.clock_s

@@ -1,6 +1,6 @@
-"""Shaped rapids: G00 moves written as shaped G01 blocks where the table is ready for the next cut sooner.
+"""Shaped rapids: G00 moves written as shaped G01 blocks where the table then settles sooner for the next cut.
 
-Compared is the time until the table has settled: behind a G00 the control waits for in-position, but the modes ring on.
+The time until the table has settled is compared: after a G00 the control waits for in-position only.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ NOTHING_SHAPED = "no cut of the program is shaped"
 OUT_OF_TOLERANCE = "misses its tolerance as shaped blocks"
 BUDGET = "budget"
 
-_STOP, _STOP_S = "G04P1", 0.001  # what comes before has stopped, as it has before a G00
+_STOP, _STOP_S = "G04P1", 0.001  # the motion before has stopped, as before a G00
 
 
 @dataclass(frozen=True)
 class ShapedRapids:
-    """A text with shaped rapids."""
+    """A program with shaped rapids."""
 
     emitted: Program  # the whole program, read back
-    placed: list[Placed]  # the cutting regions and their places in it
-    outcome: RapidsOutcome  # what became of the rapids
-    warnings: list[str]  # what is different where they became cutting moves
-    extra_s: float  # what the replacements add to the cycle time (settling not counted), s
+    placed: list[Placed]  # the cutting regions and their positions in it
+    outcome: RapidsOutcome  # outcome of the rapids
+    warnings: list[str]  # consequences of the replacement by cutting moves
+    extra_s: float  # cycle time added by the replacements (without settling), s
 
 
 def shape_rapids(
@@ -55,10 +55,10 @@ def shape_rapids(
     pool: Executor,
     budget: Budget | None = None,
 ) -> ShapedRapids:
-    """Replace the rapids of an emitted text where that brings the next cut closer."""
+    """Replace rapids of an emitted program where the next cut can then start sooner."""
     if model.machine.tolerance.residual_floor_um <= 0.0:
         raise _core.ArgumentError(
-            "tolerance.residual_floor_um is 0: shaped rapids need the band in which vibration counts as having decayed"
+            "tolerance.residual_floor_um is 0: shaped rapids need the band in which vibration counts as decayed"
         )
     # One shaper for all axes keeps a straight move straight.
     return _RapidShaper(emitted, placed, _without_contour(model), replace(grid, axis_firs=()), pool).shaped(budget)
@@ -125,7 +125,7 @@ class _RapidShaper:
     def _write(self, choice: Choice) -> EmittedRegion:
         region = choice.region
         limits = self.model.limits()
-        # Ends of blocks are rounded, and F is rounded up: at the clamp itself a block would last a tick too long.
+        # Block ends are rounded, and F is rounded up: at the clamp itself a block would take one period too long.
         increment_mm = written_increment_mm(self.machine, region.exit.units)
         margin_mm_per_s = 2.0 * increment_mm / self.grid.block_period_s
         limits.max_feed_mm_per_s = np.maximum(limits.max_feed_mm_per_s - margin_mm_per_s, margin_mm_per_s)
@@ -156,9 +156,9 @@ class _RapidShaper:
 
 
 def _without_contour(model: MachineModel) -> MachineModel:
-    """The same machine for moves in the air: their contour is neither corrected nor judged."""
+    """The machine for moves in the air, without contour correction and limit."""
     machine = model.machine
-    # A straight move has no corner to round: the look-ahead's ramps serve.
+    # A straight move has no corners: the ramps of the look-ahead suffice.
     shaping = machine.shaping.model_copy(update={"contour": "off", "planner": "look-ahead"})
     tolerance = machine.tolerance.model_copy(update={"contour_um": math.inf, "feed_excess_ratio": math.inf})
     return MachineModel(machine.model_copy(update={"shaping": shaping, "tolerance": tolerance}))
@@ -198,28 +198,28 @@ def _warnings(outcome: RapidsOutcome, machine: Machine) -> list[str]:
         f"{letter} {axis.max_feed_mm_per_min:g}" for letter, axis in zip("XYZ", machine.axes.as_tuple(), strict=True)
     )
     warnings = [
-        f"{outcome.shaped} of {outcome.found} rapids are shaped cutting moves (the table is ready "
-        f"{outcome.time_saved_s:.2f} s sooner in all): rapid override no longer acts on them, feed override does",
+        f"{outcome.shaped} of {outcome.found} rapids are shaped cutting moves (the next cuts can start "
+        f"{outcome.time_saved_s:.2f} s sooner in total): rapid override has no effect on them, feed override has",
         "shaped rapids run at the cutting feeds of the axes (axes.*.max_feed_mm_per_min: "
         f"{fastest} mm/min): the control's clamp of cutting feeds (parameters 1422, 1430) must not lie below",
     ]
     if machine.controller.rapid_path == "non_linear":
         warnings.append(
-            "shaped rapids are straight lines; the rapids that they replace were not (controller.rapid_path = "
+            "shaped rapids are straight lines; the replaced rapids were not (controller.rapid_path = "
             '"non_linear"): check that the straight path is free'
         )
     if outcome.slowed_blocks and not machine.emission.leaves_look_ahead:
         warnings.append(
             f"{outcome.slowed_blocks} blocks of shaped rapids step an axis by more than "
             "controller.corner_speed_difference_mm_per_min: run them with the look-ahead mode off "
-            '(emission.prologue, for example ["G05.1Q0"]), or it slows them'
+            '(emission.prologue, for example ["G05.1Q0"]), or it slows them down'
         )
     return warnings
 
 
 @dataclass(frozen=True)
 class Spliced:
-    """A text with replacements, and the places of regions and replacements in it."""
+    """A program with replacements, and the positions of regions and replacements in it."""
 
     text: bytes
     placed: list[Placed]
@@ -227,14 +227,14 @@ class Spliced:
 
     @property
     def everything(self) -> list[Placed]:
-        """Both, in the order of the text."""
+        """Regions and replacements, in program order."""
         return sorted([*self.placed, *self.moves], key=lambda place: place.first_line)
 
 
 def splice(text: bytes, placed: Sequence[Placed], choices: Sequence[Choice]) -> Spliced:
-    """A text with replacements in the places of rapids."""
+    """Insert the replacements of rapids into a program."""
     parts, at = [], 0
-    shifts = []  # (line behind which it holds, lines that were added)
+    shifts = []  # (line after which it applies, lines added)
     added = 0
     moves = []
     for choice in choices:
@@ -256,7 +256,7 @@ def splice(text: bytes, placed: Sequence[Placed], choices: Sequence[Choice]) -> 
 
 
 def original_line(line: int, placed: Sequence[Placed]) -> int:
-    """Line of the original from which a kept line of the emitted text comes."""
+    """Line of the original for an unchanged line of the emitted program."""
     index = bisect([place.first_line for place in placed], line)
     if index:
         before = placed[index - 1]

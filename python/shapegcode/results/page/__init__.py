@@ -1,1 +1,1 @@
-"""A result as one self-contained page: what stands on it (`model`, `scene`), and how it becomes HTML (`html`)."""
+"""A result as one self-contained page: content (`model`, `scene`) and conversion to HTML (`html`)."""

@@ -29,7 +29,7 @@ _PRINTED_PICTURES = 2  # so that the page stays within four sheets
 
 
 def title_of(result: Outcome) -> str:
-    """What the result is, in words, and of which program."""
+    """Title of a page: kind of result, program and machine."""
     words = " ".join(word.lower() for word in _WORD.findall(type(result).__name__))
     name = getattr(result, "program", None)
     machine = getattr(result, "machine", None)
@@ -56,7 +56,7 @@ def warnings_of(result: Outcome) -> Iterator[model.Section]:
 
 
 def next_steps(result: Outcome, *further: model.NextStep) -> model.Section:
-    """What to do next."""
+    """The section of the next steps."""
     text = result.next_step
     is_command = text.startswith("shapegcode ")
     sentence = text if is_command else text[:1].upper() + text[1:]
@@ -66,14 +66,14 @@ def next_steps(result: Outcome, *further: model.NextStep) -> model.Section:
 
 
 def _is_typed(text: str) -> bool:
-    """Whether all of it can be typed: behind the command stand options with their values, and files."""
+    """True if the text is a complete command line: command, options with their values, and files."""
     program, _, *words = text.split(" ") if " " in text else (text, "")
     is_typed = all(before.startswith("-") or _NO_WORD.search(word) for before, word in pairwise(("", *words)))
     return program == "shapegcode" and bool(words) and is_typed
 
 
 def _tables(tables: Sequence[Table]) -> Iterator[model.Section]:
-    """Short tables together, each long one by itself and folded."""
+    """Sections of tables: short ones together, each long one separate and folded."""
     short: tuple[model.Part, ...] = tuple(table for table in tables if len(table.rows) <= _UNFOLDED_ROWS)
     if short:
         yield model.Section("figures", "Figures", short)
@@ -85,13 +85,13 @@ def _tables(tables: Sequence[Table]) -> Iterator[model.Section]:
 
 @cache
 def _captions() -> dict[str, str]:
-    """How to read each picture, by the names that `plots()` has."""
+    """Explanations of the pictures, by the names in `plots()`."""
     text = (resources.files("shapegcode") / "data" / "page" / "captions.txt").read_text(encoding="utf-8")
     return dict(line.split(": ", 1) for line in text.splitlines())
 
 
 def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[model.Section]:
-    """The pictures, each with a line that says how to read it."""
+    """The pictures, each with an explanation."""
     how = _captions()
     pictures = [model.Picture(name, plot, how.get(name, _UNKNOWN)) for name, plot in result.plots().items()]
     chosen = [each for each in pictures if each.name in printed] or pictures[:_PRINTED_PICTURES]
@@ -100,8 +100,8 @@ def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[model.
     if others := tuple(each for each in pictures if each not in chosen):
         yield model.Section("more-pictures", "More pictures", others, printed=False)
     if result.from_json:
-        left_out = "Pictures that need the samples of the run are not here: the JSON does not hold them."
-        yield model.Section("no-pictures", "Pictures that are not here", (model.Text((left_out,)),), printed=False)
+        left_out = "Pictures that need the samples of the run are missing: the JSON does not contain them."
+        yield model.Section("no-pictures", "Missing pictures", (model.Text((left_out,)),), printed=False)
 
 
 def provenance_section(provenance: Provenance) -> model.Section:
@@ -109,7 +109,7 @@ def provenance_section(provenance: Provenance) -> model.Section:
     rows = [("by", provenance.by), *([("command", provenance.command)] if provenance.command else [])]
     for file in provenance.files:
         rows.append((file.role, f"{file.name}, {file.size_bytes} bytes, SHA-256 {file.sha256 or 'not known'}"))
-    how = "The hash of a file changes with every byte of it: compare it before you rely on this page."
+    how = "Any changed byte changes the hash of a file: compare it before you rely on this page."
     return model.Section(
         "provenance", "Command, version and files", (model.Notes(tuple(rows)),), how=how, folded=True, printed=False
     )
@@ -139,7 +139,7 @@ def page_of(
 
 
 def _named(scene: Scene | None, provenance: Provenance) -> Scene | None:
-    """With the name of the file that was written; while it was made it had none."""
+    """Add the name of the output file to the scene, which was unknown when it was made."""
     output = provenance.file("output")
     if scene is None or output is None or len(scene.variants) < 2:
         return scene
@@ -148,14 +148,14 @@ def _named(scene: Scene | None, provenance: Provenance) -> Scene | None:
 
 
 def raw_page(report: Mapping[str, Any], why: str) -> model.Page:
-    """The page of a result that cannot be read back: its JSON as it stands."""
+    """The page of a result that cannot be read back: its unchanged JSON."""
     provenance = report.get("provenance", report.get("made"))
     by = provenance.get("by", "another version") if isinstance(provenance, dict) else "another version"
     return model.Page(
-        title="A result as its JSON has it",
+        title="JSON of a result",
         light="amber",
         verdict=f"This result was written by {by}, and {this_version()} cannot read it back from its JSON.",
-        reason="it is shown as it stands; run the command again for a page",
+        reason="it is shown unchanged; run the command again for a page",
         sections=(_json(report),),
         report=report,
         problems=(why,),
@@ -163,7 +163,7 @@ def raw_page(report: Mapping[str, Any], why: str) -> model.Page:
 
 
 def _json(report: Mapping[str, Any]) -> model.Section:
-    """The JSON itself, if no page can be made of it."""
+    """The JSON itself, if no page can be made from it."""
     texts = {key: json.dumps(value, ensure_ascii=False) for key, value in report.items()}
     rows = [(key, text if len(text) <= _SHORT_TEXT else f"{text[: _SHORT_TEXT - 1]}…") for key, text in texts.items()]
     columns = (Column("key", value=lambda row: row[0], left=True), Column("value", value=lambda row: row[1], text=True))

@@ -1,6 +1,6 @@
-"""A page as one HTML file that needs no server and no network.
+"""A page as one HTML file, readable offline.
 
-It forbids itself every connection (Content-Security-Policy), and runs no script but those whose hash it names.
+Its Content-Security-Policy forbids every connection and allows only scripts with the listed hashes.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ SCRIPTS = tuple(
     for name in ("page", "cuts", "decode", "view", "pixels", "axes", "stage", "programs", "charts", "scene")
 )
 STYLES = ("page.css", "scene.css", "print.css")
-"""Files of `shapegcode/data/page`, in the order in which they are put together."""
+"""Files of `shapegcode/data/page`, in the order in which they are joined."""
 
 
 _IDS = ("top", "theme", "print", "save-json", "result", "scene-head", "scene-data", "plotly-data")
 
 
 def to_html(page: Page, script: Script = "inline") -> str:
-    """The file of a page."""
+    """Convert a page to the text of its file."""
     if script not in ("inline", "beside"):
         raise ArgumentError(f'script must be "inline" or "beside", not {script!r}')
     own = _assets(SCRIPTS)
@@ -80,7 +80,7 @@ def _problems(page: Page) -> str:
 
 
 def save(page: Page, path: str | Path, script: Script = "inline") -> list[str]:
-    """Write the file of a page; it is either complete or as it was before."""
+    """Write the file of a page; on failure the former file is kept."""
     text = to_html(page, script)
     wrote = []
     if script == "beside" and page.scene is not None:
@@ -94,25 +94,25 @@ def save(page: Page, path: str | Path, script: Script = "inline") -> list[str]:
 
 
 def plotly_name() -> str:
-    """Name of the file that holds Plotly's script for the pages beside it."""
+    """Name of the file with Plotly's script, shared by the pages of its folder."""
     return f"plotly-{metadata.version('plotly')}.min.js"
 
 
 def is_shared(name: str) -> bool:
-    """Whether a file is such a script, of any version of Plotly."""
+    """True if a file is such a script, of any version of Plotly."""
     return re.fullmatch(r"plotly-[\w.]+\.min\.js", name.rpartition("/")[2]) is not None
 
 
 @cache
 def _plotly_source() -> str:
-    """Read as a file: importing Plotly's package takes longer."""
+    """Read Plotly's script as a file, which is faster than importing the package."""
     package = metadata.distribution("plotly").locate_file("plotly/package_data/plotly.min.js")
     return Path(str(package)).read_text(encoding="utf-8")
 
 
 @cache
 def _plotly() -> tuple[str, str]:
-    """Its hash, and the script compressed, in base64: a third of its size, and read only when curves are looked at."""
+    """Hash of the script, and the script compressed in base64: a third of its size, unpacked only for curves."""
     source = _plotly_source()
     return _hash(source), base64.b64encode(gzip.compress(source.encode(), 9, mtime=0)).decode()
 

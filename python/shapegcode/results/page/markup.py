@@ -1,4 +1,4 @@
-"""The parts of a page as HTML that is read without a script. Every text is escaped where it enters."""
+"""The parts of a page as HTML that is readable without scripts. Every text is escaped here."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from shapegcode.results.table import NO_BREAK, Column, Table
 LIGHT_WORDS: dict[model.Light, str] = {
     "green": "Go ahead", "calm": "Nothing to do", "amber": "Check first", "red": "Do not use"
 }  # fmt: skip
-"""What a traffic light says, for those who cannot see its colour."""
+"""Word for each traffic light, for readers who cannot see its colour."""
 
 _SIGNS: dict[model.Light, str] = {
-    # Each colour has a shape of its own: disc, square, triangle, octagon.
+    # Each colour has its own shape: disc, square, triangle, octagon.
     "green": '<circle cx="16" cy="16" r="14"/><path class="mark" d="M9 16.5l5 5 9-11"/>',
     "calm": '<rect x="3" y="3" width="26" height="26" rx="5"/><path class="mark" d="M10 12.5h12m-12 7h12"/>',
     "amber": '<path d="M16 2.5 30.5 29h-29z"/><path class="mark" d="M16 12v8m0 3.2v2.2"/>',
@@ -35,19 +35,19 @@ _CODE = re.compile(r"`([^`\n]+)`")
 
 
 def light_sign(light: model.Light) -> str:
-    """A traffic light: its colour, its shape and its word."""
+    """A traffic light: colour, shape and word."""
     sign = f'<svg viewBox="0 0 32 32" aria-hidden="true" class="sign">{_SIGNS[light]}</svg>'
     return f'<p class="light {light}">{sign}<strong>{LIGHT_WORDS[light]}</strong></p>'
 
 
 def prose(text: str) -> str:
-    """A sentence; what stands between backticks is code."""
+    """A sentence; text between backticks is code."""
     return _CODE.sub(r"<code>\1</code>", escape(text))
 
 
 def number(value: float, digits: int, *, key: str = "", factor: float = 1.0) -> str:
-    """A number, and where the JSON has it."""
-    # As the JSON rounds it, so that both agree in the last digit.
+    """A number, with its position in the JSON."""
+    # Rounded as in the JSON, so that both agree in the last digit.
     value = float(f"{value / factor:.9g}") * factor
     place = f' data-json="{escape(key)}" data-factor="{factor!r}" data-digits="{digits}"' if key else ""
     return f'<span class="number" data-value="{value!r}"{place}>{value:z.{digits}f}</span>'
@@ -220,12 +220,12 @@ def _linked(text: str, column: Column, row: object) -> str:
 
 
 def _scrolled(table: str) -> str:
-    """Wide tables scroll by themselves, also by keys."""
+    """Make a table scrollable if it is too wide, also by keys."""
     return f'<div class="scrolled" tabindex="0" role="group" aria-label="Table">{table}</div>'
 
 
 def _number_of(row: model.CutRow, name: str) -> float | None:
-    """What a column of numbers is sorted by, and summed."""
+    """Number of a row by which a column is sorted and summed."""
     if name == "first":
         return row.lines[0]
     if name == "bytes_added":
@@ -248,7 +248,7 @@ _CUT_COLUMNS: Mapping[str, Column] = {
     "bytes_added": Column("bytes added", value=partial(_number_of, name="bytes_added")),
     "outcome": Column("shaped, or why not", value="outcome", text=True),
 }
-"""Columns of the cuts, by what they are sorted by."""
+"""Columns of the cuts, by sort key."""
 
 _CUT_SUMS = (
     ("count", "cuts to shape"),
@@ -260,7 +260,7 @@ _CUT_SUMS = (
 
 
 def _cut_picker(picker: model.CutPicker, key: str) -> str:
-    """The table, which is read without a script; sums, boxes to tick and the command, which a script fills."""
+    """The table, readable without a script; totals, check boxes and the command are filled by a script."""
     columns = tuple(_CUT_COLUMNS.values())
     table = Table("", columns, picker.rows, row_style=lambda row: "shaped" if row.is_shaped else "")
     shown = table.shown()
@@ -285,7 +285,7 @@ def _cut_picker(picker: model.CutPicker, key: str) -> str:
         f'<button type="button" data-tick="{name}">{text}</button> '
         for name, text in (("all", "Tick all"), ("none", "Tick none"), ("first", "Reset"))
     )
-    # On paper are the shaped ones.
+    # On paper only the shaped ones are listed.
     kind = "cut-picker" if any(row.is_shaped for row in picker.rows) else "cut-picker unprinted"
     return (
         f'<div class="{kind}" data-of="{escape(key)}-cuts"><div class="needs-script on-screen">'
@@ -297,7 +297,7 @@ def _cut_picker(picker: model.CutPicker, key: str) -> str:
 
 
 def json_script(key: str, value: Any) -> str:
-    """JSON inside of HTML: what could end the element or start another one is written by its number."""
+    """JSON in HTML, with `<`, `>` and `&` escaped as code points."""
     encoder = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     if isinstance(value, Mapping) and any(isinstance(each, Streamed) for each in value.values()):
         stream = io.StringIO()

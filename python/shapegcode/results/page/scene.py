@@ -1,6 +1,6 @@
-"""Motion to look at on a page: programs in time, thinned for display (Douglas and Peucker 1973), packed.
+"""Motion of a page: programs over time, decimated for display (Douglas and Peucker 1973), packed.
 
-Extremes are kept; every curve is within a stated fraction of a pixel. Figures are never taken from here.
+Extremes are kept; every curve is within a given fraction of a pixel. Figures are never computed from these data.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from shapegcode.io.units import FloatArray
 class Channel:
     """A value along the path."""
 
-    label: str  # what it is
+    label: str  # its name
     unit: str
-    how: str  # one line: how to read a picture of it
+    how: str  # explanation in one line
 
 
 CHANNELS: Mapping[str, Channel] = {
@@ -33,31 +33,31 @@ CHANNELS: Mapping[str, Channel] = {
         "µm",
         "Distance of the table from the programmed path; the contour error also counts how far a corner is cut.",
     ),
-    "vibration": Channel("vibration", "µm", "Distance of the table from where the control wants it at that instant."),
+    "vibration": Channel("vibration", "µm", "Distance of the table from the commanded position at that instant."),
     "speed": Channel("speed", "mm/min", "Speed of the command; corners and short blocks are slow."),
-    "acceleration": Channel("acceleration", "m/s²", "Acceleration of the command: what excites the vibration modes."),
+    "acceleration": Channel("acceleration", "m/s²", "Acceleration of the command, which excites the vibration modes."),
     "block_s": Channel("time per block", "s", "Duration of the block at the tool: slow blocks are bright."),
-    "force": Channel("force", "N", "Cutting force, or force of the motors where the plant has drives."),
+    "force": Channel("force", "N", "Cutting force, or force of the motors if the plant has drives."),
 }
-"""Values along the path that a scene may hold, by name."""
+"""Possible values along the path of a scene, by name."""
 
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """A program in time."""
+    """A program over time."""
 
     key: str  # "original" or "emitted", or another name of small letters
-    label: str  # for people
+    label: str  # shown name
     file: str  # name of the program
-    text: str  # of the program
-    sample: npt.NDArray[np.int64]  # which interpolation periods are kept, (n,), rising
-    line: npt.NDArray[np.int64]  # of the text, of the block that is interpolated, (n,), from 1
-    block: npt.NDArray[np.int64]  # rank of that block among the motion blocks, (n,), from 0
+    text: str  # program text
+    sample: npt.NDArray[np.int64]  # indices of the kept interpolation periods, (n,), ascending
+    line: npt.NDArray[np.int64]  # program line of the block being interpolated, (n,), from 1
+    block: npt.NDArray[np.int64]  # index of that block among the motion blocks, (n,), from 0
     command_mm: FloatArray  # set-points, (n, 3)
-    deviation_um: FloatArray  # of the table from the path, or where that is not known from its command, (n, 3)
+    deviation_um: FloatArray  # of the table from the path or, if unknown, from its command, (n, 3)
     channels: Mapping[str, FloatArray]  # values along the path by the names of `CHANNELS`, each (n,)
-    samples: int  # how many periods were simulated
-    # first and last line of each cut, (k, 2): there the largest deviation is looked for; empty: everywhere
+    samples: int  # number of simulated periods
+    # first and last line of each cut, (k, 2), in which the largest deviation is searched for; empty: everywhere
     cut_lines: tuple[tuple[int, int], ...] = ()
 
 
@@ -82,22 +82,22 @@ class SceneSpectrum:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a page shows of motion."""
+    """The motion shown on a page."""
 
     period_s: float  # interpolation period
     variants: tuple[Variant, ...]  # programs, the original first
-    thinned: str  # how far the thinning may be seen, in a sentence
+    thinned: str  # accuracy of the decimation, in a sentence
     spectra: tuple[SceneSpectrum, ...] = ()  # of axes that move
     modes: tuple[ModeLine, ...] = ()  # of the machine
-    # lines of the emitted text and the lines of the original that they stand for: rows of first and last emitted, first
+    # lines of the emitted program and the corresponding lines of the original: rows of first and last emitted, first
     # and last original
     link_lines: tuple[tuple[int, int, int, int], ...] = field(default=())
 
 
 def packed(scene: Scene) -> tuple[dict[str, Any], str]:
-    """A scene as the page's script reads it.
+    """Pack a scene for the script of the page.
 
-    Numbers are 16-bit ranks between the least and the largest value of their column (`low`, `high`), stored as
+    Numbers are 16-bit integers between minimum and maximum of their column (`low`, `high`), stored as
     differences modulo 65536 (`u2d`); samples, lines and blocks are 32-bit differences (`i4d`).
     """
     body = bytearray()
@@ -151,10 +151,10 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 PIXELS_WIDE, PIXELS_HIGH = 1600, 200
-"""Of the screen for which is thinned: path and time across, a curve from its least to its largest value."""
+"""Pixels of the screen for the decimation: path and time across, a curve from minimum to maximum."""
 
 _HALF_PIXEL = 0.5
-_STEP = 0.5  # of the tolerance, for each of two passes
+_STEP = 0.5  # ratio of the tolerance, for each of two passes
 _COARSER = 1.5
 _PATH_LAST = 20.0
 _SHARE_OF_STARTS = 0.5
@@ -162,19 +162,19 @@ _SHARE_OF_STARTS = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """What is left."""
+    """The kept samples."""
 
-    sample: IntArray  # which samples, (n,)
-    labels: IntArray  # what was said of each, (n, labels)
+    sample: IntArray  # indices of the samples, (n,)
+    labels: IntArray  # labels of each, (n, labels)
     command_mm: FloatArray  # (n, 3)
     deviation_um: FloatArray  # (n, 3)
     curves: Mapping[str, FloatArray]  # by name, each (n,)
-    path_pixels: float  # how far the path may be off
-    pixels: float  # how far a curve may be off
+    path_pixels: float  # largest error of the path
+    pixels: float  # largest error of a curve
 
 
 class Thinner:
-    """Takes samples piece by piece and keeps at most so many."""
+    """Decimates samples piece by piece to a maximum number."""
 
     def __init__(self, scales: Mapping[str, float], most: int) -> None:
         self._scales = scales
@@ -183,7 +183,7 @@ class Thinner:
         self._pieces: list[tuple[IntArray, IntArray, FloatArray, BoolArray]] = []
         self._low: FloatArray | None = None
         self._high: FloatArray | None = None
-        # What is thinned again is off by the sum of what each pass allows.
+        # The error of repeated decimation is the sum of the tolerances.
         self._spent = _STEP
         self._path_spent = _path_factor(_STEP)
         self.samples = 0
@@ -200,7 +200,7 @@ class Thinner:
         self._high = high if self._high is None else np.maximum(self._high, high)
         started = np.zeros(len(sample), dtype=bool)
         started[starts] = True
-        # By the ranges so far, which only grow: finer than at the end.
+        # Tolerances from the ranges so far, which only grow: finer than at the end.
         rows = self._chosen(sample, values, started, _STEP)
         self._pieces.append((sample[rows], labels[rows], values[rows], started[rows]))
         self.samples += len(sample)
@@ -212,12 +212,12 @@ class Thinner:
 
     def _tolerances(self, factor: float) -> FloatArray:
         assert self._low is not None and self._high is not None
-        # The path is drawn large: it gives way only where its points alone are too many.
+        # The path is drawn large: its tolerance grows only if its own points are too many.
         path = np.full(3, self._scales["path"] * _path_factor(factor))
         span = np.maximum(self._high - self._low, 1e-12)
         floors = np.array([self._scales.get(name, 0.0) for name in self._names])
         curves = np.maximum(span[6:], floors) * _HALF_PIXEL / PIXELS_HIGH
-        # The three components of the deviation together are as fine as its magnitude.
+        # The three components of the deviation together are as accurate as its magnitude.
         deviation = np.full(3, max(float(span[3:6].max()), self._scales["deviation"])) * _HALF_PIXEL / PIXELS_HIGH
         tolerances: FloatArray = np.concatenate([path, deviation * factor, curves * factor])
         return tolerances
@@ -243,7 +243,7 @@ class Thinner:
         return (sample[rows], labels[rows], values[rows], started[rows]), factor
 
     def result(self) -> Kept:
-        """What is left."""
+        """The kept samples."""
         if not self._pieces:
             raise ValueError("no sample: nothing to show")
         (sample, labels, values, _), factor = self._thinned(_STEP, most=self._most)
@@ -254,16 +254,16 @@ class Thinner:
 
 
 def _path_factor(factor: float) -> float:
-    """By what the path's tolerance grows where that of the curves grows by a factor."""
+    """Factor of the path's tolerance for a factor of the curves' tolerance."""
     return max(factor / _PATH_LAST, min(factor, _STEP))
 
 
-_SEGMENT_S = 2.0  # so the lines lie half a hertz apart
+_SEGMENT_S = 2.0  # line spacing half a hertz
 _STILL = 1e-9
 
 
 class AccelerationSpectrum:
-    """Welch's mean of the spectra of windows that overlap by half (P. D. Welch 1967), window of Hann."""
+    """Welch's mean of spectra of half-overlapping Hann windows (P. D. Welch 1967)."""
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s
@@ -274,7 +274,7 @@ class AccelerationSpectrum:
         self._rest: FloatArray = np.zeros((0, 3))
 
     def add(self, acceleration: FloatArray) -> None:
-        """Further samples, (k, 3), m/s²."""
+        """Add samples, (k, 3), m/s²."""
         waiting = np.concatenate([self._rest, acceleration])
         half = self._length // 2
         begin = 0
@@ -290,7 +290,7 @@ class AccelerationSpectrum:
     def lines(self, variant: str, *, most_hz: float) -> list[SceneSpectrum]:
         """The spectral density of each axis that moves."""
         if len(self._rest) and not self._windows:
-            # A motion shorter than one window: with rest behind it.
+            # A motion shorter than one window: zero-padded.
             self._count(np.concatenate([self._rest, np.zeros((self._length - len(self._rest), 3))]))
         frequency: FloatArray = np.fft.rfftfreq(self._length, self._period_s).astype(np.float64)
         wanted = (frequency > 0.0) & (frequency <= most_hz)
