@@ -219,7 +219,7 @@ def _largest_um(rows: Iterable[Any]) -> dict[str, float]:
 def full_table(outcomes: Sequence[Outcome]) -> str:
     """One program with a wide contour tolerance: what each shaper leaves and costs by itself."""
     before = outcomes[0].cutting_s
-    head = ["shaper", "T, ms", "lasts, ms", "residual X", "residual Y", "peak X, Y", "command", "response"]
+    head = ["shaper", "T, ms", "duration, ms", "residual X", "residual Y", "peak X, Y", "command", "response"]
     rows = []
     for each in outcomes:
         if each.refusal:
