@@ -89,7 +89,7 @@ def guard_table() -> str:
         rows.append(
             [f"same band, taps < 0, Σ\\|a\\| ≤ {NEGATIVE_SUM:g}", *_figures(*periods(signed)), _ms(grid), "any"]
         )
-    return markdown(["shaper", "band at 5 %", "lasts, periods", "arc, µm", "corner, µm", "1 ms grid", "modes"], rows)
+    return markdown(["shaper", "band at 5 %", "duration, periods", "arc, µm", "corner, µm", "1 ms grid", "modes"], rows)
 
 
 def families_table() -> str:
@@ -113,10 +113,10 @@ def families_table() -> str:
     head = [
         "family",
         "band at 5 %",
-        "lasts, periods",
+        "duration, periods",
         "arc, µm",
         "corner, µm",
-        "`robust` of that band lasts",
+        "duration of `robust` for that band",
         "1 ms grid",
     ]
     return markdown(head, rows)
