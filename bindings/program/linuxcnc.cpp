@@ -77,7 +77,7 @@ void define_options(py::module_& module) {
 void register_linuxcnc(py::module_& module) {
   define_options(module);
   py::class_<LinuxcncProgram>(module, "LinuxcncProgram", "A LinuxCNC program in FANUC's words.")
-      .def_readonly("expanded", &LinuxcncProgram::expanded)
+      .def_readonly("expanded", &LinuxcncProgram::expanded, "The program in FANUC's words.")
       .def_property_readonly(
           "path_tolerance_mm",
           [](const LinuxcncProgram& self) -> std::optional<std::pair<std::optional<double>, std::optional<double>>> {

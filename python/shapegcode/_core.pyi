@@ -7254,7 +7254,9 @@ class LinuxcncProgram:
     """
     @property
     def expanded(self) -> ExpandedProgram:
-        ...
+        """
+        The program in FANUC's words.
+        """
     @property
     def path_tolerance_mm(self) -> tuple[float | None, float | None] | None:
         """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -150,6 +151,22 @@ def test_subroutines_in_files_beside_and_where_their_lines_come_from(tmp_path: P
     (tmp_path / "hole.ngc").write_text("o<hole> sub\nG38.2 Z-1\no<hole> endsub\n")
     with pytest.raises(sg.ProgramError, match=r"hole\.ngc:2:1: G38\.2 is a probing move.*called from part\.ngc line 4"):
         read("o<hole> call", tmp_path)
+
+
+def test_names_are_the_same_in_every_file(tmp_path: Path) -> None:
+    """Letters beyond ASCII too; a file's own name may be no UTF-8."""
+    (tmp_path / "hole.ngc").write_bytes("o<hole> sub\nG1 X#<_größe>\no<hole> endsub\n".encode())
+    assert ends(read("#<_größe> = 4\no<hole> call", tmp_path))[-1] == [4.0, 0.0, 5.0]
+    with pytest.raises(sg.ProgramError, match=r":1:1: division by zero") as error:
+        sg.Program.from_text("G1 X[1/0]\nM2\n", machine(), source="part\udce9.ngc")
+    assert vars(error.value)["file"] == "part\udce9.ngc"
+
+
+def test_rapids_without_a_feed_are_read_in_linear_time() -> None:
+    text = "G21\n" + "G0 X1\nG0 X2\n" * 10_000 + "M2\n"
+    begin = time.perf_counter()
+    assert sg.Program.from_text(text, machine()).core.line_count > 20_000
+    assert time.perf_counter() - begin < 20.0  # every line looked at the whole rest: minutes
 
 
 def test_m98_m99_and_m70_m72() -> None:

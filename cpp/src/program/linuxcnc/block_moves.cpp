@@ -259,7 +259,7 @@ void BlockRunner::put_arc(const Arc& arc, const std::string& head, const WordVal
 }
 
 std::string BlockRunner::arc_feed(const Arc& arc, const WordValues& values) {
-  const std::string feed = feed_word(values);
+  std::string feed = feed_word(values);
   if (state_.modes.feed_mode != 930) return feed;
   const std::optional<double> begin = arc.start[arc.axes.normal];
   const std::optional<double> end = state_.position[arc.axes.normal];

@@ -13,15 +13,8 @@
 namespace shapegcode::linuxcnc {
 namespace {
 
-std::optional<Group> group_of(std::int64_t code) {
-  if (is_cycle(code)) return Group::motion;
+bool is_one_shot(std::int64_t code) {
   switch (code) {
-    case 0:
-    case 10:
-    case 20:
-    case 30:
-    case 800:
-      return Group::motion;
     case 100:
     case 280:
     case 281:
@@ -32,7 +25,22 @@ std::optional<Group> group_of(std::int64_t code) {
     case 921:
     case 922:
     case 923:
-      return Group::one_shot;
+      return true;
+    default:
+      return false;
+  }
+}
+
+std::optional<Group> group_of(std::int64_t code) {
+  if (is_cycle(code)) return Group::motion;
+  if (is_one_shot(code)) return Group::one_shot;
+  switch (code) {
+    case 0:
+    case 10:
+    case 20:
+    case 30:
+    case 800:
+      return Group::motion;
     case 40:
       return Group::dwell;
     case 530:
