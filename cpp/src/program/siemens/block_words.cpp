@@ -132,8 +132,7 @@ void BlockWords::refuse_groups(const Block& block) const {
     }
     if (names.size() < 2) continue;
     std::ranges::sort(names);
-    const auto rest = std::ranges::unique(names);
-    names.erase(rest.begin(), rest.end());
+    names.erase(std::unique(names.begin(), names.end()), names.end());
     if (names.size() > 1) {
       throw error_at(block.column, fmt::format("{} and {} in one block: leave one of them out", names[0], names[1]));
     }

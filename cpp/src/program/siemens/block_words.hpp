@@ -53,6 +53,8 @@ class BlockWords {
   [[nodiscard]] bool is_incremental(const Word& word) const;
   [[nodiscard]] std::int64_t whole_of(const Word& word) const;
 
+  /// A word of a mode, or G9; false: another one.
+  bool mode(const Word& word, Given& given);
   /// A word without a value.
   void code(const Word& word, Given& given);
   void path_mode(WordId id);

@@ -14,68 +14,48 @@ std::string_view shown_motion(Motion motion) { return motion == Motion::none ? "
 
 }  // namespace
 
-void BlockWords::code(const Word& word, Given& given) {
+bool BlockWords::mode(const Word& word, Given& given) {
   Modes& modes = path_.modes;
   const auto offset_from = [&word](WordId first) { return static_cast<int>(word.id) - static_cast<int>(first); };
-  switch (word.id) {
-    case WordId::g0:
-    case WordId::g1:
-    case WordId::g2:
-    case WordId::g3:
-    case WordId::cip:
-    case WordId::ct:
-      modes.motion = static_cast<Motion>(1 + offset_from(WordId::g0));
-      return;
-    case WordId::g17:
-    case WordId::g18:
-    case WordId::g19:
-      path_.set_plane(17 + offset_from(WordId::g17));
-      return;
-    case WordId::g90:
-    case WordId::g91:
-      modes.incremental = word.id == WordId::g91;
-      return;
-    case WordId::g70:
-    case WordId::g71:
-    case WordId::g700:
-    case WordId::g710:
-      modes.unit = word.id == WordId::g70 || word.id == WordId::g700 ? mm_per_inch : 1.0;
-      modes.feed_unit = word.id == WordId::g700 ? mm_per_inch : 1.0;
-      return;
-    case WordId::g93:
-    case WordId::g94:
-    case WordId::g95: {
-      const int mode = 93 + offset_from(WordId::g93);
-      if (modes.feed_mode != mode) {  // its number means another thing now
-        modes.feed.reset();
-        given.start_feed.reset();
-      }
-      modes.feed_mode = mode;
-      return;
+  if (is_between(word.id, WordId::g0, WordId::ct)) {
+    modes.motion = static_cast<Motion>(1 + offset_from(WordId::g0));
+  } else if (is_between(word.id, WordId::g17, WordId::g19)) {
+    path_.set_plane(17 + offset_from(WordId::g17));
+  } else if (is_between(word.id, WordId::g90, WordId::g91)) {
+    modes.incremental = word.id == WordId::g91;
+  } else if (is_between(word.id, WordId::g70, WordId::g710)) {
+    modes.unit = word.id == WordId::g70 || word.id == WordId::g700 ? mm_per_inch : 1.0;
+    modes.feed_unit = word.id == WordId::g700 ? mm_per_inch : 1.0;
+  } else if (is_between(word.id, WordId::g93, WordId::g95)) {
+    const int mode = 93 + offset_from(WordId::g93);
+    if (modes.feed_mode != mode) {  // its number means another thing now
+      modes.feed.reset();
+      given.start_feed.reset();
     }
-    case WordId::flin:
-    case WordId::fnorm:
-      modes.is_linear = word.id == WordId::flin;
-      return;
-    case WordId::g9:
-      given.exact = true;
-      return;
-    case WordId::g60:
-    case WordId::g64:
-    case WordId::g641:
-      path_mode(word.id);
-      return;
-    case WordId::work_offset:
-      path_.set_offset(word.name);
-      if (word.name.size() > 3) {  // G500 and above
-        path_.name(offset_word(word.name), word.name);
-        path_.note(fmt::format("{} is written as {}", word.name, offset_word(word.name)), word.name);
-      }
-      return;
-    case WordId::ret:
-      return;
-    default:
-      break;
+    modes.feed_mode = mode;
+  } else if (is_between(word.id, WordId::flin, WordId::fnorm)) {
+    modes.is_linear = word.id == WordId::flin;
+  } else if (word.id == WordId::g9) {
+    given.exact = true;
+  } else {
+    return false;
+  }
+  return true;
+}
+
+void BlockWords::code(const Word& word, Given& given) {
+  if (word.id == WordId::ret || mode(word, given)) return;
+  if (is_between(word.id, WordId::g60, WordId::g641)) {
+    path_mode(word.id);
+    return;
+  }
+  if (word.id == WordId::work_offset) {
+    path_.set_offset(word.name);
+    if (word.name.size() > 3) {  // G500 and above
+      path_.name(offset_word(word.name), word.name);
+      path_.note(fmt::format("{} is written as {}", word.name, offset_word(word.name)), word.name);
+    }
+    return;
   }
   const auto& left_out = path_.options().left_out;
   const auto found = left_out.find(word.name);

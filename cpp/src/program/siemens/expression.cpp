@@ -88,6 +88,7 @@ Value ExpressionPool::unary(const Node& node, Scope& scope) const {
 
 Value ExpressionPool::worked(const Node& node, Scope& scope) const {
   std::vector<Value> values;
+  values.reserve(node.right);
   for (const std::uint32_t each : given(node)) {
     values.push_back(evaluate(each, scope));
     values.back().number = number(values.back(), node.column);

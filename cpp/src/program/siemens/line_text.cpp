@@ -84,7 +84,8 @@ std::string capitals(std::string_view text) {
 }
 
 bool holds_word(std::string_view text, std::string_view word) noexcept {
-  return !std::ranges::search(text, word, {}, upper).empty() || word.empty();
+  const auto is_same = [](char a, char b) { return upper(a) == b; };
+  return word.empty() || std::search(text.begin(), text.end(), word.begin(), word.end(), is_same) != text.end();
 }
 
 std::pair<std::string_view, std::string_view> split_comment(std::string_view line) noexcept {

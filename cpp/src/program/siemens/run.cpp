@@ -102,6 +102,7 @@ std::optional<std::int64_t> Run::parameter_number(const std::string& name, std::
 
 std::vector<Value> Run::worked_out(const std::vector<Expression>& expressions) {
   std::vector<Value> values;
+  values.reserve(expressions.size());
   for (const Expression& each : expressions) values.push_back(each(*this));
   return values;
 }

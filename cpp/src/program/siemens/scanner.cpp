@@ -10,9 +10,9 @@
 namespace shapegcode::siemens {
 namespace {
 
-constexpr int most_expression_levels = 1000;          // of an expression that is read
-constexpr std::size_t shown_rest = 30;     // characters
-constexpr std::size_t most_digits = 4300;  // of a whole number
+constexpr int most_expression_levels = 1000;  // of an expression that is read
+constexpr std::size_t shown_rest = 30;        // characters
+constexpr std::size_t most_digits = 4300;     // of a whole number
 
 }  // namespace
 
