@@ -351,7 +351,7 @@ def test_the_command_writes_once_and_fits(tmp_path: Path) -> None:
         "purpose": "TIME OF START AND END OF A PROGRAM",
     }  # fmt: skip
     again = shell("characterize", "--write", tmp_path / "t", "-m", "vx500")
-    assert again.returncode == 2 and "may hold results" in again.stderr
+    assert again.returncode == 2 and "may contain results" in again.stderr
     fill_in_times(tmp_path / "t", Hidden(), np.random.default_rng(4))
     done = shell("characterize", "--fit", tmp_path / "t", "-m", "vx500", "-o", tmp_path / "m.toml", "--json", "-")
     assert (done.returncode, done.stderr) == (0, "")

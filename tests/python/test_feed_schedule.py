@@ -153,7 +153,7 @@ def test_feeds_change_by_no_more_than_the_machine_says() -> None:
         ("T1 M06", "T2 M06", "no tool file describes T2"),
         ("S1800 M03", "M03", "no spindle speed"),
         ("X4. F216.", "G95 X4. F.12", "not all of its feeds are per minute"),
-        ("X4. F216.", "X4. F1.", "already below the least one"),
+        ("X4. F216.", "X4. F1.", "already below the lowest one"),
     ],
 )
 def test_what_cannot_be_scheduled_is_said_and_left(old: str, new: str, said: str) -> None:

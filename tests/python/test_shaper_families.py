@@ -351,7 +351,7 @@ def test_random_modes_on_random_grids() -> None:
         try:
             found = design(name, [band], options(float(rng.choice(PERIODS_S))))[0]
         except DesignError as error:
-            assert "lasts" in str(error) or "try another period" in str(error)
+            assert "takes" in str(error) or "try another period" in str(error)
             continue
         designed += 1
         left = left_of(found.shaper, band.mode)

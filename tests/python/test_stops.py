@@ -60,7 +60,7 @@ def test_a_dead_sensor_is_told() -> None:
 
 
 def test_a_start_goes_with_one_decay() -> None:
-    with pytest.raises(sg.ArgumentError, match=r"start at 1 s: goes with one decay"):
+    with pytest.raises(sg.ArgumentError, match=r"start at 1 s: is for one decay"):
         sg.identify([record(0)], stops=True, start_s=1.0)
 
 

@@ -141,7 +141,7 @@ def test_the_unrolled_corner_has_the_corners_radial_depth(tmp_path: Path, capsys
     assert {feed for _, feed in side["passes"][0]["feeds"]} == {216.0}
     deeper = about["deeper_than_corner"]
     out = " ".join(capsys.readouterr().out.split())
-    assert re.search(r"up to 0\.2[12]\d mm more than the corner", out)
+    assert re.search(r"up to 0\.2[12]\d mm deeper than the corner", out)
     at = np.arange(2.0, 34.0, 0.11)
     corner = _core.CornerCut(4.0, 8.0, 8.0, 0.8, before_mm=40.0, after_mm=40.0)
     # The tool's front, sqrt(4² - 3.2²) = 2.4 before its axis, reaches the rough arc 8.8 before the corner of the walls;
@@ -352,7 +352,7 @@ def test_tables_of_means_are_read_too(tmp_path: Path) -> None:
     assert abs(report["cutting"]["specific_exponent"] + 0.153) < 0.01
     assert report["cutting"]["specific_n_per_mm2"] == pytest.approx(221.3, rel=0.03)
     # One feed alone tells less, and that is said.
-    assert any("is known to +-" in text for text in same["poor"])
+    assert any("is known only to +-" in text for text in same["poor"])
     assert abs(same["at_chip"][0]["value"] / (221.3 * same["chip_mm"]["middle"] ** -0.153) - 1.0) < 0.02
 
 
@@ -399,7 +399,7 @@ def test_the_api_does_what_the_command_does(tmp_path: Path) -> None:
     drawn = [draw(ax) for draw, ax in zip(found.plots().values(), whole.subplots(1, 2), strict=True)]
     assert all(panel.figure.figure is whole for panel in drawn)
     assert [panel.get_ylabel() for panel in drawn] == ["along the feed in N", "k1 in N/mm²"]
-    with pytest.raises(sg.ArgumentError, match="the radial depth must grow"):
+    with pytest.raises(sg.ArgumentError, match="the radial depth must increase"):
         sg.taper_cut(given, None, (0.8, 0.8))
     with pytest.raises(sg.ArgumentError, match="state the spindle speed"):
         sg.taper_cut(sg.CutConditions(given.machine, given.tool, 108.0, AXIAL))
@@ -501,7 +501,7 @@ def test_bad_arguments_of_the_fit_are_refused(tmp_path: Path, capsys: pytest.Cap
     for arguments, said in (
         ([f"3={file}", *cut], "pass 3: the test cut has 2 passes"),
         ([file, f"1={file}", *cut], "pass 1 is given twice"),
-        ([file, *cut, "--edge-forces"], "edge forces and chip thickness go with a taper"),
+        ([file, *cut, "--edge-forces"], "edge forces and chip thickness are for a taper"),
         ([file, *cut, "-o", str(tmp_path / "c.toml")], "describes a corner: -o only with a taper"),
         ([file, "--cut", file], "not valid JSON"),
         ([file, *cut, "--json", file], "would overwrite"),
@@ -516,7 +516,7 @@ def test_bad_arguments_of_the_fit_are_refused(tmp_path: Path, capsys: pytest.Cap
         ("kind", "taper", "the figures in 'about' are not those of a taper"),
         ("axial_depth_mm", 0.0, "axial_depth_mm: Input should be greater than 0"),
         ("spindle_rev_per_min", None, "spindle_rev_per_min: Input should be a valid number"),
-        ("passes", [{**side["passes"][0], "start_mm": 9.0}], "pass 1: edge, feeds and ends do not fit together"),
+        ("passes", [{**side["passes"][0], "start_mm": 9.0}], "pass 1: edge, feeds and ends are inconsistent"),
         ("format", 1, "not the side file of a test cut"),
     ):
         (tmp_path / "bad.json").write_text(json.dumps({**side, key: value}), encoding="utf-8")

@@ -51,7 +51,7 @@ points_mm = [[0, 0], [120, 0], [120, 50], [90, 80], [0, 80]]
 holes_mm = [[[50, 30], [70, 30], [70, 50], [50, 50]]]
 z_mm = [-25, 0]
 """,
-    "What roughing left on the walls that this program finishes": """\
+    "Layer left by roughing on the walls finished by this program": """\
 [allowance]
 allowance_mm = 0.5
 corner_radius_mm = 8  # the roughing tool had a diameter of 16 mm

@@ -70,16 +70,16 @@ class Prepared:
         return replace(self, usable=usable, refused=(*self.refused, *refused))
 
 
-# A second pulse above this ratio to the first is refused: the impulse, and so the mass, would be wrong by as much.
+# A second pulse above this fraction of the first is refused: the impulse, and so the mass, would be wrong by as much.
 DOUBLE_HIT = 0.1  # Below, it may be the ringing of an anti-aliasing filter, which reaches 9 %
 MIN_FORCE = 10.0  # Least ratio of force to its noise: the mass would be wrong by about the inverse
 MIN_PULSE = 3  # Least samples of a pulse: with three, the impulse of a half sine is known to about 10 %
 MIN_LEAD = 8  # Least samples before the impact to measure noise and offset: a standard deviation to 25 %
-_CUT_PULSE = 0.2  # Refuse a record that begins within the pulse above this ratio to its peak
-_AT_REST = 0.1  # At rest before the impact: vibration below this ratio to that afterwards
+_CUT_PULSE = 0.2  # Refuse a record that begins within the pulse above this fraction of its peak
+_AT_REST = 0.1  # At rest before the impact: vibration below this fraction of that afterwards
 _MIN_MARGIN = 3  # The force is used for half a pulse on either side, at least this many samples
 _OFFSET_ERRORS = 2.0  # An offset above this many standard errors of its mean is removed
-_OFFSET_TOLD = 0.05  # An offset of the force above this ratio to the peak is reported
+_OFFSET_TOLD = 0.05  # An offset of the force above this fraction of the peak is reported
 _OPPOSED = -0.7  # Correlation of force and response below which they are opposite
 _SAME_PERIOD = 1e-5  # Allowed relative difference of sampling periods, as in files of six digits
 
@@ -270,8 +270,8 @@ _NEARLY_TOP, _FLAT_SHARE, _FLAT_RUN = 0.95, 0.5, 5
 EXCITED = 0.1  # Force spectrum fallen to this ratio (-20 dB): noise counts tenfold
 EXCITED_HALF_SINE = 1.3033  # A half sine reaches it at this multiple of 1/duration: cos(pi x) / (1 - 4 x²) = 0.1
 MIN_PERIODS = 8.0  # Least periods to find damping without full decay; fewer cannot distinguish decay from beat
-_STRONG_PEAK = 0.3  # ... of the lowest spectral peak above this ratio to the largest
-DECAYED = 0.1  # Decayed: the last tenth of the record is below this ratio to the beginning
+_STRONG_PEAK = 0.3  # ... of the lowest spectral peak above this fraction of the largest
+DECAYED = 0.1  # Decayed: the last tenth of the record is below this fraction of the beginning
 _MIN_SAMPLES = 32  # Least samples after the impact for any model
 FOLDING = 0.8  # highest strongest frequency relative to half the sampling rate: above, filters cut and modes alias
 
@@ -378,13 +378,13 @@ def refuse_short(
 
 
 _PULSE_ENDS = 0.01  # A pulse ends below this share of its peak; a half sine then lacks 0.01 % of its impulse
-_NOISE_ENDS = 3.0  # ... or into the noise, so many standard deviations
-_SMALLEST_PULSE = 0.03  # Pulses are searched above this ratio to the largest force
-_SMALLEST_HIT = 0.1  # An impact is above this ratio to the largest force; below, someone touched the hammer
+_NOISE_ENDS = 3.0  # ... or below this many standard deviations of noise
+_SMALLEST_PULSE = 0.03  # Pulses are searched above this fraction of the largest force
+_SMALLEST_HIT = 0.1  # An impact is above this fraction of the largest force; below, someone touched the hammer
 _PULSE_NOISE = 7.0  # ... and above so many standard deviations of noise, not reached by a million samples of noise
 _RINGING_SAMPLES = 8  # A pulse this many samples later is ringing of the anti-aliasing filter
 _BOUNCE_S = 0.1  # A second impact within this time is a bounce of the hammer
-_RESTED = 0.1  # Before an intended next impact the response has fallen to this ratio to its peak
+_RESTED = 0.1  # Before an intended next impact the response has fallen to this fraction of its peak
 _LEAD_SHARE = 0.1  # A record of one impact begins this fraction of the time between impacts before it
 _MAD = 1.4826  # Normal noise: standard deviation over median absolute deviation
 

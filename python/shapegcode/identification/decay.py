@@ -17,15 +17,15 @@ from shapegcode.io.units import FloatArray
 
 _ENVELOPE_PERIODS = 2.0  # RMS window of the envelope: periods of the slowest mode, or a beat of the two closest modes
 _ENVELOPE_SHARE = 0.05  # ... and at least this fraction of the record while the modes are unknown
-_EVENT_RISES, _EVENT_SHARE = 1.3, 0.3  # An event: the envelope rises by this factor, to this ratio to its maximum
+_EVENT_RISES, _EVENT_SHARE = 1.3, 0.3  # An event: the envelope rises by this factor, to this fraction of its maximum
 _TAIL = 0.3  # The tail of a decay, without command, begins after this fraction of it
 _MIN_TAIL = 16  # Least samples of a tail to find a frequency
-_MODE_SHARE = 0.2  # Modes are peaks above this ratio to the tail's largest; slower motion is of the axis
+_MODE_SHARE = 0.2  # Modes are peaks above this fraction of the tail's largest; slower motion is of the axis
 # A window of one period with this fraction of the largest RMS begins at most half a period early, so the decay
 # begins this fraction of a period later.
 _ONSET = 0.7
-_SLOWER = 0.8  # Below this ratio to the slowest mode's frequency it is motion of the axis
-_MOTION_SHARE = 0.4  # The axis moves: mean over a period of the lowest mode above this ratio to the envelope
+_SLOWER = 0.8  # Below this fraction of the slowest mode's frequency it is motion of the axis
+_MOTION_SHARE = 0.4  # The axis moves: mean over a period of the lowest mode above this fraction of the envelope
 _FEWEST_PERIODS = 3.0  # of the strongest frequency in the record
 _STOP_PERIODS, _STOP_FALLS = 3.0, 0.3  # periods of the lowest frequency after a stop; ratio to which the envelope falls
 _LOWEST_HZ = 10.0  # lowest mode in an ordinary run; slower is motion

@@ -80,7 +80,7 @@ class TapPlan(Result):
             Column("samples/s", value="samples_per_s", digits=0),
             Column("record", "s", lambda row: f"{row.duration_s:g}"),
             Column("pre-trigger", "s", lambda row: f"{row.pre_trigger_s:.2g}"),
-            Column("pulse at most", "ms", lambda row: f"{1e3 * row.pulse_s:.2g}"),
+            Column("longest pulse", "ms", lambda row: f"{1e3 * row.pulse_s:.2g}"),
             Column("tip", text=True),
         )
         return [Table("recording", columns, self.recordings)]

@@ -411,7 +411,7 @@ _REFUSAL_COLUMNS = (_FREQUENCY, Column("why", value="refusal", text=True))
 _RECORD_COLUMNS = (
     Column("record", value="source", text=True),
     Column("samples"),
-    Column("lasts", "s", "duration_s", digits=3),
+    Column("duration", "s", "duration_s", digits=3),
     Column("resolution", "Hz", "resolution_hz", digits=3),
     Column("excited up to", "Hz", "excited_hz", digits=0),
     Column("not used", value="reason", text=True),

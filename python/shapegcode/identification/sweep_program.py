@@ -122,7 +122,7 @@ class SweepProgram(Result):
             Column("feed up to", "mm/min", "feed_mm_per_min", digits=0),
             Column("acceleration", "mm/s²", "acceleration_mm_s2", digits=0),
             Column("blocks"),
-            Column("lasts", "s", "duration_s", digits=1),
+            Column("duration", "s", "duration_s", digits=1),
         )
         return [Table("planned, as simulated", columns, self.bands)]
 

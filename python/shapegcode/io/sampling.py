@@ -17,7 +17,7 @@ _OFF_STEP = 0.9
 _TELL = 0.1  # deviation from the grid that is reported, relative to the period
 #: Allowed relative difference of stated and measured rate: clocks are far better, wrong units far worse.
 STATED_RATE_TOLERANCE = 0.01
-#: Rounding moves an instant by half a digit at most; if digits are finer than this ratio to the deviation, the
+#: Rounding moves an instant by half a digit at most; if digits are finer than this fraction of the deviation, the
 #: clock of the logger itself is uneven.
 _ROUNDED = 0.5
 _UNEVEN = 0.05  # uneven clock: half of the steps differ from the usual one by more than this ratio

@@ -70,7 +70,7 @@ def own_modes(machine: Machine, shift: float = 0.0, only: str | None = None) -> 
 
 
 def excited_modes(machine: Machine) -> list[list[_core.Mode]]:
-    """Modes that X, Y, Z excite, for their shapers, weighted by their motion of the tool along that axis."""
+    """Modes that X, Y, Z excite, for their shapers, weighted by the tool motion that the axis excites."""
     found: list[list[_core.Mode]] = [[], [], []]
     for exciting, share, axis, mode in _excitations(machine):
         still = _shifted(mode, 0.0, machine)

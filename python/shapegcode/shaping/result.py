@@ -326,7 +326,7 @@ class Recommendation(Result):
             Column("", value=lambda each: marks.get(id(each), ""), text=True),
             Column("family", text=True),
             Column("grid", "ms", lambda each: "any" if each.period_s is None else f"{each.period_s * 1e3:.4g}"),
-            Column("lasts", "ms", lambda each: each.duration_s * 1e3, digits=2),
+            Column("duration", "ms", lambda each: each.duration_s * 1e3, digits=2),
             Column("worst", "%", lambda each: _percent(each.worst_residual)),
             Column("nominal", "%", lambda each: _percent(each.residual)),
             Column("σ²", "ms²", lambda each: f"{each.variance_s2 * 1e6:.4g}"),

@@ -259,7 +259,7 @@ class CycleTime(TimeParts, Result):
         columns = (
             Column("time", value=lambda row: row[0], text=True),
             Column("s", value=lambda row: row[1], digits=3),
-            Column("of the whole", value=lambda row: row[2]),
+            Column("of total", value=lambda row: row[2]),
         )
         return Table("", columns, rows, sections=(1, 1 + len(PARTS)))
 

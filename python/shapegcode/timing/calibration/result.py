@@ -195,7 +195,7 @@ class CycleTimeCalibration(Result):
         if largest is None:
             return f"{head}; no log has a complete run to check them"
         left_out = any(run.cross_validated_s is not None or run.use == "test" for run in self.runs)
-        kind = "left out" if left_out else "fitted"
+        kind = "not in the fit" if left_out else "fitted"
         within = "within" if self.ok else "NOT within"
         return f"{head}; runs {kind} are {within} {TOLERANCE_PERCENT:g} % (at most {largest:.1f} %)"
 
@@ -240,11 +240,11 @@ _RUNS = (
     Column("run", value="name", text=True),
     Column("use", value="use", left=True),
     Column("measured", "s", "measured_s", digits=1),
-    Column("held", "s", lambda run: run.held_s or None, digits=1),
+    Column("holds", "s", lambda run: run.held_s or None, digits=1),
     Column("predicted", "s", "predicted_s", digits=1),
     Column("95 %", "s", lambda run: f"{run.low_s:.0f}-{run.high_s:.0f}"),
     Column("error", "%", "error_percent", digits=2),
-    Column("left out", "%", "cross_validated_percent", digits=2),
+    Column("cross-validated", "%", "cross_validated_percent", digits=2),
 )
 _SHARES = (
     Column("run", value=lambda row: row[0].name, text=True),
@@ -256,7 +256,7 @@ _SHARES = (
 _FAMILIES = (
     Column("kind", value="name", text=True),
     Column("fitted", "s", "fitted_s", digits=3),
-    Column("left out", "s", "cross_validated_s", digits=3),
+    Column("cross-validated", "s", "cross_validated_s", digits=3),
     Column("description", value="meaning", text=True),
 )
 _NUMBERS = (
