@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'CommandPlanner', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerEvent', 'ControllerKind', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExpandedProgram', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedOf', 'FeedRate', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'JogResult', 'LimitedFeed', 'LinearBlock', 'LinearPlant', 'LinuxcncOptions', 'LinuxcncProgram', 'LinuxcncSlowing', 'LinuxcncToolTable', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OffsetLimits', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlannerRules', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'SegmentRules', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'controlled_motion', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_difference_mm', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_blocks', 'linear_distance_mm', 'linear_duration_s', 'linear_end_speed', 'linear_model', 'linear_positions_mm', 'linuxcnc_peck_clearance_mm', 'linuxcnc_slowing', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_linuxcnc', 'read_parts', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_optimal_trajectory', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'CommandPlanner', 'ComparedKind', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerEvent', 'ControllerKind', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExpandedProgram', 'ExtraInsensitive', 'FanucModel', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedOf', 'FeedRate', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'JogResult', 'LimitedFeed', 'LinearBlock', 'LinearPlant', 'LinuxcncOptions', 'LinuxcncProgram', 'LinuxcncSlowing', 'LinuxcncToolTable', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'OffsetLimits', 'OverrideFigures', 'Path', 'PathFollower', 'PathSection', 'PlannerRules', 'PositionFeedback', 'ProgramComparison', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'SegmentRules', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SiemensOptions', 'SiemensProgram', 'SimulationChunk', 'SimulationFigures', 'SimulationOptions', 'SimulationStream', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'TrackFigures', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'busiest_per_s', 'compare_programs', 'contour_kernel', 'controlled_motion', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_difference_mm', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_blocks', 'linear_distance_mm', 'linear_duration_s', 'linear_end_speed', 'linear_model', 'linear_positions_mm', 'linuxcnc_peck_clearance_mm', 'linuxcnc_slowing', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plan_tolerances', 'plant_response', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_linuxcnc', 'read_parts', 'read_program', 'read_siemens', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_blocks', 'simulate_circle', 'simulate_path', 'simulate_planned', 'simulate_samples', 'simulated_duration_s', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_optimal_trajectory', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv', 'zv_on_grid']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -7262,6 +7262,128 @@ class LinuxcncProgram:
         """
         The one P and Q of all its G64, mm, None for a word that is left out; None: there are several, or none.
         """
+class SiemensOptions:
+    """
+    What a SINUMERIK program does not say of itself.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def arc_radius_tolerance_mm(self) -> float:
+        """
+        By which start and end radius of an arc may differ.
+        """
+    @arc_radius_tolerance_mm.setter
+    def arc_radius_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def block_skip(self) -> bool | None:
+        """
+        Whether `/` blocks are skipped; None: not known.
+        """
+    @block_skip.setter
+    def block_skip(self, arg0: bool | None) -> None:
+        ...
+    @property
+    def called(self) -> bool:
+        """
+        Called with the name of a program in capitals; gives its file and its text, or None.
+        """
+    @called.setter
+    def called(self, arg1: collections.abc.Callable[[str], tuple[str, str] | None]) -> None:
+        ...
+    @property
+    def file(self) -> str:
+        """
+        Name of the program's file, as errors name it.
+        """
+    @file.setter
+    def file(self, arg0: str) -> None:
+        ...
+    @property
+    def least_increment_mm(self) -> float:
+        """
+        Of the expanded program.
+        """
+    @least_increment_mm.setter
+    def least_increment_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def left_out(self) -> dict[str, str]:
+        """
+        Words that are left out, with what is told of them.
+        """
+    @left_out.setter
+    def left_out(self, arg0: collections.abc.Mapping[str, str]) -> None:
+        ...
+    @property
+    def left_out_addresses(self) -> dict[str, str]:
+        """
+        Addresses likewise.
+        """
+    @left_out_addresses.setter
+    def left_out_addresses(self, arg0: collections.abc.Mapping[str, str]) -> None:
+        ...
+    @property
+    def max_expansion_moves(self) -> int:
+        """
+        Moves, likewise.
+        """
+    @max_expansion_moves.setter
+    def max_expansion_moves(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_program_steps(self) -> int:
+        """
+        Blocks that are executed, beside those of the text.
+        """
+    @max_program_steps.setter
+    def max_program_steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def name(self) -> str:
+        """
+        Of a program without a head %_N_NAME_MPF, in capitals.
+        """
+    @name.setter
+    def name(self, arg0: str) -> None:
+        ...
+    @property
+    def refused(self) -> collections.abc.Callable[[str], str]:
+        """
+        Called with a word: why it is refused; empty: not known.
+        """
+    @refused.setter
+    def refused(self, arg0: collections.abc.Callable[[str], str]) -> None:
+        ...
+    @property
+    def tool_change_unknown_axes(self) -> str:
+        """
+        Axes whose position is not known behind M6.
+        """
+    @tool_change_unknown_axes.setter
+    def tool_change_unknown_axes(self, arg0: str) -> None:
+        ...
+    @property
+    def work_offsets(self) -> dict[str, typing.Annotated[list[float], "FixedSize(3)"]]:
+        """
+        By name, mm.
+        """
+    @work_offsets.setter
+    def work_offsets(self, arg0: collections.abc.Mapping[str, typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]) -> None:
+        ...
+class SiemensProgram:
+    """
+    A SINUMERIK program in FANUC's words.
+    """
+    @property
+    def expanded(self) -> ExpandedProgram:
+        ...
+    @property
+    def names(self) -> list[tuple[str, str]]:
+        """
+        Words that stand for others of the source, each with that one.
+        """
 def acceleration_filters(model: FanucModel) -> list[Fir]:
     """
     Filters behind interpolation in order, none, one or two.
@@ -7903,6 +8025,10 @@ def read_parts(parts: list, options: ReaderOptions) -> ProgramText:
 def read_program(text: bytes, options: ReaderOptions = ...) -> ProgramText:
     """
     Read a program text (bytes). Raises ProgramError with line and column.
+    """
+def read_siemens(text: str, options: SiemensOptions) -> SiemensProgram:
+    """
+    Executes a SINUMERIK program in DIN words as the control does, and writes what it executes in FANUC's words. Raises ProgramError with file, line and column of what is not read.
     """
 def repeated_zv(mode: Mode, zeros: typing.SupportsInt | typing.SupportsIndex) -> Shaper:
     """
