@@ -124,7 +124,7 @@ def test_a_cut_whose_end_its_unit_cannot_name_is_left_unchanged_with_its_reason(
     outcomes = judged.conversion.cuts
     assert [each.is_shaped for each in outcomes] == [True, False, True]
     # 81.2 mm and 2 inches are 51968.504 increments of an inch.
-    assert "it ends at X 132.00000 mm, 1.26 um off what G20 can name" in outcomes[1].reason
+    assert "it ends at X 132.00000 mm, 1.26 um off the increments of G20" in outcomes[1].reason
     assert "limit 0.50 um" in outcomes[1].reason
 
 

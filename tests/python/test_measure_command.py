@@ -237,5 +237,5 @@ def test_a_tool_is_needed(folder: Path, capsys: pytest.CaptureFixture[str]) -> N
 
 def test_demo_without_pictures_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["demo", "path", "--plots", str(tmp_path)]) == 0
-    assert "pictures: there are none" in capsys.readouterr().out
+    assert "pictures: this result has none" in capsys.readouterr().out
     assert list(tmp_path.iterdir()) == []

@@ -139,7 +139,7 @@ def test_a_copy_holds_samples_and_program_and_simulates_again() -> None:
     assert other.text == conversion.text
     assert list(other.plots()) == list(conversion.plots())
     region = other.placed[0].region
-    with pytest.raises(NotKeptError, match="nothing: a pickled result does not hold it"):
+    with pytest.raises(NotKeptError, match="nothing: a pickled result does not contain it"):
         region.nothing  # noqa: B018
     # What differs in an array differs.
     study = sg.study(sg.Program.from_text(SHAPED), METRIC, {"axes.x.modes.1.frequency_hz": [45, 47]}, n=2)
