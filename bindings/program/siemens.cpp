@@ -48,7 +48,7 @@ void register_siemens(py::module_& module) {
           "called", [](const SiemensOptions& self) { return static_cast<bool>(self.called); }, &set_called,
           "Called with the name of a program in capitals; gives its file and its text, or None.");
   py::class_<SiemensProgram>(module, "SiemensProgram", "A SINUMERIK program in FANUC's words.")
-      .def_readonly("expanded", &SiemensProgram::expanded)
+      .def_readonly("expanded", &SiemensProgram::expanded, "The program in FANUC's words.")
       .def_readonly("names", &SiemensProgram::names, "Words that stand for others of the source, each with that one.");
   module.def(
       "read_siemens",

@@ -7378,7 +7378,9 @@ class SiemensProgram:
     """
     @property
     def expanded(self) -> ExpandedProgram:
-        ...
+        """
+        The program in FANUC's words.
+        """
     @property
     def names(self) -> list[tuple[str, str]]:
         """
