@@ -29,7 +29,7 @@ MACHINE = (("-m --machine", "MACHINE", None, _MACHINE_HELP, NEEDED), _SET)
 MACHINE_OR_NONE = (("-m --machine", "MACHINE", None, _MACHINE_HELP), _SET)
 PROGRAM = (
     "--program", "O1234", program_choice,
-    "program of a multi-program file (default: the first): O1234; /FOLDER/O1234 if several folders hold it; <NAME>; "
+    "program of a multi-program file (default: the first): O1234; /FOLDER/O1234 if several folders have it; <NAME>; "
     "#3: the third; all: every program that no other program calls",
 )  # fmt: skip
 """``all`` is handled in `shapegcode.cli.several`."""
