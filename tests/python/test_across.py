@@ -189,7 +189,7 @@ def test_into_the_machine_file_and_back(files: list[Path], tmp_path: Path) -> No
     names = [str(each) for each in files]
     done = run(tmp_path, "identify", *names, "--axis", "y", "--update", file, "--keep-modes", "x", "--across")
     assert done.returncode == 0, done.stderr
-    assert "what each mode moves" in done.stdout
+    assert "mode shapes, relative" in done.stdout
     said = moves(sg.Machine.load(file))
     assert said[0] is not None and said[0]["z"] == pytest.approx(0.3, abs=0.01)
     assert said[1] is not None and said[1]["x"] == 0.0  # not told from nothing

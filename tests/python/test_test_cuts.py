@@ -513,7 +513,7 @@ def test_bad_arguments_of_the_fit_are_refused(tmp_path: Path, capsys: pytest.Cap
     for key, value, said in (
         ("passes", [], "passes: Tuple should have at least 1 item"),
         ("kind", "bore", "kind: Input should be 'taper', 'corner' or 'interval'"),
-        ("kind", "taper", "the figures in 'about' are not those of a taper"),
+        ("kind", "taper", "the parameters in 'about' are not of a taper"),
         ("axial_depth_mm", 0.0, "axial_depth_mm: Input should be greater than 0"),
         ("spindle_rev_per_min", None, "spindle_rev_per_min: Input should be a valid number"),
         ("passes", [{**side["passes"][0], "start_mm": 9.0}], "pass 1: edge, feeds and ends are inconsistent"),
