@@ -70,7 +70,7 @@ def test_by_axis_that_moves_and_by_axis_that_excites() -> None:
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        ({"axes.y.modes.1.excited_by": {"x": 1.0}}, r"axes\.y\.modes\.1\.excited_by.*share of y"),
+        ({"axes.y.modes.1.excited_by": {"x": 1.0}}, r"axes\.y\.modes\.1\.excited_by.*component along y"),
         ({"axes.y.modes.1.moves": {"y": 0.0}}, r"axes\.y\.modes\.1\.moves.*x, y and z are 0"),
         ({"axes.y.modes.1.moves": {"a": 1.0}}, r"axes\.y\.modes\.1\.moves\.a"),
         ({"axes.y.modes.1.moves": {"z": float("inf")}}, r"axes\.y\.modes\.1\.moves\.z"),
