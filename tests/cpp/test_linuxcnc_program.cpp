@@ -182,9 +182,9 @@ TEST_CASE("what is refused is named with its line") {
   CHECK(message("G1 X[SQRT[-1]]") == "SQRT of -1: it must not be negative");
   CHECK(message("G1 X#<none>") == "parameter #<none> has no value here");
   CHECK(message("G1 X#5061").starts_with("parameter #5061 is known to the machine only"));
-  CHECK(message("G1 &5") == "'&5' is no word");
-  CHECK(message("G1 X(a)2") == "a comment stands inside a word: `X1(a)2` is not X12");
-  CHECK(message("O1 while [0]\nG1") == "O1 WHILE: no ENDWHILE behind it");
+  CHECK(message("G1 &5") == "'&5' is not a word");
+  CHECK(message("G1 X(a)2") == "a comment is inside a word: `X1(a)2` is not X12");
+  CHECK(message("O1 while [0]\nG1") == "O1 WHILE: no ENDWHILE after it");
   CHECK(message("o1 sub\no1 call\no1 endsub\no1 call").starts_with("subroutines are nested more than 10 deep"));
   CHECK(message("M3 M5") == "M3 and M5 in one block");
   CHECK(message("G1 X\xc4") == "a value is expected at '\xc3\xa4'");  // Latin-1 in, UTF-8 out

@@ -160,7 +160,7 @@ def test_macros_are_fanucs() -> None:
         ("G83 Z-1. R1. I1. J.1 K.2 F10.", "changes the pecks"), ("G83 Z-1. R1. Q.5 I-.5", "changes the pecks"),
         ("G83 Z-1. R1. Q.5 K#5", "changes the pecks"), ("G84 Z-1. R1. J[2] F10.", "changes the pecks"),
         ("G82 Z-1. R1. P#1", "the dwell of G82 by a variable"), ("G89 Z-1. R1. P[#1]", "the dwell of G89"),
-        ("M97 L2 P100", "M97 takes an N number right behind it"), ("M97 P#1", "M97 takes an N number"),
+        ("M97 L2 P100", "M97 takes an N number directly after it"), ("M97 P#1", "M97 takes an N number"),
         ("M96 P10 Q8", "if an input is not set"),
     ],
 )  # fmt: skip

@@ -71,13 +71,13 @@ def test_expressions(expression: str, value: float) -> None:
     [
         ("G1 X#<nothing>", "#<nothing> has no value"), ("G1 X[1/0]", "division by zero"), ("G1 X[SQRT[-1]]", "SQRT"),
         ("G1 X[1 + ]", "a value is expected"), ("G1 X[1", "operator or ]"), ("G1 X1 X2", "X is given twice"),
-        ("G1 X1 X[2]", "X stands twice"),
+        ("G1 X1 X[2]", "X is twice"),
         ("G1 X#5061", "known to the machine only"), ("#5220 = 2", "LinuxCNC's own"), ("G1 X[0 ** -1]", "no value"),
-        ("O1 endwhile", "without WHILE"), ("O1 while [0]", "no ENDWHILE behind it"), ("O1 if", "one value in brackets"),
+        ("O1 endwhile", "without WHILE"), ("O1 while [0]", "no ENDWHILE after it"), ("O1 if", "one value in brackets"),
         ("O<none> call", "subroutine O<none> is neither in the file"), ("O1 return", "outside of a subroutine"),
         ("O1 while [1]\n#1=[#1+1]\nO1 endwhile", "does not seem to end"), ("G1 G2 X1", "G1 and G2 in one block"),
         ("O1 sub\nO1 call\nO1 endsub\nO1 call", "nested more than 10 deep"), ("G80\nX5", "axis words while no G code"),
-        ("G1 X(a (b) c)1", "a comment does not close"), ("G1 &5", "'&5' is no word"),
+        ("G1 X(a (b) c)1", "a comment does not close"), ("G1 &5", "'&5' is not a word"),
         ("G93 G1 X1 F1\nX3", "a move in G93 without F"),
     ],
 )  # fmt: skip
@@ -91,15 +91,15 @@ def test_what_cannot_be_read(body: str, message: str) -> None:
     ("body", "message"),
     [
         ("G1 X1e3", "E3 and no word in the block that uses it"), ("G1 X5 D3", "D3"), ("G1 X5 H3", "H3"),
-        ("G1 X5\nX6 I3", "I3"), ("G2 X10 I5 K3", "K is no centre of an arc in G17"), ("G1 X5 P3", "P3"),
-        ("G18\nG2 X10 I5 J1", "J is no centre of an arc in G18"), ("G90.1\nG2 X10 I5 J0 K3", "K is no centre"),
+        ("G1 X5\nX6 I3", "I3"), ("G2 X10 I5 K3", "K is not a centre word of an arc in G17"), ("G1 X5 P3", "P3"),
+        ("G18\nG2 X10 I5 J1", "J is not a centre word of an arc"), ("G90.1\nG2 X10 I5 J0 K3", "K is not a centre"),
         ("G81 X1 Z-1 R1 P3", "P3"), ("G81 X1 Z-1 R1\nX2 Q3", "Q3"), ("G82 X1 Z-1 R1 P1 K3", "K3"),
         ("G2 X10 I5 L2", "L2"), ("G92 X1 P2", "P2"), ("G54 P2", "P2"), ("G64 P1 R2", "R2"), ("G49 H1", "H1"),
         ("G81 X1 Z-1 R1 A5", "A in a drilling"), ("M3 M5", "M3 and M5 in one block"), ("M7 M8", "M7 and M8"),
-        ("T1.5", "no whole number"), ("S-5", "negative"),
-        ("G1 X1(a)2", "a comment stands inside a word"), ("G1 X1(a).5", "a comment stands"), ("G1 Y(a)2", "a comment"),
-        ("#1(a)=5", "a comment stands"), ("#1=[1(a)+1]", "a comment stands"), ("G1 X5 (a) 3", "a comment stands"),
-        ("G1 X5\x0bY3", "is no word"),
+        ("T1.5", "not a whole number"), ("S-5", "negative"),
+        ("G1 X1(a)2", "a comment is inside a word"), ("G1 X1(a).5", "a comment is inside"), ("G1 Y(a)2", "a comment"),
+        ("#1(a)=5", "a comment is inside"), ("#1=[1(a)+1]", "a comment"), ("G1 X5 (a) 3", "a comment is inside"),
+        ("G1 X5\x0bY3", "is not a word"),
     ],
 )  # fmt: skip
 def test_what_linuxcnc_refuses_is_not_read_otherwise(body: str, message: str, tmp_path: Path) -> None:
@@ -222,7 +222,7 @@ def test_tool_table(unit: str, mm: float, tmp_path: Path) -> None:
     with pytest.raises(sg.ProgramError, match=r"part\.ngc:4:1: G43 H7: .*other\.tbl has no tool 7"):
         read("G43 H7", tmp_path, **keys)
     (tmp_path / "other.tbl").write_text("T1 P1 Z3\nZ4\n")
-    with pytest.raises(sg.ProgramError, match=r"other\.tbl:2:1: 'Z4' is no row"):
+    with pytest.raises(sg.ProgramError, match=r"other\.tbl:2:1: 'Z4' is not a row"):
         read("G43 H1", tmp_path, **keys)
 
 
@@ -243,9 +243,9 @@ def test_block_skip() -> None:
         ("G38.2 Z-1", "a probing move"), ("G41 D1", "cutter compensation"), ("G42.1 D5", "cutter compensation"),
         ("G43.2 H1", "a second tool length"), ("G76 P1", "a threading cycle"), ("G87 Z1", "back boring"),
         ("G88 Z1", "waits for the operator"), ("G71 Q1", "a turning cycle"), ("G17.1", "the UV plane"),
-        ("M66 P0", "wait for an input"), ("G1 U1", "an axis beside"), ("G96 S100 D1000", "constant surface speed"),
+        ("M66 P0", "wait for an input"), ("G1 U1", "a further axis"), ("G96 S100 D1000", "constant surface speed"),
         ("G10 L10 P1 Z1", "G10 L10 is not read"), ("G10 L2 P1 R5", "turns the work coordinate system"),
-        ("G68 X0 Y0 R5", "no G code of LinuxCNC"), ("G54.1 P1", "a program for FANUC"),
+        ("G68 X0 Y0 R5", "not a G code of LinuxCNC"), ("G54.1 P1", "a program for FANUC"),
         ("G53 G2 X1 I1", "G0 or G1 only"),
     ],
 )  # fmt: skip
@@ -291,7 +291,7 @@ def test_a_dwell_that_nothing_tells_is_said_with_both_meanings() -> None:
 
 def test_a_called_file_is_read_as_strictly_as_the_program(tmp_path: Path) -> None:
     (tmp_path / "O100.nc").write_text("O100\nG1 X5. ; Y9.\nM99\n")
-    with pytest.raises(sg.ProgramError, match=r"O100\.nc:2:1: words behind `;`"):
+    with pytest.raises(sg.ProgramError, match=r"O100\.nc:2:1: words after `;`"):
         sg.Program.from_text("O1\nG21 G0 X0. Y0.\nF100.\nM98 P100\nM30\n", machine_with(), folder=tmp_path)
     (tmp_path / "hole.ngc").write_bytes(b"\xef\xbb\xbfo<hole> sub\r\nG1 X#1\r\no<hole> endsub\r\n")
     assert ends(read("o<hole> call [5]", tmp_path))[-1][0] == 5.0
@@ -310,7 +310,7 @@ def test_an_empty_program_ends_in_no_traceback(dialect: str) -> None:
 
 
 def test_an_o_word_behind_a_slash_is_refused_by_name() -> None:
-    with pytest.raises(sg.ProgramError, match=r"^part\.ngc:4:1: an O word behind `/`"):
+    with pytest.raises(sg.ProgramError, match=r"^part\.ngc:4:1: an O word after `/`"):
         read("/O1 repeat [2]\nG91 G1 X1\n/O1 endrepeat")
 
 
@@ -327,7 +327,7 @@ def test_words_behind_a_semicolon_are_neither_executed_nor_left_out_unsaid(diale
     machine_ = machine_with({"controller.dialect": dialect})
     head = "G21\nG0 X0. Y0.\nF100.\n"
     for line in ("G1 X10. ; G1 Y5.", "; Y5.", "G1 X10. (A) ;;Y5."):
-        with pytest.raises(sg.ProgramError, match=r"^a\.nc:4:1: words behind `;`: FANUC begins a block there"):
+        with pytest.raises(sg.ProgramError, match=r"^a\.nc:4:1: words after `;`: FANUC begins a block there"):
             sg.Program.from_text(f"{head}{line}\nM30\n", machine_, source="a.nc")
     for line in ("G1 X10.;", "G1 X10.; (Y5.)", "G1 X10.;; \r", "(A; Y5.)\nG1 X10.;", "G1 X10.\n%;"):
         program = sg.Program.from_text(f"{head}{line}\nM30\n", machine_, source="a.nc")

@@ -135,7 +135,7 @@ def test_what_convert_writes_for_siemens_is_read_back(name: str) -> None:
 
 def test_a_step_behind_a_tool_length_is_refused() -> None:
     """Whether the control adds the length to it is a setting: SD42442."""
-    with pytest.raises(sg.ProgramError, match="Z incrementally behind a change of its offset"):
+    with pytest.raises(sg.ProgramError, match="Z incrementally after a change of its offset"):
         read(for_siemens("TEST_G91.NC")[1])
 
 
@@ -443,7 +443,7 @@ BAD = {
     "G58 X5": (4, ["G58", "TRANS"]),
     "G999": (4, ["G999"]),
     "NOWHERE": (4, ["NOWHERE", "NOWHERE.SPF"]),
-    "GOTOF NOWHERE": (4, ["GOTOF NOWHERE", "behind"]),
+    "GOTOF NOWHERE": (4, ["GOTOF NOWHERE", "after"]),
     "BEHIND: X1\nGOTOF BEHIND": (5, ["GOTOF BEHIND"]),
     "R1=0\nGOTOF INSIDE\nIF R1==0\nINSIDE: X1\nENDIF": (5, ["INSIDE"]),
     "IF R1==1\nX1": (4, ["IF is never closed", "ENDIF"]),

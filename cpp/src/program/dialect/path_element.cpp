@@ -158,7 +158,7 @@ PathElement tangential_arc(const Vector3& start, const Vector3& end, const Vecto
   }
   const Complex seen = chord * std::conj(ahead) / std::abs(ahead);  // along the direction, and to its left
   if (std::abs(seen.imag()) <= 1e-9 * std::abs(chord)) {
-    if (seen.real() < 0.0) refuse("CT to a point straight behind: no circle leads there");
+    if (seen.real() < 0.0) refuse("CT to a point directly opposite to the direction: no circle leads there");
     return {.start = start, .end = end, .centre = {}, .plane = 17, .sweep_rad = 0.0};
   }
   const double chord_size = std::abs(chord);

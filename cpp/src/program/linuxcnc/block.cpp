@@ -45,7 +45,7 @@ std::string without_comments(std::string_view line, std::vector<std::string>& co
       code += comment_mark;
     }
   };
-  const auto refuse_comment = [] { refuse("a comment does not close, or stands inside another one"); };
+  const auto refuse_comment = [] { refuse("a comment does not close, or is inside another one"); };
   if (has_comments && line.find(comment_mark) != line.npos) refuse_comment();
   for (std::size_t i = 0; i < line.size();) {
     const char c = line[i];
@@ -65,7 +65,7 @@ std::string without_comments(std::string_view line, std::vector<std::string>& co
       ++i;
     }
   }
-  if (in_a_word) refuse("a comment stands inside a word: `X1(a)2` is not X12");
+  if (in_a_word) refuse("a comment is inside a word: `X1(a)2` is not X12");
   if (has_comments) std::erase(code, comment_mark);
   return code;
 }
@@ -73,7 +73,7 @@ std::string without_comments(std::string_view line, std::vector<std::string>& co
 void read_block(std::string_view line, ParameterNames& names, Block& block) {
   const std::string code = without_comments(line, block.comments);
   block.skips = code.starts_with('/');
-  if (code.starts_with("/o")) refuse("an O word behind `/`: it is not read; take the `/` away, or the line");
+  if (code.starts_with("/o")) refuse("an O word after `/` is not read; remove the `/`, or the line");
   ValueReader reader(std::string_view(code).substr(block.skips ? 1 : 0), block.code, names);
   std::uint32_t seen = 0;
   while (!reader.is_done()) {
@@ -82,11 +82,11 @@ void read_block(std::string_view line, ParameterNames& names, Block& block) {
       block.settings.push_back(reader.setting());
       continue;
     }
-    if (!is_word_letter(letter)) refuse(quoted_begin(reader.left()) + " is no word");
+    if (!is_word_letter(letter)) refuse(quoted_begin(reader.left()) + " is not a word");
     reader.skip();
     const std::uint32_t bit = 1U << place_of(letter);
     if ((seen & bit) != 0 && letter != 'g' && letter != 'm') {
-      refuse(fmt::format("{} stands twice in a block", upper(letter)));
+      refuse(fmt::format("{} is twice in a block", upper(letter)));
     }
     seen |= bit;
     block.words.push_back({letter, reader.value()});

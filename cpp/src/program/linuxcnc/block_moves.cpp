@@ -102,7 +102,7 @@ void BlockRunner::run_move(const WordValues& words, std::string& codes, bool is_
     flush(codes);
     sync();
     written_motion_.reset();
-    if (modes.motion > 10) refuse("G53 stands with G0 or G1 only");
+    if (modes.motion > 10) refuse("G53 is read with G0 or G1 only");
     const std::optional<WordValues> in_program = offsets_.in_program(values, modes.motion == 0);
     if (!in_program) return;
     values = *in_program;
@@ -141,7 +141,7 @@ std::string BlockRunner::feed_word(const WordValues& values) {
 WordValues BlockRunner::cartesian(const WordValues& values) const {
   if (!values.has_any(polar)) return values;
   if (state_.modes.plane != 170 || values.has_any(letter_set("xy"))) {
-    refuse("polar words @ and ^ stand in G17, without X and Y");
+    refuse("polar words @ and ^ are read in G17 only, without X and Y");
   }
   if (!state_.position[0] || !state_.position[1]) {
     refuse("the position of X and Y is not known, from which @ and ^ go on");

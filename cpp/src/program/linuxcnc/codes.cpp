@@ -126,7 +126,7 @@ std::string_view refused_code(std::int64_t code) {
     case 421:
       return compensation;
     case 432:
-      return "a second tool length offset beside the first";
+      return "a second tool length offset added to the first";
     case 700:
     case 710:
     case 711:
@@ -256,10 +256,10 @@ void BlockWords::sort() {
   values = {};
   for (const auto& [letter, value] : words) {
     if (letter == 'g') {
-      if (!is_whole(value * 10.0, 1e-3) || value < 0.0) refuse(fmt::format("G{:g} is no G code of LinuxCNC", value));
+      if (!is_whole(value * 10.0, 1e-3) || value < 0.0) refuse(fmt::format("G{:g} is not a G code of LinuxCNC", value));
       codes.push_back(rounded(value * 10.0));
     } else if (letter == 'm') {
-      if (!is_whole(value, 1e-4) || value < 0.0) refuse(fmt::format("M{:g} is no M code of LinuxCNC", value));
+      if (!is_whole(value, 1e-4) || value < 0.0) refuse(fmt::format("M{:g} is not an M code of LinuxCNC", value));
       functions.push_back(rounded(value));
     } else if (letter != 'n') {
       values.set(letter, value);
@@ -272,13 +272,14 @@ GroupCodes by_group_of(const BlockWords& block) {
     if (const std::string_view what = refused_code(code); !what.empty()) {
       refuse(fmt::format("{} is {}: it is not read", code_text(code), what));
     }
-    if (!group_of(code)) refuse(code_text(code) + " is no G code of LinuxCNC");
+    if (!group_of(code)) refuse(code_text(code) + " is not a G code of LinuxCNC");
   }
   if (std::ranges::find(block.functions, waits_for_input) != block.functions.end()) {
     refuse("M66 is a wait for an input: its result, #5399, only the machine knows: it is not read");
   }
   if (const char letter = block.values.first_of(letter_set("uvw")); letter != '\0') {
-    refuse(fmt::format("{} is an axis beside X, Y, Z, and another thing on FANUC: it is not read", upper(letter)));
+    refuse(fmt::format("{} is a further axis on LinuxCNC, and has another meaning on FANUC: it is not read",
+                       upper(letter)));
   }
   if (block.values.get('$', 0.0) != 0.0) refuse("$ selects another spindle: it is not read");
   GroupCodes found;
@@ -311,12 +312,13 @@ void refuse_unused(const Modes& modes, const GroupCodes& codes, const BlockWords
   const int plane = codes.get(Group::plane).value_or(modes.plane);
   const char normal_centre = centre_letters[dialect::axes_of(plane / 10).normal];
   if (motion && is_arc(*motion) && values.has(normal_centre)) {
-    refuse(fmt::format("{} is no centre of an arc in {}: LinuxCNC refuses it", upper(normal_centre), code_text(plane)));
+    refuse(fmt::format("{} is not a centre word of an arc in {}: LinuxCNC refuses it", upper(normal_centre),
+                       code_text(plane)));
   }
   if (const char axis = values.first_of(letter_set("abc")); motion && is_cycle(*motion) && axis != '\0') {
     refuse(fmt::format("{} in a drilling cycle: LinuxCNC refuses it", upper(axis)));
   }
-  if (values.has('t') && !is_whole(values['t'], 1e-4)) refuse(fmt::format("T{:g} is no whole number", values['t']));
+  if (values.has('t') && !is_whole(values['t'], 1e-4)) refuse(fmt::format("T{:g} is not a whole number", values['t']));
   if (values.get('s', 0.0) < 0.0) refuse(fmt::format("S{:g} is negative", values['s']));
   refuse_two_functions(block.functions);
 }

@@ -66,7 +66,7 @@ void Interpreter::control(std::size_t index, OLine& line) {
     case Keyword::endif:
       return;
     default:
-      refuse(named(line) + " is no keyword of LinuxCNC");
+      refuse(named(line) + " is not a keyword of LinuxCNC");
   }
 }
 
@@ -90,8 +90,7 @@ void Interpreter::run_while(std::size_t index, OLine& line) {
   if (!holds || !begin) return;
   if (broke_) {
     lines_.note(static_cast<std::uint32_t>(index + 1),
-                "a DO loop behind a BREAK: read as documented; LinuxCNC 2.9.0~pre1 runs it once only",
-                "DO behind BREAK");
+                "a DO loop after a BREAK: read as documented; LinuxCNC 2.9.0~pre1 runs it once only", "DO after BREAK");
   }
   next_ = *begin + 1;
 }
@@ -123,7 +122,7 @@ std::size_t Interpreter::behind(std::size_t index, const OLine& line, std::initi
   if (place) return *place;
   std::string all;
   for (const Keyword keyword : keywords) all += (all.empty() ? "" : " OR ") + uppered(text_of(keyword));
-  refuse(fmt::format("{}: no {} behind it", named(line), all));
+  refuse(fmt::format("{}: no {} after it", named(line), all));
 }
 
 std::size_t Interpreter::loop_end(std::size_t index, const OLine& line) {
@@ -187,7 +186,7 @@ std::pair<SourceFile*, std::size_t> Interpreter::subroutine(const std::string& l
   }
   SourceFile& file = load(label);
   const auto line = file.find(label, keyword);
-  if (!line) refuse(fmt::format("{} holds no O{} {}", file.name(), shown(label), uppered(text_of(keyword))));
+  if (!line) refuse(fmt::format("{} contains no O{} {}", file.name(), shown(label), uppered(text_of(keyword))));
   return {&file, *line};
 }
 
@@ -197,9 +196,9 @@ SourceFile& Interpreter::load(const std::string& label) {
   const std::string name = label.substr(begin, label.find_last_not_of("<>") + 1 - begin);
   auto found = options_.find_subroutine ? options_.find_subroutine(name) : std::nullopt;
   if (!found) {
-    refuse(
-        fmt::format("subroutine O{} is neither in the file nor is there {}.ngc beside it or in input.program_folders",
-                    shown(label), shown(name)));
+    refuse(fmt::format(
+        "subroutine O{} is neither in the file nor is there {}.ngc in its folder or in input.program_folders",
+        shown(label), shown(name)));
   }
   const std::uint32_t index = lines_.add_file(found->first);
   SourceFile& file = *(files_[label] = std::make_unique<SourceFile>(found->first, found->second, index));

@@ -138,7 +138,7 @@ void OffsetCodes::local(const WordValues& values) {
     if (!values.has(axis_letters[axis])) continue;
     const double offset = values[axis_letters[axis]] * state_.unit_mm();
     if (state_.g92[axis] != 0.0 && !state_.g52) {
-      refuse("G52 behind G92: both set one offset on LinuxCNC, and two on FANUC");
+      refuse("G52 after G92: both set one offset on LinuxCNC, and two on FANUC");
     }
     state_.shift(axis, state_.g92[axis], offset);
     state_.g92[axis] = offset;
@@ -151,7 +151,7 @@ void OffsetCodes::local(const WordValues& values) {
 }
 
 void OffsetCodes::set_position(const WordValues& values) {
-  if (state_.g52) refuse("G92 behind G52: both set one offset on LinuxCNC, and two on FANUC");
+  if (state_.g52) refuse("G92 after G52: both set one offset on LinuxCNC, and two on FANUC");
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!values.has(axis_letters[axis])) continue;
     const double to = values[axis_letters[axis]] * state_.unit_mm();

@@ -198,7 +198,7 @@ std::shared_ptr<const Block> read_block(std::string_view line) {
   if (name.empty() || !read_statement(scan, name, *block)) {
     read_words(scan, block->pool, block->words);
   } else if (!scan.is_done()) {
-    throw scan.error(fmt::format("{} behind {}: the block must end here", scan.rest(), name));
+    throw scan.error(fmt::format("{} after {}: the block must end here", scan.rest(), name));
   }
   return block;
 }

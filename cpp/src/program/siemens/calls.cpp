@@ -42,7 +42,7 @@ void Run::call_named(const std::string& name, const Word& word) {
   std::string own = capitals(std::string_view(name).substr(folder == std::string::npos ? 0 : folder + 1));
   if (own.starts_with("_N_")) own.erase(0, 3);
   const Program found = find(own);
-  if (found == nullptr) throw word.error(fmt::format("\"{}\": no such program is beside this one", name));
+  if (found == nullptr) throw word.error(fmt::format("\"{}\": no such program is in the folder of this one", name));
   call(found, found->name, word.column, {});
 }
 

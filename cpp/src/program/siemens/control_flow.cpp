@@ -66,7 +66,7 @@ std::size_t Run::jump(Flow& flow, const Jump& jump, std::size_t index, std::size
   if (const auto found = flow.program.target(jump, index, ordinal)) return *found;
   if (jump.kind == JumpKind::quiet) return index + 1;
   constexpr std::array<std::pair<std::string_view, std::string_view>, 3> ways = {
-      {{"GOTO", "anywhere near"}, {"GOTOF", "behind"}, {"GOTOB", "before"}}};
+      {{"GOTO", "anywhere near"}, {"GOTOF", "after"}, {"GOTOB", "before"}}};
   const auto& [command, where] = ways[static_cast<std::size_t>(jump.kind)];
   throw error_at(jump.column, fmt::format("{} {}: no such label or block {} it, outside of other IF and loops", command,
                                           jump.target, where));
@@ -100,7 +100,7 @@ void Run::define(const Block& block) {
 void Run::set_counter(const Block& block, const Value& value) {
   if (!knows(block.name)) {
     throw error_at(block.column,
-                   fmt::format("{} of FOR is no variable of this program: DEF must define it before", block.name));
+                   fmt::format("{} of FOR is not a variable of this program: DEF must define it before", block.name));
   }
   assign(block.name, worked_out(block.index), value, block.column);
 }

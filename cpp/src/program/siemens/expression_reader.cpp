@@ -180,7 +180,7 @@ class ExpressionReader {
     if (name[0] == '$') {
       throw scan_.error(fmt::format("{}: system variables are not read, their values are in the control", name), begin);
     }
-    if (scan_.peek() == '(') throw scan_.error(fmt::format("{}( ) is no function that is read", name), begin);
+    if (scan_.peek() == '(') throw scan_.error(fmt::format("{}( ) is not a function that is read", name), begin);
     const std::vector<std::uint32_t> index = indices();
     return pool_.add_variable(name, index, scan_.column(begin));
   }

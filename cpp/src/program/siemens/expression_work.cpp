@@ -95,7 +95,7 @@ Value compared(Operation operation, const Value& a, const Value& b) {
   for (const Value& each : given) values += fmt::format("{}{:g}", values.empty() ? "" : ", ", each.number);
   const std::string_view name = name_of(function);
   throw error_at(column,
-                 fmt::format("{}({}) is no number: the value lies outside of what {} takes", name, values, name));
+                 fmt::format("{}({}) is not a number: the value is outside the domain of {}", name, values, name));
 }
 
 /// Of functions whose value is real; what is none is not finite.

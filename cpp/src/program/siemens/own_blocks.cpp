@@ -124,8 +124,7 @@ void BlockWords::pole(const Word& first, const Word& code, std::span<const Word*
     } else if ((word->id == WordId::ap || word->id == WordId::rp) && word->value) {
       polar_word(*word, Mode::none, given);
     } else if (!is_one_of(word->id, {WordId::g17, WordId::g18, WordId::g19, WordId::g90, WordId::g91})) {
-      throw word->error(
-          fmt::format("{} beside {}: axes of the plane or AP= and RP= is expected", word->name, code.name));
+      throw word->error(fmt::format("{} with {}: axes of the plane or AP= and RP= is expected", word->name, code.name));
     }
   }
   path_.define_pole(110 + static_cast<int>(code.id) - static_cast<int>(WordId::g110), given);
@@ -142,7 +141,7 @@ void BlockWords::dwell(std::span<const Word* const> others) {
       }
       seconds = number_of_word(*word) * 60.0 / spindle_;
     } else {
-      throw word->error(fmt::format("{} beside G4: F in seconds or S in turns is expected, alone", word->name));
+      throw word->error(fmt::format("{} with G4: only F in seconds or S in revolutions is expected", word->name));
     }
     if (seconds < 0.0) throw word->error(fmt::format("G4 {}{:g}: it must be 0 or more", word->name, seconds));
     path_.put("G04X" + dialect::number_text(rounded_to(seconds, 4)));
@@ -161,7 +160,7 @@ void BlockWords::reference(const Word& code, std::span<const Word* const> others
     } else if (word->name != "FP" &&
                !is_one_of(word->id, {WordId::g0, WordId::g90, WordId::g91, WordId::g53, WordId::g153, WordId::supa})) {
       throw word->error(
-          fmt::format("{} beside {}: the axes that go there must be alone in this block", word->name, code.name));
+          fmt::format("{} with {}: only the axes that move there may be in this block", word->name, code.name));
     }
   }
   std::string sorted = axes;

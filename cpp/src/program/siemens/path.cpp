@@ -195,7 +195,7 @@ std::optional<Vector3> SiemensPath::direction() const {
 void SiemensPath::polar_end(Given& given) {
   const PlaneAxes axes = axes_of(modes.plane);
   if (given.axes.find(axes.first) != nullptr || given.axes.find(axes.second) != nullptr) {
-    throw given.error("AP=, RP= beside an axis of the plane: leave one of them out");
+    throw given.error("AP=, RP= with an axis of the plane: remove one of them");
   }
   for (const PolarWord& word : given.polar) {
     if (word.is_angle && word.mode == Mode::none && modes.incremental) {
@@ -234,7 +234,7 @@ void SiemensPath::move(Given& given) {
     const Coordinate& word = given.axes.coordinate(k);
     if (word.from_start && shifted_[axis]) {
       throw error_at(word.column,
-                     fmt::format("{} incrementally behind a change of its offset: whether the control adds that "
+                     fmt::format("{} incrementally after a change of its offset: whether the control adds that "
                                  "depends on a setting (SD42440, SD42442); it must be programmed absolutely before",
                                  "XYZ"[axis]));
     }

@@ -64,7 +64,7 @@ double SiemensPath::distance_of(const Given& given, const Vector3& end, std::siz
   }
   if (std::isnan(at_[k])) {
     throw given.error(
-        fmt::format("{} absolutely beside an axis whose position is not known: in a block of its own", "XYZ"[axis]));
+        fmt::format("{} absolute with an axis whose position is not known: a separate block is needed", "XYZ"[axis]));
   }
   const double step = on_grid(end)[k] - on_grid(at_)[k];
   at_[k] = end[k];
@@ -146,7 +146,7 @@ PathElement SiemensPath::arc_in_plane(const Given& given, const Vector3& here, c
     const int axis = given.centre.axis(k);
     const Coordinate& word = given.centre.coordinate(k);
     if (static_cast<std::size_t>(axis) == axes.normal) {
-      throw error_at(word.column, fmt::format("{} lies across the plane G{}: it must be left out",
+      throw error_at(word.column, fmt::format("{} is perpendicular to the plane G{}: it must be left out",
                                               "IJK"[static_cast<std::size_t>(axis)], modes.plane));
     }
     about[axis] = word.from_start ? here[axis] + word.value : word.value;

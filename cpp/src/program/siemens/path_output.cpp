@@ -174,7 +174,7 @@ double SiemensPath::constant_feed(const Given& given, double length_mm) const {
         fmt::format("{} without a feed: F must be programmed before, more than 0", name_of(modes.motion)));
   }
   if (modes.feed_mode != 93) return *modes.feed;
-  if (!given.has_feed) throw given.error("G93 without F: every block with a feed must hold one");
+  if (!given.has_feed) throw given.error("G93 without F: every block with a feed must contain one");
   if (std::isnan(length_mm)) {
     throw given.error("G93 and a start that is not known: its axes must be programmed before");
   }

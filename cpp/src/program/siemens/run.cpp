@@ -80,7 +80,7 @@ Value Run::value_of(const std::string& name, std::span<const Value> index, std::
   if (const auto found = variables.find(name); found != variables.end()) return found->second.read(name, index, column);
   const std::optional<std::int64_t> parameter = parameter_number(name, index, column);
   if (!parameter) {
-    throw error_at(column, name + " is no variable of this program: DEF must define it before");
+    throw error_at(column, name + " is not a variable of this program: DEF must define it before");
   }
   const auto found = r_.find(*parameter);
   if (found == r_.end()) {
@@ -202,7 +202,7 @@ End Run::words(const Block& block) {
   for (const Word& word : others) {
     if (word.name != "P") {
       throw word.error(
-          fmt::format("{} beside the call of {}: the call must be in a separate block", word.name, first.name));
+          fmt::format("{} with the call of {}: the call must be in a separate block", word.name, first.name));
     }
   }
   const auto count_word = std::ranges::find_if(others, [](const Word& word) { return bool(word.value); });

@@ -109,7 +109,7 @@ class StatementReader {
     }
     if (command.empty()) {
       throw scan_.error(
-          fmt::format("{} behind the condition: GOTOF, GOTOB, GOTO or GOTOC must follow, or nothing", scan_.rest()));
+          fmt::format("{} after the condition: GOTOF, GOTOB, GOTO or GOTOC must follow, or nothing", scan_.rest()));
     }
     found.target = target();
     if (found.target.empty()) {
@@ -165,7 +165,7 @@ class StatementReader {
     block_.kind = BlockKind::again;
     block_.name = scan_.take_name();
     if (!scan_.is_done() && !is_count()) {
-      throw scan_.error(fmt::format("{} behind REPEAT {}: P= and a number must follow; an end label is not read",
+      throw scan_.error(fmt::format("{} after REPEAT {}: P= and a number must follow; an end label is not read",
                                     scan_.rest(), block_.name));
     }
     std::vector<Word> words;
@@ -208,7 +208,7 @@ class StatementReader {
       if (found.empty() && scan_.take_word(each)) found = each;
     }
     if (found.empty()) found = scan_.rest_or("nothing");
-    throw scan_.error(fmt::format("{} behind {}: REAL, INT, BOOL or STRING is expected", found, what));
+    throw scan_.error(fmt::format("{} after {}: REAL, INT, BOOL or STRING is expected", found, what));
   }
 
   bool procedure() {

@@ -106,7 +106,7 @@ def _lines(source: str, file: str, notes: dict[str, Note]) -> tuple[list[str], d
 
 
 def _refuse_in_cycles(code: str, file: str) -> None:
-    """Words of drilling cycles, which hold for the holes behind them too, that mean another thing on FANUC."""
+    """Modal words of drilling cycles whose meaning differs on FANUC."""
     cycle = ""
     for number, whole_line in enumerate(_LINE.findall(code), start=1):
         line = whole_line.partition(";")[0]
@@ -147,7 +147,7 @@ def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
     words = _OLD_OFFSET.sub(lambda match: f"G54.1P{int(match[1]) - 109}", words)
     words = _M97.sub(lambda match: f"M98P{_CALL_BASE + int(match[1])}{match[2].strip() or 'L1'}", words)
     if (unread := _UNREAD_M97.search(words)) is not None:
-        raise ValueError(f"{unread[0]} takes an N number right behind it (M97 P1000): it is not read otherwise")
+        raise ValueError(f"{unread[0]} takes an N number directly after it (M97 P1000): it is not read otherwise")
     if _M98.search(words) is not None and re.search(r"L[ \t]*[\d#\[]", words, re.IGNORECASE) is None:
         # Five digits are a program's number, not FANUC's repetitions and four digits.
         words = _PROGRAM.sub(lambda match: f"{match[0]}L1", words)
@@ -206,13 +206,13 @@ def _with_dwell(words: str, codes: list[str], note: Callable[[str, str], None]) 
     )
     milliseconds = round(seconds * 1e3)
     if "4" not in codes and abs(milliseconds - seconds * 1e3) > 1e-6:
-        raise ValueError(f"P{match[1]} is no whole number of milliseconds, in which FANUC's cycles wait")
+        raise ValueError(f"P{match[1]} is not a whole number of milliseconds, the unit of FANUC's cycles")
     word = f"X{match[1]}" if "4" in codes else f"P{milliseconds}"
     return words[: match.start()] + word + words[match.end() :]
 
 
 def _with_subprograms(lines: list[str], called: Mapping[int, int], file: str) -> tuple[list[str], list[int]]:
-    """The lines, and behind them each part that M97 calls as a program of its own: from its N number to M99."""
+    """The lines, then each part that M97 calls as a separate program: from its N number to M99."""
     end = "\r\n" if lines[0].endswith("\r\n") else "\n"
     plain = [_COMMENT.sub("", line) for line in lines]
     begins = {int(match[1]): index for index, line in reversed([*enumerate(plain)]) if (match := _N.match(line))}
@@ -223,7 +223,7 @@ def _with_subprograms(lines: list[str], called: Mapping[int, int], file: str) ->
         head[-1] += end
     numbers = [*range(1, last + 1)]
     first = next((index for index, line in enumerate(plain) if line.strip() not in {"", "%"}), 0)
-    if _O.match(plain[first]) is None:  # behind a program without a number another one would be its own
+    if _O.match(plain[first]) is None:  # after a program without a number another one would be part of it
         head.insert(first, f"O{_CALL_BASE}{end}")
         numbers.insert(first, first + 1)
     for number, call in sorted(called.items()):

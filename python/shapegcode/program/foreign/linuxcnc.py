@@ -136,7 +136,7 @@ def read_tool_table(path: Path, unit: str) -> ToolTable:
             continue
         words = {letter.upper(): float(value) for letter, value in _WORD.findall(code)}
         if words.get("T", _LAST_TOOL + 1.0) > _LAST_TOOL or _WORD.sub("", code).strip():
-            raise refusal(str(path), number, f"{code[:40]!r} is no row of a tool table (T1 P1 Z12.5 D6)")
+            raise refusal(str(path), number, f"{code[:40]!r} is not a row of a tool table (T1 P1 Z12.5 D6)")
         x, y, z = (words.get(axis, 0.0) * factor for axis in "XYZ")
         tools[int(words["T"])] = ToolRow((x, y, z), words.get("D", 0.0) * factor)
     return ToolTable(tools, str(path), unit)

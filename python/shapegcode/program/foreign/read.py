@@ -244,7 +244,7 @@ def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
     found = next((each for each in _BEHIND_SEMICOLON.finditer(data) if each[1]), None) if b";" in data else None
     if found is not None:
         message = (
-            "words behind `;`: FANUC begins a block there, LinuxCNC, a Haas and a Sinumerik have a comment; write a "
+            "words after `;`: FANUC begins a block there, LinuxCNC, a Haas and a Sinumerik have a comment; write a "
             "line end or ( ), or state the control: --set controller.dialect=linuxcnc, haas or siemens"
         )
         raise refusal(source, data.count(b"\n", 0, found.start()) + 1, message)
