@@ -64,7 +64,7 @@ double PathElement::length_mm() const {
 }
 
 Vector3 PathElement::point_at(double share) const {
-  const Vector3 point = start + share * (end - start);
+  Vector3 point = start + share * (end - start);
   if (!centre || share == 0.0 || share == 1.0) return point;
   const Complex first = in_plane(start - *centre, plane);
   const Complex last = in_plane(end - *centre, plane);
