@@ -193,7 +193,8 @@ def test_a_shaped_program_is_as_near_as_the_judge_finds_it(name: str, tmp_path: 
     for kind in ("rapids", "tools", "spindle", "coolant", "offsets", "functions", "stops", "cuts", "cycles", "modal"):
         assert not result.count(kind).differs, result.counts
     assert re.fullmatch(
-        r"(\d+) of \1 rapids, (\d+) of \2 tool calls, (\d+) of \3 offsets unchanged; path within \d+\.\d µm",
+        r"(\d+) of \1 rapids, (\d+) of \2 tool calls, (\d+) of \3 offsets unchanged; "
+        r"programmed paths within \d+\.\d µm of each other",
         result.answer,
     )
     centre = machine.input.arc_centre
@@ -347,7 +348,8 @@ def test_the_command(tmp_path: Path) -> None:
     (tmp_path / "none.nc").write_text("%\nO1\nG1 X1Y\nM30\n%\n")
     same = run(tmp_path, "compare", "a.nc", "a.nc")
     assert same.returncode == 0 and "built-in machine vx500" in same.stdout
-    assert same.stdout.startswith("9 of 9 rapids, 2 of 2 tool calls, 6 of 6 offsets unchanged; path within 0.0 µm")
+    unchanged = "9 of 9 rapids, 2 of 2 tool calls, 6 of 6 offsets unchanged"
+    assert same.stdout.startswith(f"{unchanged}; programmed paths within 0.0 µm of each other")
     assert run(tmp_path, "compare", "a.nc", "b.nc").returncode == 1
     allowed = run(tmp_path, "compare", "a.nc", "b.nc", "-m", "vx500", "--allow", "feeds")
     assert allowed.returncode == 0 and "built-in machine" not in allowed.stdout

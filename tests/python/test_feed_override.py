@@ -153,7 +153,7 @@ def test_the_note_on_the_override_is_about_the_contour_where_that_is_worst() -> 
     conversion = sg.convert(PROGRAMS / "CONTOUR_R.NC", "vx500", shape_all=True)
     notes = {note.topic: note.text for note in conversion.at_the_control}
     override, text = worst_override(conversion)
-    assert f"at {override * 100:.0f} % the contour error of the response {text}" in notes["override"]
+    assert f"at {override * 100:.0f} % the contour error of the machine table {text}" in notes["override"]
 
 
 def test_the_operator_reads_the_worst_position_and_where_to_begin_again() -> None:

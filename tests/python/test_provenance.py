@@ -453,7 +453,7 @@ def test_verdict_rests_on_a_filter_that_nobody_measured() -> None:
     rows = [row for row in judged.conversion.parameter_sensitivity if row.key == "controller.shaped_time_constant_s"]
     (row,) = rows
     assert (row.origin, row.value, row.tested_value) == ("assumed", "0.0 s", "0.024 s")
-    assert row.figure == "contour error of the response"
+    assert row.figure == "contour error of the machine table"
     before, after = (replayed(judged, judged.modes, ms)[0] for ms in (0, 24))
     assert row.figure_um == pytest.approx(before, rel=0.05, abs=0.1)
     assert row.tested_um == pytest.approx(after, rel=0.05)
@@ -473,7 +473,8 @@ def test_verdict_rests_on_a_mode_of_another_machine() -> None:
         for sign in (-1.0, 1.0):
             moved = [replace(m, frequency_hz=m.frequency_hz * (1.0 + sign * percent / 100.0)) for m in x]
             left.append(replayed(judged, [moved, y, z], 0))
-        place = ["contour error of the response", *(f"residual vibration {axis}" for axis in "XYZ")].index(row.figure)
+        figures = ["contour error of the machine table", *(f"residual vibration {axis}" for axis in "XYZ")]
+        place = figures.index(row.figure)
         assert row.tested_um == pytest.approx(max(each[place] for each in left), rel=0.05, abs=0.02)
         assert row.figure_um == pytest.approx(replayed(judged, judged.modes, 0)[place], rel=0.05, abs=0.02)
         assert row.tested_um > 1.2 * row.figure_um

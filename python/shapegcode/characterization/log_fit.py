@@ -459,7 +459,7 @@ def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, floa
 
 
 def _lag_of(records: list[tuple[FloatArray, FloatArray, float]]) -> tuple[float, float]:
-    """Fit position gain (1/s) and remaining lag ratio (1 − f) to all records by least squares."""
+    """Fit position gain (1/s) and remaining lag ratio (1 − feed-forward ratio) to all records by least squares."""
     from scipy.optimize import minimize_scalar
 
     def solve(gain: float) -> tuple[float, float]:

@@ -155,7 +155,7 @@ CONVERT = Interface(
         ("--max-bytes", "N[k|M]", size,
          "largest size of the emitted program, for example 256k: the cuts that gain least are left unchanged"),
         ("--baud", "N", positive,
-         "speed of the serial line: block periods get longer, then cuts are left unchanged"),
+         "speed of the serial line; if too slow, block periods get longer, then cuts are left unchanged"),
         ("--max-blocks-per-second", "N", positive, "blocks per second that the control can read; effect as --baud"),
         ("--feed-schedule", None, bool,
          "first set the feeds so that the shaped program keeps the tool's limits, as `shapegcode feed`; "

@@ -78,7 +78,7 @@ def cluster_of(args: argparse.Namespace) -> Cluster | None:
 
 MODES = (
     ("--keep-modes", "AXES", axes,
-     "keep the modes of these axes, for example XY, though not measured: the file is of the same machine"),
+     "keep the modes of these axes, for example XY, though not measured: the machine file is of this machine"),
     ("--rigid", "AXES", axes, "these axes have no significant vibration mode, for example Z"),
 )  # fmt: skip
 """Options for modes that were not measured on this machine."""
@@ -92,7 +92,7 @@ def cutting(*, required: bool) -> tuple[Row, ...]:
          "number"),
         ("--stock", "S.toml", {"required": required},
          "stock file: shape of the workpiece before the first block (docs/reference/tool_files.md)"),
-        ("--margin", "RATIO", share, "safety margin kept to each limit, for example 3%% (default: 1.5%%)"),
+        ("--margin", "RATIO", share, "safety margin kept to each limit of the tool, for example 3%% (default: 1.5%%)"),
         ("--resolution", "LENGTH", micrometres,
          "grid of the material, for example 50um (default: a hundredth of the tool's diameter)"),
     )  # fmt: skip

@@ -65,7 +65,7 @@ SHAPER = Interface(
          "block period on which the impulses must lie, such as 5ms; may be repeated (default: the machine's, or the "
          "best few)", []),
         ("--continuous", None, bool,
-         "also design in continuous time, not only on the grid of --block-period (default: if no machine is given)"),
+         "design in continuous time, with --block-period on its grids too (default: without -m and --block-period)"),
         ("--family", "NAME", {"action": "extend", "nargs": "+"},
          f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"),
         ("--list-families", None, bool, "list the families with meaning and source, and exit"),

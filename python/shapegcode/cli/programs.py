@@ -219,10 +219,10 @@ def _time(args: argparse.Namespace) -> int:
 
 
 TIME = Interface(
-    "Predicts the cycle time of an unchanged program in closed form, and checks it by computing every set-point: "
-    "cutting, rapids, in-position, dwells, acceleration, tool changes; by tool; the slowest regions and blocks. "
+    "Predicts the cycle time of an unchanged program in closed form, and checks it by computing every set-point. "
+    "Reports cutting, rapids, in-position, dwells, acceleration, tool changes; by tool; slowest regions and blocks. "
     "For a machine calibrated with run logs also the 95 % interval, and which log would narrow it. "
-    "Exit code 1 if closed form and full interpolation differ by more than 0.5 %.",
+    "Exit code 0; 1: closed form and full interpolation differ by more than 0.5 %; 2: bad input.",
     (
         *options.program_input("PROGRAM"),
         ("--override", "RATIO", override,
@@ -231,8 +231,7 @@ TIME = Interface(
          "rapid override, for example 25%% (at most 100%%; default: times.rapid_override_percent); the acceleration of "
          "rapids is unchanged"),
         ("--log-next", "PROGRAM", [None],
-         "a program that could be logged next: the interval that would result; repeatable, "
-         "the best comes first"),
+         "show the interval that a log of this program would give; repeatable, the best comes first"),
         ("--no-full", None, bool, "closed form only, no full interpolation"),
         ("--blocks", None, bool, "write every block into the JSON"),
         ("--csv", "FILE", None, "write one line per block; - for standard output"),
@@ -255,7 +254,7 @@ def _check(args: argparse.Namespace) -> int:
 
 
 CHECK = Interface(
-    "Lists what the control would refuse, several alarms in one run, each with number and position; and those that it "
+    "Lists what the control would refuse, several alarms in one run, each with number and position; and what it "
     "would not run as programmed: stops inside of cuts, blocks shorter than the block time, feeds above the "
     "limits of the axes, program memory, speed of the serial line. Exit code 0: no alarms and no warnings; 1: "
     "warnings; 2: at least one alarm.",

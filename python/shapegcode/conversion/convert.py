@@ -263,7 +263,7 @@ def _rewritten(plan: ConversionPlan, shaped: Shaped, before: Sequence[int]) -> S
 
 
 def _as_it_was(plan: ConversionPlan, shaped: Shaped) -> Shaped:
-    """If nothing was shaped, return the input file instead of its expansion, if it was a single program."""
+    """If nothing was shaped and the input was a single program, return it instead of its expansion."""
     rapids_shaped = shaped.rapids is not None and shaped.rapids.outcome.shaped > 0
     # A foreign program was given in another dialect than the emitted one.
     is_other = plan.program.number is not None or plan.program.foreign is not None

@@ -211,7 +211,7 @@ def _restart_lines(emitted: Program, placed: Sequence[Placed]) -> str:
         number = re.match(rb"N\d+", line.strip())
         named.append(f"{number[0].decode()} (line {at})" if number else f"line {at}")
     more = f" and {len(placed) - len(named)} more" if len(placed) > len(named) else ""
-    return f"here: {', '.join(named)}{more}"
+    return f"cuts begin at {', '.join(named)}{more}"
 
 
 def _lines_from(emitted: Program, number: int) -> Iterator[bytes]:

@@ -185,7 +185,7 @@ class Aims:
 
     @property
     def is_priced(self) -> bool:
-        """True if cuts are shaped for the tightest tolerance within their price: the requested one costs more."""
+        """True if a shaped cut has a looser tolerance than requested: the tightest within its price."""
         return any(not self.reasons[index] for index in self._priced)
 
     def shaped_for_um(self, index: int) -> float:

@@ -53,7 +53,7 @@ Grade = Literal[
 class ChangeProof:
     """Proof of what is unchanged in an emitted program."""
 
-    answer: str  # such as "42 of 42 rapids, 7 of 7 tool calls, 31 of 31 offsets unchanged; path within 12.3 µm"
+    answer: str  # such as "42 of 42 rapids, 7 of 7 tool calls, 31 of 31 offsets unchanged; programmed …"
     counts: tuple[KindCount, ...]  # for each kind that occurs in one of the programs
     path_um: float  # largest distance of the paths of a cut, seen from either; of the command, not of the machine table
     refused: tuple[ProgramDifference, ...]  # differences not explained by shaping; none: proven

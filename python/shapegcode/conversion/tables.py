@@ -178,7 +178,7 @@ def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
 
 
 def _other_command(machine: Machine, unmeasured: Mapping[str, KeyValue], key: str, other_s: float) -> Iterator[_Trial]:
-    """A trial with another time that also changes the set-points; none if it is invalid in a machine file."""
+    """A trial of another time that also changes the set-points; none if measured, or if the time is invalid."""
     with suppress(MachineError):
         if key in unmeasured:
             yield _Trial(unmeasured[key], f"{other_s:g} s", machine.with_values(key, other_s), moves_command=True)
@@ -206,7 +206,7 @@ def _axis_trials(machine: Machine) -> dict[str, _Trial]:
 
 
 def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[Sensitivity, ...]:
-    """Rank axes with unknown modes by the vibration of a usual mode with this program: which to measure first."""
+    """Rank axes with unknown modes, which to measure first: by how much a typical mode there would vibrate."""
     from shapegcode.simulation.simulate import simulate
 
     unknown = unknown_axes(machine)

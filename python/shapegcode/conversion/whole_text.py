@@ -337,7 +337,7 @@ _STATE_FIELDS = (
 
 
 def read_back(parts: list[bytes], placed: Sequence[Placed], machine: Machine) -> Program:
-    """Read the emitted program and compare it with the original: end points, modal states between regions, sweeps."""
+    """Read the emitted program and check end points, modal states around regions and angles of arcs."""
     # Half an increment: a program may have more digits than the controller resolves.
     tolerance_mm = {units: 0.5 * written_increment_mm(machine, units) + 1e-9 for units in (20, 21)}
     probes = [line for place in placed for line in (place.first_line - 1, place.last_line)]

@@ -29,7 +29,7 @@ class Upright(TomlTable):
 
 
 class Box(Upright):
-    """A block."""
+    """A cuboid."""
 
     x_mm: Range = key("from ... to along X")
     y_mm: Range = key("from ... to along Y")

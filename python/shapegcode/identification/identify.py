@@ -216,7 +216,7 @@ def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record
 
 
 def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: model_search.Sought) -> Identification:
-    """Modes of the stops with least motion of ordinary runs, then of all stops that these modes explain."""
+    """Modes of the stillest third of the stops in ordinary runs, then of all stops that these modes explain."""
     forced = [record for record in records if record.force_n is not None]
     if forced:
         raise ArgumentError(f"{forced[0].source}: contains a force: stops are searched in a run without a hammer")

@@ -79,7 +79,7 @@ class Input(TomlTable):
     tool_length_wear_mm: _Lengths = key("wear of the length by offset number H", default={})
     compensation: Literal["refuse", "expand", "keep"] = key(
         'what `convert` does with cutter compensation G41/G42. "refuse": stops with an error; "expand": shapes the '
-        'tool path for the radius given here; the offset in the control is then without effect; "keep": leaves these '
+        'tool path for tool_radius_mm; the offset in the control is then without effect; "keep": leaves these '
         "moves unchanged. Cycle time and pictures always use the expanded path where the radius is known",
         default="refuse",
     )
@@ -334,8 +334,8 @@ class Shaping(TomlTable):
         default="auto",
     )
     per_axis: Bool = key(
-        "one shaper per axis, for that axis' modes only: shorter than one for all. Needs contour compensation (so not "
-        'contour = "off", stated bands, or modes that move with an axis)',
+        "one shaper per axis, for that axis' modes only: shorter than one for all. Not with "
+        'contour = "off", a named family, stated bands, or modes that move with an axis',
         default=False,
     )
     vibration_limit: Annotated[Positive, Field(lt=1)] = key(

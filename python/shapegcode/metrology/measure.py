@@ -256,7 +256,7 @@ class Job:
 
 
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:
-    """Pairs of regions to measure, without those without sections."""
+    """Pairs of regions to measure: those with sections."""
     pairs = [pair for pair in paired_regions(program, nominal) if pair[1].path.length_mm > 0.0]
     blocks = _BLOCKS_PER_CURVE * machine.controller.block_time_s
     blocks = blocks if program.shaped_regions > 0 and nominal is program else 0.0

@@ -162,7 +162,7 @@ class OwnFilter:
 
     @property
     def mean_deviation_s(self) -> float:
-        """Upper bound on the mean absolute deviation; the error at a corner is proportional to it."""
+        """Upper bound on the mean absolute deviation of the delay; the error at a corner is proportional to it."""
         if self.shape == "exponential":
             return self.time_constant_s * 2.0 / math.e
         return (self.time_constant_s + self.bell_time_s) / 4.0

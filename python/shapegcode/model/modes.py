@@ -241,8 +241,8 @@ def drive_parameters(
 ) -> list[_core.FeedDriveParameters]:
     """Feed drives of X, Y and Z, referred to table travel.
 
-    Position gain and feed-forward are those of the controller; the axes' modes are attached to the tables, those that
-    vary with a position at their nominal frequency.
+    Position gain and feed-forward are those of the controller; the axes' modes are attached to the tables, with the
+    nominal frequency where it varies with a position.
 
     Args:
         machine: with a key table ``[axes.x.drive]``, and likewise for y and z.

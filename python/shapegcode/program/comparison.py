@@ -103,7 +103,7 @@ class Allowed:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The words in the form for `of`."""
+        """What is allowed, as words that `of` accepts."""
         path = (f"path={self.path_um:g}um",) if self.path_um > 0.0 else ()
         return (*(kind for kind in KINDS if kind in self.kinds), *path)
 
@@ -229,7 +229,7 @@ class Comparison(Result):
         shown_counts = [self.count(kind) for kind in _ALWAYS]
         shown_counts += [each for each in self.counts if each.differs and each.kind not in (*_ALWAYS, "emission")]
         counts = ", ".join(f"{each.unchanged} of {each.original} {_noun(each.kind)}" for each in shown_counts)
-        sentence = f"{counts} unchanged; path within {self.path_um:.1f} µm"
+        sentence = f"{counts} unchanged; programmed paths within {self.path_um:.1f} µm of each other"
         refused = list(self.refused)
         if not refused:
             return sentence

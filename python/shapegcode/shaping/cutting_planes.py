@@ -188,8 +188,8 @@ class Bounds(NamedTuple):
 class CutPool:
     """Planes found so far, per band: angular frequency and direction. Valid for every duration.
 
-    Directions are relative to the phase of an impulse in the middle of the shaper, where that of the best design
-    hardly depends on its duration.
+    Directions are relative to the phase of an impulse in the middle of the shaper: so those of the best design hardly
+    depend on its duration.
     """
 
     omegas: list[list[float]]

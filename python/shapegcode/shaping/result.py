@@ -275,7 +275,7 @@ class Recommendation(Result):
         """Indices of the designs for a table, shortest first.
 
         The recommended designs, overall and for each grid; per family at continuous times the preferred design and the
-        shortest ones of the Pareto front, and on grids the shortest one of all.
+        shortest ones of the Pareto front, and the shortest one on any grid.
 
         Args:
             everything: return all designs.

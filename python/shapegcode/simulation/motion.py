@@ -24,7 +24,7 @@ _BUCKETS = 4000
 
 
 class MotionEnvelope:
-    """Minimum and maximum of several curves over equal intervals of samples, as short as their number allows."""
+    """Minimum and maximum of several curves over equal intervals, as short as the limit of their number allows."""
 
     def __init__(self, most: int = _BUCKETS) -> None:
         """Create an envelope of at most *most* intervals, 2 or more."""

@@ -50,7 +50,7 @@ def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: FloatArray, *, up:
 
 
 def _crossing(x: FloatArray, begin: FloatArray, edge_x: FloatArray, edge_y: FloatArray, radius: float) -> FloatArray:
-    """Distance ahead of the axis at which the tool's front first leaves the edge; `begin` if it is outside."""
+    """Distance ahead of the axis where the tool's front leaves the edge; `begin` if it has left there already."""
     open_ = np.interp(x + begin, edge_x, edge_y) > radius - np.sqrt(np.maximum(radius**2 - begin**2, 0.0))
     found = np.where(open_, radius, begin)
     slopes = np.diff(edge_y) / np.diff(edge_x)

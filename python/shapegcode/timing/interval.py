@@ -78,7 +78,7 @@ class TimeInterval:
         return tuple(sorted(parts, key=lambda part: -part.share))
 
     def narrowed_by(self) -> str:
-        """Required contents of a logged program that would narrow it; scatter between runs cannot be narrowed."""
+        """What a program must contain so that its log narrows the interval; no log narrows the scatter between runs."""
         name = next((part.name for part in self.parts() if part.name not in (BETWEEN, RUNS)), CUTS)
         text = next((text for word, text in _TELLS.items() if word in name), f"a program in which {name} occurs alone")
         return text.format(move=self.mean_move_mm)

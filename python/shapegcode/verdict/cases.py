@@ -28,7 +28,7 @@ Target = Literal["command", "response"]
 
 ALL_MODES = "all"
 _OVERRIDES_PERCENT = (50.0, 60.0, 70.0, 80.0, 90.0, 110.0, 120.0)
-_QUANTITIES = {"command": "contour error of the command", "response": "contour error of the response"}
+_QUANTITIES = {"command": "contour error of the command", "response": "contour error of the machine table"}
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,11 @@ class LimitCheck:
         return self.value_um > self.limit_um * (1.0 + 1e-9)
 
     def __str__(self) -> str:
-        return f"{self.figure} {self.value_um:.{self.decimals}f} um, limit {self.limit_um:.{self.decimals}f} um"
+        for decimals in range(self.decimals, self.decimals + 4):  # as many as show which one is larger
+            value, limit = (f"{each:.{decimals}f}" for each in (self.value_um, self.limit_um))
+            if value != limit:
+                break
+        return f"{self.figure} {value} um, limit {limit} um"
 
 
 def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]]]]:
@@ -203,7 +207,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
             if any(case.residual_um[axis] >= _SWINGS_UM for case in cases)
         ),
         Column("command", value=lambda case: _known(case.contour_error_um.command, 1)),
-        Column("resp.", value=lambda case: _known(case.contour_error_um.response, 1)),
+        Column("table", value=lambda case: _known(case.contour_error_um.response, 1)),
         Column("s", value=lambda case: _known(case.time_s, 2)),
         Column("of limit", value=lambda case: _share(case.share_of_limit)),
         Column("verdict", value=lambda case: _verdict(case, case is worst), left=True),
@@ -211,10 +215,11 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
     shown = sum(not case.counts for case in cases)
     brackets = "; those in brackets are only shown" if shown else ""
     return Table(
-        "operating conditions: residual X Y Z, contour error of command and response, µm",
+        "operating conditions: residual X Y Z, contour error of command and machine table, µm",
         columns,
         cases,
-        caption=f"{len(cases) - shown} of {len(cases)} operating conditions count{brackets} ([verdict])",
+        caption=f"{len(cases) - shown} of {len(cases)} operating conditions count{brackets} ([verdict]); "
+        "ceil, carry: controller.block_end",
         row_style=lambda case: _style(case, case is worst),
     )
 

@@ -179,7 +179,7 @@ class RegionVerdict:
     worse: tuple[str, ...] = ()  # missed tolerances in which it is worse than the original
 
     def is_benefit(self, contour_limit_um: float, least_gain_um: float) -> bool:
-        """True if a missed figure or a vibration falls by the least gain, and by 30 % or to its limit."""
+        """True if a missed figure or a vibration falls by the least gain, and by 30 % or to within its limit."""
         pairs = [(self.original_contour_error_um, self.contour_error_um, contour_limit_um, contour_limit_um)]
         residual = self.residual_vibration_um
         pairs += [

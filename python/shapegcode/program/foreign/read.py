@@ -47,7 +47,7 @@ class ForeignSettings:
 class ForeignProgram:
     """A program for another control, translated into an expanded program for FANUC.
 
-    Its numbers have a point where a unit hangs on it (`X10.`), I J K are distances from the start, dwells are
+    Its numbers have a point where their unit depends on it (`X10.`), I J K are distances from the start, dwells are
     `G04 X` in seconds; it begins and ends with a line `%`. One that calls programs of its own may keep these calls.
     """
 

@@ -99,7 +99,7 @@ def plotly_name() -> str:
 
 
 def is_shared(name: str) -> bool:
-    """True if a file is such a script, of any version of Plotly."""
+    """True if a file is a shared Plotly script, of any version."""
     return re.fullmatch(r"plotly-[\w.]+\.min\.js", name.rpartition("/")[2]) is not None
 
 

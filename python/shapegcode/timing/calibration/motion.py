@@ -473,7 +473,7 @@ def m_codes(values: dict[str, float]) -> dict[int, float]:
 
 
 def spindle_rows(values: dict[str, float], name: str) -> list[tuple[float, float]]:
-    """Table of a spindle's time: zero up to a speed, proportional above."""
+    """Table of a spindle's time: zero up to a speed, then rising linearly from zero."""
     slope, begin = values.get(name, 0.0), values.get(f"{name} from", 0.0)
     if slope <= 1e-6:
         return []
