@@ -111,7 +111,7 @@ def test_the_files(pocket: FeedSchedule, tmp_path: Path, monkeypatch: pytest.Mon
     files = [Path(name) for name in pocket.save_plots(tmp_path / "plots")]
     assert [file.name for file in files] == ["feed-along-path.svg", "feed-path.svg", "feed-surface.svg"]
     along, path, surface = (file.read_text(encoding="utf-8") for file in files)
-    for words in ("POCKET.NC", "really run", "limit 100 N", "distance along the cutting path in mm"):
+    for words in ("POCKET.NC", "reached", "limit 100 N", "distance along the cutting path in mm"):
         assert words in along
     assert "before: up to 124 N" in path
     assert "after: up to 98.4 N" in path

@@ -191,7 +191,7 @@ def test_without_a_place_of_rest_there_are_points_only_where_stops_are_asked_for
     stopped = converted(text, restart_interval_s=5.0, restart_stops=True)
     note = next(each.text for each in stopped.at_the_control if each.topic == "restart")
     assert len(stopped.restart_points) >= 2
-    told = re.search(r"(\d+) of them are stops that were put in .*: ([\d.]+) s more, and a dwell mark", note)
+    told = re.search(r"(\d+) of them are stops that were added .*: ([\d.]+) s more, and a dwell mark", note)
     assert told is not None
     cost_s = stopped.cutting_time_s.emitted - none.cutting_time_s.emitted
     assert float(told[2]) == pytest.approx(cost_s, abs=0.1) and cost_s > 0.05
