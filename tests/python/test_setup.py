@@ -202,7 +202,7 @@ def test_the_dialogue_asks_until_the_answers_do(typed: Any, capsys: pytest.Captu
     assert answers.modes.model_dump() == {"x": "46:0.02", "y": "rigid", "z": "unknown"}
     said = capsys.readouterr().out
     assert "873 characters, or some 35 short blocks a second" in said
-    assert "Until Z is tapped it is taken as rigid" in said
+    assert "Until Z is tapped it is simulated as rigid" in said
 
 
 def test_a_dump_that_lacks_the_rapids_has_them_asked(

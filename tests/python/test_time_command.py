@@ -294,7 +294,7 @@ def test_pictures(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first = {name: (folder / "plots" / name).read_bytes() for name in ("time.png", "time.svg")}
     assert first["time.png"].startswith(b"\x89PNG")
     drawing = first["time.svg"].decode()
-    for said in ("Where the time goes: 3.5 s on kimm004", "lines 9 to 11, T1", "lost to acceleration"):
+    for said in ("Parts of the time: 3.5 s on kimm004", "lines 9 to 11, T1", "lost to acceleration"):
         assert said in drawing
     assert run(capsys, "part.nc", "-m", "kimm004", "--plots", "plots")[0] == 0
     assert {name: (folder / "plots" / name).read_bytes() for name in first} == first
