@@ -176,7 +176,7 @@ def test_what_the_memory_would_not_hold_is_refused_before_it_is_taken(tmp_path: 
         done = run_process(tmp_path, words[0], "huge.nc", "-m", "vx500", *words[1:], limit=limit)
         assert done.returncode == 2, done.stderr
         found = re.search(
-            r"huge\.nc:1:1: .* some (\d+) bytes of memory are needed and (\d+) are available", done.stderr
+            r"huge\.nc:1:1: .* about (\d+) bytes of memory are needed and (\d+) are available", done.stderr
         )
         assert found is not None, done.stderr
         assert int(found[1]) > 900_000_000 and 0 < int(found[2]) < 3 * 2**29
