@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "program/source_loader.hpp"
 #include "register.hpp"
 #include "shapegcode/linuxcnc_program.hpp"
 
@@ -14,19 +15,6 @@ namespace py = pybind11;
 
 namespace shapegcode::bindings {
 namespace {
-
-using Subroutine = std::pair<std::string, std::string>;
-
-/// Asks Python for the file of a subroutine; the name is Latin-1, as the text.
-auto subroutine_finder(py::object find) {
-  return [find = std::move(find)](const std::string& name) -> std::optional<Subroutine> {
-    const py::gil_scoped_acquire gil;
-    const py::object found = find(py::bytes(name).attr("decode")("latin-1"));
-    if (found.is_none()) return std::nullopt;
-    const auto [file, text] = found.cast<std::pair<std::string, py::bytes>>();
-    return Subroutine{file, static_cast<std::string>(text)};
-  };
-}
 
 LinuxcncToolTable tool_table(std::string file, std::string unit, double unit_mm,
                              const std::map<std::int64_t, std::pair<std::array<double, 3>, double>>& tools) {
@@ -53,22 +41,15 @@ void define_options(py::module_& module) {
       .def_readwrite("machine_unit_mm", &LinuxcncOptions::machine_unit_mm, "Length of the machine's own unit.")
       .def_readwrite("adds_points", &LinuxcncOptions::adds_points,
                      "Numbers of whole units need a point in the expanded program.")
-      .def_property(
-          "block_skip",
-          [](const LinuxcncOptions& self) -> std::optional<bool> {
-            if (self.block_skip == BlockSkip::unknown) return std::nullopt;
-            return self.block_skip == BlockSkip::on;
-          },
-          [](LinuxcncOptions& self, std::optional<bool> is_on) {
-            self.block_skip = !is_on ? BlockSkip::unknown : *is_on ? BlockSkip::on : BlockSkip::off;
-          },
-          "Switch of /: on, off, or None: not known.")
+      .def_readwrite("block_skip", &LinuxcncOptions::block_skip, "Switch of /: on, off, or None: not known.")
       .def_readwrite("max_steps", &LinuxcncOptions::max_steps, "Lines executed, not counting one for each line.")
       .def_readwrite("max_expansion_bytes", &LinuxcncOptions::max_expansion_bytes,
                      "Bytes by which the expanded program may be larger than the program.")
       .def_property(
           "find_subroutine", [](const LinuxcncOptions& self) { return static_cast<bool>(self.find_subroutine); },
-          [](LinuxcncOptions& self, py::object find) { self.find_subroutine = subroutine_finder(std::move(find)); },
+          [](LinuxcncOptions& self, py::object find) {
+            self.find_subroutine = source_loader<std::string>(std::move(find));
+          },
           "Called with the name of a subroutine that the program does not hold; gives (name, bytes) or None.");
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "arrays.hpp"
+#include "program/source_loader.hpp"
 #include "register.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/program.hpp"
@@ -98,27 +99,6 @@ char one_letter(const std::string& text, const char* allowed) {
     throw Error(ErrorKind::argument, "'" + text + "' must be one of the letters " + allowed);
   }
   return text.front();
-}
-
-// Calls back into Python from a reading that has let go of the interpreter lock.
-std::function<std::optional<SourceText>(std::int64_t)> program_loader(py::object loader) {
-  if (loader.is_none()) {
-    return {};
-  }
-  // The last copy may go while the lock is not held.
-  const std::shared_ptr<py::object> callable(new py::object(std::move(loader)), [](py::object* held) {
-    const py::gil_scoped_acquire acquire;
-    delete held;
-  });
-  return [callable](std::int64_t number) -> std::optional<SourceText> {
-    const py::gil_scoped_acquire acquire;
-    const py::object result = (*callable)(number);
-    if (result.is_none()) {
-      return std::nullopt;
-    }
-    const auto pair = result.cast<std::pair<std::string, py::bytes>>();
-    return SourceText{pair.first, static_cast<std::string>(pair.second)};
-  };
 }
 
 // Text of a program as Python's; any byte is a character.
@@ -246,7 +226,9 @@ void register_gcode(py::module_& module) {
                      "The same by its index in `list_programs`, whatever its name, and alone; -1: by number.")
       .def_property(
           "load_program", [](const ReaderOptions& self) { return static_cast<bool>(self.load_program); },
-          [](ReaderOptions& self, py::object loader) { self.load_program = program_loader(std::move(loader)); },
+          [](ReaderOptions& self, py::object loader) {
+            self.load_program = source_loader<std::int64_t>(std::move(loader));
+          },
           "Called with an O number that the file does not hold; gives (name, bytes) or None.")
       .def_readwrite("opaque_programs", &ReaderOptions::opaque_programs,
                      "First and last program number whose calls are kept if the program is not found.")

@@ -1,31 +1,16 @@
 #include <pybind11/functional.h>
 #include <pybind11/stl.h>
 
-#include <functional>
-#include <optional>
 #include <string>
 #include <utility>
 
+#include "program/source_loader.hpp"
 #include "register.hpp"
 #include "shapegcode/siemens_program.hpp"
 
 namespace py = pybind11;
 
 namespace shapegcode::bindings {
-namespace {
-
-using FoundProgram = std::optional<std::pair<std::string, std::string>>;
-
-void set_called(SiemensOptions& options, std::function<FoundProgram(const std::string&)> find) {
-  options.called = [find = std::move(find)](const std::string& name) -> std::optional<SiemensSource> {
-    FoundProgram found = find(name);
-    if (!found) return std::nullopt;
-    return SiemensSource{.file = std::move(found->first), .text = std::move(found->second)};
-  };
-}
-
-}  // namespace
-
 void register_siemens(py::module_& module) {
   py::class_<SiemensOptions>(module, "SiemensOptions", "What a SINUMERIK program does not say of itself.")
       .def(py::init<>())
@@ -45,8 +30,9 @@ void register_siemens(py::module_& module) {
       .def_readwrite("left_out_addresses", &SiemensOptions::left_out_addresses, "Addresses likewise.")
       .def_readwrite("refused", &SiemensOptions::refused, "Called with a word: why it is refused; empty: not known.")
       .def_property(
-          "called", [](const SiemensOptions& self) { return static_cast<bool>(self.called); }, &set_called,
-          "Called with the name of a program in capitals; gives its file and its text, or None.");
+          "called", [](const SiemensOptions& self) { return static_cast<bool>(self.called); },
+          [](SiemensOptions& self, py::object find) { self.called = source_loader<std::string>(std::move(find)); },
+          "Called with the name of a program in capitals; gives (name, bytes in UTF-8) or None.");
   py::class_<SiemensProgram>(module, "SiemensProgram", "A SINUMERIK program in FANUC's words.")
       .def_readonly("expanded", &SiemensProgram::expanded, "The program in FANUC's words.")
       .def_readonly("names", &SiemensProgram::names, "Words that stand for others of the source, each with that one.");

@@ -7158,7 +7158,7 @@ class LinuxcncOptions:
         Switch of /: on, off, or None: not known.
         """
     @block_skip.setter
-    def block_skip(self, arg1: bool | None) -> None:
+    def block_skip(self, arg0: bool | None) -> None:
         ...
     @property
     def file(self) -> str:
@@ -7287,10 +7287,10 @@ class SiemensOptions:
     @property
     def called(self) -> bool:
         """
-        Called with the name of a program in capitals; gives its file and its text, or None.
+        Called with the name of a program in capitals; gives (name, bytes in UTF-8) or None.
         """
     @called.setter
-    def called(self, arg1: collections.abc.Callable[[str], tuple[str, str] | None]) -> None:
+    def called(self, arg1: typing.Any) -> None:
         ...
     @property
     def file(self) -> str:

@@ -20,6 +20,7 @@ using shapegcode::ErrorKind;
 using shapegcode::LinuxcncOptions;
 using shapegcode::LinuxcncProgram;
 using shapegcode::read_linuxcnc;
+using shapegcode::SourceText;
 
 namespace {
 
@@ -102,10 +103,10 @@ TEST_CASE("O words loop, choose and call") {
 TEST_CASE("subroutines come from other files, and every line knows its file") {
   LinuxcncOptions options = options_of_a_mill();
   std::vector<std::string> asked;
-  options.find_subroutine = [&asked](const std::string& name) -> std::optional<std::pair<std::string, std::string>> {
+  options.find_subroutine = [&asked](const std::string& name) -> std::optional<SourceText> {
     asked.push_back(name);
     if (name != "hole") return std::nullopt;
-    return std::pair(std::string("lib/hole.ngc"), std::string("; a hole\r\no<hole> sub\r\nG1 Z[#1]\r\no<hole> endsub"));
+    return SourceText{"lib/hole.ngc", "; a hole\r\no<hole> sub\r\nG1 Z[#1]\r\no<hole> endsub"};
   };
   const LinuxcncProgram program =
       read_linuxcnc(std::string(head) + "o<hole> call [-1]\no<hole> call [-2]\nM2\n", options);
@@ -116,7 +117,7 @@ TEST_CASE("subroutines come from other files, and every line knows its file") {
   CHECK(program.expanded.lines[static_cast<std::size_t>(of_file)] == 3);
   CHECK(std::string(refused("o<none> call", options).what()).starts_with("subroutine O<none> is neither in the file"));
   options.find_subroutine = [](const std::string&) {
-    return std::optional(std::pair(std::string("hole.ngc"), std::string("o<hole> sub\nG38.2 Z-1\no<hole> endsub")));
+    return std::optional(SourceText{"hole.ngc", "o<hole> sub\nG38.2 Z-1\no<hole> endsub"});
   };
   const Error error = refused("o<hole> call", options);
   CHECK(error.file() == "hole.ngc");

@@ -1,6 +1,7 @@
 #include "shapegcode/siemens_program.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <random>
@@ -14,7 +15,7 @@ using shapegcode::Error;
 using shapegcode::read_siemens;
 using shapegcode::SiemensOptions;
 using shapegcode::SiemensProgram;
-using shapegcode::SiemensSource;
+using shapegcode::SourceText;
 
 namespace {
 
@@ -27,12 +28,12 @@ SiemensOptions options() {
   made.max_program_steps = 2000;
   made.left_out = {{"SOFT", "SOFT is left out"}};
   made.refused = [](const std::string& word) { return word == "H" ? "H functions go to the PLC" : ""; };
-  made.called = [](const std::string& name) -> std::optional<SiemensSource> {
+  made.called = [](const std::string& name) -> std::optional<SourceText> {
     if (name == "RECT") {
-      return SiemensSource{"RECT.SPF",
-                           "PROC RECT(REAL W, REAL H, VAR REAL AREA) SAVE DISPLOF\nG91\nX=W\nY=H\nAREA=W*H\nRET\n"};
+      return SourceText{"RECT.SPF",
+                        "PROC RECT(REAL W, REAL H, VAR REAL AREA) SAVE DISPLOF\nG91\nX=W\nY=H\nAREA=W*H\nRET\n"};
     }
-    if (name == "WRONG") return SiemensSource{"WRONG.SPF", "X1\nX=1/0\nM17\n"};
+    if (name == "WRONG") return SourceText{"WRONG.SPF", "X1\nX=1/0\nM17\n"};
     return std::nullopt;
   };
   return made;
@@ -58,7 +59,7 @@ std::string error_of(const std::string& body) {
   try {
     static_cast<void>(read_siemens(start + body + "\nM30\n", options()));
   } catch (const Error& error) {
-    return error.what();
+    return fmt::format("{}:{}:{}: {}", error.file(), error.line(), error.column(), error.what());
   }
   return {};
 }

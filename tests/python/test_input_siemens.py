@@ -592,3 +592,16 @@ def test_siemens_in_and_siemens_out_keep_names() -> None:
     ]
     assert words_of[0][0] == b"G54"  # the opening of what is written names the frame
     assert words_of[0][1:] == words_of[1]
+
+
+def test_names_that_are_no_utf_8_are_kept(tmp_path: Path) -> None:
+    """Of the program itself in errors, and of the subprogram that it calls: a file system holds any bytes."""
+    folder = tmp_path / "teile\udce9"
+    folder.mkdir()
+    (folder / "SUB.SPF").write_text("G1 X=Q\nM17\n")
+    text, machine = "G0 X0\nG1 F100\nSUB\nM30\n", machine_with({"input.tool_change_unknown_axes": ""}, "kimm004")
+    with pytest.raises(sg.ProgramError, match=r"teile\\udce9/SUB\.SPF:1:6: Q is not a variable .*called from line 3"):
+        read_siemens(text, file=str(folder / "a.mpf"), machine=machine, folder=folder)
+    with pytest.raises(sg.ProgramError) as caught:
+        read_siemens("G1 X=Q\nM30\n", file=str(folder / "a.mpf"), machine=machine)
+    assert str(caught.value).startswith(f"{folder}/a.mpf:1:6: ") and caught.value.file == f"{folder}/a.mpf"

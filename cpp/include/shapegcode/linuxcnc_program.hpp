@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include "shapegcode/expanded_program.hpp"
+#include "shapegcode/program.hpp"
 
 namespace shapegcode {
 
@@ -27,9 +27,6 @@ struct LinuxcncToolTable {
   double unit_mm = 1.0;
 };
 
-/// Position of the block-skip switch.
-enum class BlockSkip : std::uint8_t { unknown, on, off };
-
 /// What the machine says of a LinuxCNC program.
 struct LinuxcncOptions {
   std::string file;         ///< name of the program in messages
@@ -41,11 +38,11 @@ struct LinuxcncOptions {
   std::map<std::int64_t, double> tool_length_mm;  ///< by H number, before those of the table
   double machine_unit_mm = 1.0;                   ///< length of the machine's own unit
   bool adds_points = false;                       ///< numbers of whole units need a point in the expanded program
-  BlockSkip block_skip = BlockSkip::unknown;
-  std::uint64_t max_steps = 4'000'000;  ///< lines executed, not counting one for each line
+  std::optional<bool> block_skip;                 ///< whether `/` lines are skipped; none: not known, they are executed
+  std::uint64_t max_steps = 4'000'000;            ///< lines executed, not counting one for each line
   std::uint64_t max_expansion_bytes = 400'000'000;
   /// Name and text of the file of a subroutine, by the name that the call gives; none: there is no such file.
-  std::function<std::optional<std::pair<std::string, std::string>>(const std::string&)> find_subroutine;
+  std::function<std::optional<SourceText>(const std::string& name)> find_subroutine;
 };
 
 /// P and Q of G64, mm; none: the word is left out.

@@ -12,14 +12,9 @@
 #include <vector>
 
 #include "shapegcode/expanded_program.hpp"
+#include "shapegcode/program.hpp"
 
 namespace shapegcode {
-
-/// A program that another one calls.
-struct SiemensSource {
-  std::string file;  ///< that holds it, as errors name it
-  std::string text;  ///< UTF-8
-};
 
 /// What a SINUMERIK program does not say of itself.
 struct SiemensOptions {
@@ -36,8 +31,8 @@ struct SiemensOptions {
   std::unordered_map<std::string, std::string> left_out, left_out_addresses;
   /// Why a word is refused; empty: no reason is known.
   std::function<std::string(const std::string& word)> refused;
-  /// A program that is called, by its name in capitals; none: there is no such program.
-  std::function<std::optional<SiemensSource>(const std::string& name)> called;
+  /// A program that is called, by its name in capitals, its text UTF-8; none: there is no such program.
+  std::function<std::optional<SourceText>(const std::string& name)> called;
 };
 
 struct SiemensProgram {
@@ -47,7 +42,7 @@ struct SiemensProgram {
 };
 
 /// Executes a SINUMERIK program in DIN words, UTF-8, as the control would. Throws Error(program) with file, line and
-/// column in its message.
+/// column.
 [[nodiscard]] SiemensProgram read_siemens(std::string_view text, const SiemensOptions& options);
 
 }  // namespace shapegcode

@@ -71,7 +71,7 @@ class Tail {
   std::vector<double> fine_s_;
   std::vector<AxisPole> poles_;
   std::vector<std::vector<Complex>> decays_;  // of each mode, from each fine step to the end
-  std::vector<Complex> before_;               // what the blocks before have left of each mode at the end
+  std::vector<Complex> before_;               // vibration of each mode at the end from the blocks before
   Vector unit_;                               // of the speeds, as they are written
 };
 
@@ -131,7 +131,7 @@ std::vector<LinearBlock> Tail::with_speeds(const Vector& speeds) const {
   return made;
 }
 
-// Errors of the command, and what is left of the modes.
+// Errors of the command, and the residual vibration of the modes.
 Vector Tail::rows(const Vector& speeds) const {
   const std::vector<LinearBlock> made = with_speeds(speeds);
   Vector found(static_cast<Eigen::Index>(3 * window_.size() + 2 * poles_.size()));

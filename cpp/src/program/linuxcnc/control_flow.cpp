@@ -194,14 +194,14 @@ SourceFile& Interpreter::load(const std::string& label) {
   if (const auto loaded = files_.find(label); loaded != files_.end()) return *loaded->second;
   const std::size_t begin = std::min(label.find_first_not_of("<>"), label.size());
   const std::string name = label.substr(begin, label.find_last_not_of("<>") + 1 - begin);
-  auto found = options_.find_subroutine ? options_.find_subroutine(name) : std::nullopt;
+  auto found = options_.find_subroutine ? options_.find_subroutine(shown(name)) : std::nullopt;
   if (!found) {
     refuse(fmt::format(
         "subroutine O{} is neither in the file nor is there {}.ngc in its folder or in input.program_folders",
         shown(label), shown(name)));
   }
-  const std::uint32_t index = lines_.add_file(found->first);
-  SourceFile& file = *(files_[label] = std::make_unique<SourceFile>(found->first, found->second, index));
+  const std::uint32_t index = lines_.add_file(found->name);
+  SourceFile& file = *(files_[label] = std::make_unique<SourceFile>(found->name, found->text, index));
   read_lines_ += file.count();
   return file;
 }

@@ -261,13 +261,12 @@ const Block* Interpreter::block(std::size_t index) {
 }
 
 bool Interpreter::is_skipped() {
-  if (options_.block_skip == BlockSkip::on) return true;
-  if (options_.block_skip == BlockSkip::unknown) {
+  if (!options_.block_skip) {
     lines_.note(runner_.place.line,
                 "`/` lines are executed, as with the block-skip switch off; input.block_skip states its position",
                 "block skip");
   }
-  return false;
+  return options_.block_skip.value_or(false);
 }
 
 void Interpreter::require_steps() const {

@@ -28,8 +28,8 @@ Run::Program Run::find(const std::string& name) {
   if (const auto known = programs_.find(name); known != programs_.end()) return known->second;
   Program found;
   if (options_.called) {
-    if (const std::optional<SiemensSource> source = options_.called(name)) {
-      found = programs_of_text(source->text, source->file, name)[0];
+    if (const std::optional<SourceText> source = options_.called(name)) {
+      found = programs_of_text(source->text, source->name, name)[0];
       found->name = name;
     }
   }

@@ -175,7 +175,7 @@ void Run::require_limits() const {
 Error Run::located(const ProgramLines& program, std::size_t index, std::uint32_t column,
                    const std::string& message) const {
   const std::uint32_t line = program.first + static_cast<std::uint32_t>(index);
-  std::string text = fmt::format("{}:{}:{}: {}", program.file, line, column, message);
+  std::string text = message;
   for (auto call = calls_.rbegin(); call != calls_.rend(); ++call) {
     text += fmt::format("{}line {}", call == calls_.rbegin() ? "; called from " : ", ", *call);
   }

@@ -6,18 +6,25 @@ What is read and what is refused: docs/reference/input_dialects.md.
 from __future__ import annotations
 
 import re
-from codecs import BOM_UTF8
 from dataclasses import dataclass
 from pathlib import Path
 
 from shapegcode import _core
-from shapegcode.errors import ProgramError, located_error
 from shapegcode.io.data_file import read_file
 from shapegcode.io.ini import UNITS_MM, ini_entries
 from shapegcode.machine import Machine
-from shapegcode.program.foreign.read import ForeignProgram, ForeignSettings, program_folders, program_of_core, refusal
+from shapegcode.program.foreign.read import (
+    ForeignProgram,
+    ForeignSettings,
+    called_program,
+    located_errors,
+    program_folders,
+    program_of_core,
+    refusal,
+    shown_name,
+)
 
-_MAX_BYTES = 10_000_000  # of a tool table, and of a program that another one calls
+_MAX_BYTES = 10_000_000  # of a tool table
 _LAST_TOOL = 2**31 - 1
 _FILE_NAME = re.compile(r"[\w.+-]+")
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
@@ -28,14 +35,10 @@ def read_linuxcnc(source: str, *, file: str, machine: Machine, folder: Path | No
     """The expanded program of a LinuxCNC program."""
     table = find_tool_table(machine.input.tool_table, machine.input.machine_unit, folder)
     options = _options(machine, table)
-    options.file = _shown(file)
-    folders, most = program_folders(machine, folder), min(_MAX_BYTES, machine.controller.max_program_bytes)
-    options.find_subroutine = lambda name: _subroutine(name, folders, most)
-    try:
+    options.file, folders = shown_name(file), program_folders(machine, folder)
+    options.find_subroutine = lambda name: _subroutine(name, folders, machine)
+    with located_errors(file):
         program = _core.read_linuxcnc(source.encode("latin-1", "replace"), options)
-    except ProgramError as error:
-        where = file if error.file == options.file else error.file
-        raise located_error(where, error.line, error.column, str(error)) from None
     tools = {} if table is None else table.tools
     settings = ForeignSettings(
         tool_length_mm={number: tool.offset_mm[2] for number, tool in tools.items()},
@@ -60,7 +63,7 @@ def _options(machine: Machine, table: ToolTable | None) -> _core.LinuxcncOptions
     options.machine_unit_mm = UNITS_MM[given.machine_unit]
     if table is not None:
         options.tool_table = _core.LinuxcncToolTable(
-            _shown(table.file),
+            shown_name(table.file),
             table.units,
             UNITS_MM[table.units],
             {number: (tool.offset_mm, tool.diameter_mm) for number, tool in table.tools.items()},
@@ -74,18 +77,13 @@ def _options(machine: Machine, table: ToolTable | None) -> _core.LinuxcncOptions
     return options
 
 
-def _shown(name: str) -> str:
-    """A file's name in messages: it may hold what cannot be written as UTF-8."""
-    return name.encode("utf-8", "backslashreplace").decode()
-
-
-def _subroutine(name: str, folders: list[Path], most: int) -> tuple[str, bytes] | None:
+def _subroutine(name: str, folders: list[Path], machine: Machine) -> tuple[str, bytes] | None:
     """Name and text of the file of a subroutine."""
     if _FILE_NAME.fullmatch(name) is None:
         return None
     for path in (folder / (name + suffix) for folder in folders for suffix in (".ngc", ".NGC", ".nc")):
         if path.is_file():
-            return str(path), read_file(path, most).removeprefix(BOM_UTF8)
+            return called_program(path, machine)
     return None
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from codecs import BOM_UTF8
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -81,10 +82,25 @@ def program_folders(machine: Machine, folder: Path | None) -> list[Path]:
     return own + [Path(name).expanduser() for name in machine.input.program_folders]
 
 
-def called_source(path: Path, machine: Machine) -> str:
-    """The text of a program that another one calls, as long as it may be."""
+def called_program(path: Path, machine: Machine) -> tuple[str, bytes]:
+    """Name and text of a program that another one calls, as long as it may be."""
     most = min(_MAX_CALLED_BYTES, machine.controller.max_program_bytes)
-    return read_file(path, most).decode("utf-8-sig", "replace")
+    return shown_name(str(path)), read_file(path, most).removeprefix(BOM_UTF8)
+
+
+def shown_name(file: str) -> str:
+    """A file's name as the core has it: it may hold what cannot be written as UTF-8."""
+    return file.encode("utf-8", "backslashreplace").decode()
+
+
+@contextmanager
+def located_errors(file: str) -> Iterator[None]:
+    """Errors of a reader in the core with file, line and column, the program's own file by its name."""
+    try:
+        yield
+    except ProgramError as error:
+        where = file if error.file == shown_name(file) else error.file
+        raise located_error(where, error.line, error.column, str(error)) from None
 
 
 def refusal(file: str, line: int, message: str) -> ProgramError:

@@ -17,9 +17,11 @@ from shapegcode.machine import Machine
 from shapegcode.program.foreign.read import (
     ForeignProgram,
     ForeignSettings,
-    called_source,
+    called_program,
+    located_errors,
     program_folders,
     program_of_core,
+    shown_name,
 )
 
 
@@ -29,8 +31,8 @@ def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | Non
     Subprograms are looked for in the text, in `folder` and in `input.program_folders`: NAME.SPF, then NAME.MPF.
     """
     controller, settings, options = machine.controller, machine.input, _core.SiemensOptions()
-    options.file = file
-    options.name = re.sub(r"(?i)^_N_|_(MPF|SPF)$|\.[A-Z0-9]+$", "", re.split(r"[/\\]", file)[-1]).upper()
+    options.file = shown_name(file)
+    options.name = re.sub(r"(?i)^_N_|_(MPF|SPF)$|\.[A-Z0-9]+$", "", re.split(r"[/\\]", options.file)[-1]).upper()
     options.least_increment_mm = controller.least_increment_mm
     options.arc_radius_tolerance_mm = controller.arc_radius_tolerance_mm
     options.max_program_steps = controller.max_program_steps
@@ -41,7 +43,8 @@ def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | Non
     options.left_out, options.left_out_addresses, refused = _tables()
     options.refused = lambda word: next((why for pattern, why in refused.items() if pattern.fullmatch(word)), "")
     options.called = _finder(machine, folder)
-    program = _core.read_siemens(source, options)
+    with located_errors(file):
+        program = _core.read_siemens(source, options)
     return program_of_core("siemens", program.expanded, ForeignSettings(names=dict(program.names)))
 
 
@@ -57,18 +60,21 @@ def _tables() -> tuple[dict[str, str], dict[str, str], dict[re.Pattern[str], str
     return words, addresses, {re.compile(pattern): reason for pattern, reason in tables["refused"].items()}
 
 
-def _finder(machine: Machine, folder: Path | None) -> Callable[[str], tuple[str, str] | None]:
+def _finder(machine: Machine, folder: Path | None) -> Callable[[str], tuple[str, bytes] | None]:
     """What finds the file of a program that another one calls, and its text."""
     files: dict[str, Path] = {}  # by name in capitals; found when the first one is looked for
     folders = program_folders(machine, folder)
 
-    def find(name: str) -> tuple[str, str] | None:
+    def find(name: str) -> tuple[str, bytes] | None:
         while folders:
             for each in sorted(folders[0].iterdir()) if folders[0].is_dir() else ():
                 files.setdefault(each.name.upper(), each)
             folders.pop(0)
         known = (f"{name}.SPF", f"{name}.MPF", f"_N_{name}_SPF", f"_N_{name}_MPF")
         path = next((files[file] for file in known if file in files), None)
-        return None if path is None else (str(path), called_source(path, machine))
+        if path is None:
+            return None
+        shown, text = called_program(path, machine)
+        return shown, text.decode("utf-8", "replace").encode()
 
     return find
