@@ -101,6 +101,23 @@ TEST_CASE("a new override acts behind the section that is being run") {
   }
 }
 
+TEST_CASE("a window that is hardly longer than the braking distance costs 2 % at most") {
+  // From 200 mm/s within 1000 mm/s2 and 50 000 mm/s3: 22 mm, 110 blocks.
+  ControllerSettings settings = limited_to(114);
+  settings.smoothing_time_s = 0.0;
+  std::vector<Segment> row;
+  constexpr int blocks = 1500;
+  for (int k = 0; k < blocks; ++k) row.push_back(make_line({0.2 * k, 0, 0}, {0.2 * (k + 1), 0, 0}, max_speed));
+  row.back().stop_at_end = true;
+  Watched watched(settings, row);
+  int moving = 0;
+  while (watched.step() != Activity::idle) ++moving;
+  watched.check_limits();
+  // The shortest time in its closed form: the row at full speed, and one more ramp.
+  const double ramp_s = max_speed / max_acceleration + max_acceleration / max_jerk;
+  CHECK(period_s * moving <= 1.02 * (row.back().end_mm[0] / max_speed + ramp_s));
+}
+
 TEST_CASE("a hold brakes behind the section that is being run, and the motion goes on from there") {
   for (int when = 100; when < 1500; when += is_sanitized ? 487 : 61) {
     CAPTURE(when);

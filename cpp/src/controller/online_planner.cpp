@@ -26,6 +26,9 @@ constexpr double stops_ahead = 2.0;
 // window than that, or of the stations where these are too few for the window.
 constexpr double stations_for_new = 16.0;
 constexpr double renewed_share = 0.25;
+// In a window that holds the braking distance but no long section besides, sections are the shortest and plans are
+// made more often: what a section takes of the window, the motion has less to brake in.
+constexpr double stations_for_new_if_tight = 32.0;
 // What is tried while the motion is under way, by its speed; and how often from rest, with less each time.
 constexpr std::array<double, 4> slower{no_limit, 0.9, 0.6, 0.0};
 constexpr int attempts_at_rest = 12;
@@ -160,8 +163,9 @@ bool OnlinePlanner::wants_plan(const PathPoint& from, std::uint64_t pushed) cons
     return static_cast<double>(motion_.passed()) >= renewed_share * static_cast<double>(plan_.end());
   }
   const bool has_more = end < pushed || pushed != pushed_before_;
+  const double for_new = is_tight_ ? stations_for_new_if_tight : stations_for_new;
   const double worth =
-      std::min(static_cast<double>(plan_.end()) / stations_for_new, renewed_share * static_cast<double>(rules_.window));
+      std::min(static_cast<double>(plan_.end()) / for_new, renewed_share * static_cast<double>(rules_.window));
   if (is_full_ && has_more && static_cast<double>(end - planned_) < worth) return false;
   // Before the motion has to brake for what is only the end of the plan.
   return std::isfinite(motion_.to_stop(stops_ahead * longest_stop_mm_));
@@ -172,6 +176,7 @@ std::uint64_t OnlinePlanner::look_ahead(const PathPoint& from, std::uint64_t pus
                                         const FeedRatios& ratios) noexcept {
   const std::uint64_t last = std::max(std::min(pushed, from.segment + rules_.window), fixed_ + 1);
   longest_stop_mm_ = 0.0;
+  double longest_braking_mm = 0.0;
   double ahead = -from.offset;
   std::uint64_t end = from.segment;
   // Not without a rounding that the motion has entered.
@@ -187,9 +192,11 @@ std::uint64_t OnlinePlanner::look_ahead(const PathPoint& from, std::uint64_t pus
     const double stop_s = stopping_time(v, a, jerk);
     const double sections_s = rules_.period_s * static_cast<double>(longest_section + margin_periods);
     longest_stop_mm_ = std::max(longest_stop_mm_, v * (0.5 * stop_s + sections_s));
+    longest_braking_mm = std::max(longest_braking_mm, 0.5 * v * braking_time(v, a, jerk));
     ahead += entry.segment.length_mm;
   }
   is_full_ = end == from.segment + rules_.window;
+  is_tight_ = is_full_ && ahead >= longest_braking_mm && ahead < longest_stop_mm_;
   return end;
 }
 
@@ -436,7 +443,8 @@ void OnlinePlanner::give_out(Section& section, const PathPoint& from, std::uint6
   const double periods = periods_share * static_cast<double>(section.whole_count - section.count);
   const std::size_t shortest =
       std::max(shortest_section, static_cast<std::size_t>(rules_.lead_periods) / sections_ahead);
-  length_ = std::clamp(static_cast<std::size_t>(periods), shortest, std::max(shortest, longest_section));
+  const std::size_t longest = is_tight_ ? shortest : std::max(shortest, longest_section);
+  length_ = std::clamp(static_cast<std::size_t>(periods), shortest, longest);
   has_motion_ = true;
   publish(section);
 }

@@ -90,6 +90,7 @@ class OnlinePlanner {
   std::size_t retry_ = 0;
   double least_acceleration_ = 0.0, least_jerk_ = 0.0;
   bool is_full_ = false;          // the plan reaches as far as the window
+  bool is_tight_ = false;         // and that is hardly further than the longest stop
   double longest_stop_mm_ = 0.0;  // of the segments that are planned
   alignas(cache_line) std::atomic<std::uint64_t> running_{0};
 };

@@ -85,6 +85,12 @@ struct Station {
   return speed / acceleration + std::min(2.0 * std::sqrt(speed / jerk), 2.0 * acceleration / jerk);
 }
 
+/// The time of braking from a steady speed.
+[[nodiscard]] inline double braking_time(double speed, double acceleration, double jerk) noexcept {
+  const double build_up = acceleration / jerk;
+  return speed > acceleration * build_up ? speed / acceleration + build_up : 2.0 * std::sqrt(speed / jerk);
+}
+
 /// Derivatives of so many axes at `x` mm behind a station.
 [[nodiscard]] Derivatives derivatives_at(const Station& station, const PlannedSegment& segment, double x,
                                          std::size_t axes) noexcept;
