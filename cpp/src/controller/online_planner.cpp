@@ -27,8 +27,10 @@ constexpr double stops_ahead = 2.0;
 constexpr double stations_for_new = 16.0;
 constexpr double renewed_share = 0.25;
 // In a window that holds the braking distance but no long section besides, sections are the shortest and plans are
-// made more often: what a section takes of the window, the motion has less to brake in.
+// made more often: what a section takes of the window, the motion has less to brake in. Only where plans are small: so
+// many stations for each period of a section, which take some tenths of it.
 constexpr double stations_for_new_if_tight = 32.0;
+constexpr std::size_t stations_of_period = 32;
 // What is tried while the motion is under way, by its speed; and how often from rest, with less each time.
 constexpr std::array<double, 4> slower{no_limit, 0.9, 0.6, 0.0};
 constexpr int attempts_at_rest = 12;
@@ -153,6 +155,10 @@ bool OnlinePlanner::waits_at(const PathPoint& point) const noexcept {
   return point.offset <= 0.0 && (*ring_)[point.segment].waits > stops_over_;
 }
 
+bool OnlinePlanner::is_tight() const noexcept {
+  return is_tight_ && plan_.end() <= stations_of_period * shortest_section;
+}
+
 bool OnlinePlanner::wants_plan(const PathPoint& from, std::uint64_t pushed) const noexcept {
   const std::uint64_t end = std::min(pushed, from.segment + rules_.window);
   if (!plan_.is_cut() && planned_ >= end) return false;
@@ -163,7 +169,7 @@ bool OnlinePlanner::wants_plan(const PathPoint& from, std::uint64_t pushed) cons
     return static_cast<double>(motion_.passed()) >= renewed_share * static_cast<double>(plan_.end());
   }
   const bool has_more = end < pushed || pushed != pushed_before_;
-  const double for_new = is_tight_ ? stations_for_new_if_tight : stations_for_new;
+  const double for_new = is_tight() ? stations_for_new_if_tight : stations_for_new;
   const double worth =
       std::min(static_cast<double>(plan_.end()) / for_new, renewed_share * static_cast<double>(rules_.window));
   if (is_full_ && has_more && static_cast<double>(end - planned_) < worth) return false;
@@ -443,7 +449,7 @@ void OnlinePlanner::give_out(Section& section, const PathPoint& from, std::uint6
   const double periods = periods_share * static_cast<double>(section.whole_count - section.count);
   const std::size_t shortest =
       std::max(shortest_section, static_cast<std::size_t>(rules_.lead_periods) / sections_ahead);
-  const std::size_t longest = is_tight_ ? shortest : std::max(shortest, longest_section);
+  const std::size_t longest = is_tight() ? shortest : std::max(shortest, longest_section);
   length_ = std::clamp(static_cast<std::size_t>(periods), shortest, longest);
   has_motion_ = true;
   publish(section);

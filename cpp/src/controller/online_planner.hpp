@@ -51,6 +51,7 @@ class OnlinePlanner {
   [[nodiscard]] std::ptrdiff_t periods_ahead() const noexcept;
   [[nodiscard]] int rest_at(const PathPoint& point) const noexcept;
   [[nodiscard]] bool waits_at(const PathPoint& point) const noexcept;
+  [[nodiscard]] bool is_tight() const noexcept;
   [[nodiscard]] bool wants_plan(const PathPoint& from, std::uint64_t pushed) const noexcept;
   std::uint64_t look_ahead(const PathPoint& from, std::uint64_t pushed, const FeedRatios& ratios) noexcept;
   std::optional<PathPoint> next_start(std::uint64_t pushed) noexcept;
