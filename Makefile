@@ -45,7 +45,7 @@ SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 .PHONY: help demo test test-all lint bench bench-full bench-realtime coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
-        build-packages test-packages package dev tidy tidy-all release plain sanitize threads wheel stub-check \
+        build-packages test-packages package dev fetched lint-package lint-others tidy tidy-all release plain sanitize threads wheel stub-check \
         test-all-core test-all-python test-linuxcnc fuzz-parameters fuzz-merge
 
 help:
@@ -75,14 +75,12 @@ demo: package
 	$(BIN)/shapegcode convert tests/golden/programs/PARALLEL.NC -m vx500 --set tolerance.contour_um=10 \
 	  -o demo-output/PARALLEL.NC --plots demo-output --json demo-output/PARALLEL.json --html demo-output/PARALLEL.html
 
-# One after the other, so that the output reads from top to bottom and ends with pytest's own closing line.
+# Mostly one after the other, so that the output reads from top to bottom and ends with pytest's own closing line.
+TOGETHER := --no-print-directory -j$(JOBS) --output-sync=recurse
 test:
 	$(MAKE) lint
 	$(MAKE) release
-	$(MAKE) stub-check
-	tests/tools/fetch_rs274.sh
-	tests/tools/fetch_peers.sh
-	tests/tools/fetch_axe.sh
+	$(MAKE) $(TOGETHER) stub-check fetched
 	$(PYTEST) -m 'not slow'
 
 # What takes longer than a person waits; .ci/run does of it what guards a file that changed since it last passed, which
@@ -96,15 +94,14 @@ test-all:
 	$(MAKE) docs
 	$(BIN)/python tests/tools/full_pass.py write
 
+test-all-core: export SHAPEGCODE_ALL_TRIALS := 1
 test-all-core:
+	ctest --preset release -L trials $(CTEST_FLAGS)
 	$(MAKE) plain
 	$(MAKE) sanitize
 	$(MAKE) threads
 
-test-all-python: package dev
-	tests/tools/fetch_rs274.sh
-	tests/tools/fetch_peers.sh
-	tests/tools/fetch_axe.sh
+test-all-python: package dev fetched
 	$(PYTEST) -m slow $(PYTEST_FLAGS)
 
 # LinuxCNC is installed for it, with a user that may run it where this is root, and the component into its modules.
@@ -117,13 +114,18 @@ test-linuxcnc: package dev
 BENCHMARK_CHECK := --follow-imports=silent --ignore-missing-imports --no-warn-unused-ignores \
   $(addprefix --disable-error-code=,arg-type call-overload index misc no-any-return no-untyped-call)
 lint: test-packages dev
+	$(MAKE) $(TOGETHER) lint-package lint-others
+	@echo 'lint: nothing to complain about'
+
+lint-package: dev
+	$(BIN)/mypy --strict python/shapegcode
+
+lint-others: test-packages dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy --strict python/shapegcode
 	$(BIN)/mypy $(BENCHMARK_CHECK) tests/benchmarks
 	clang-format --dry-run -Werror $(CPP_FILES)
 	$(MAKE) tidy
-	@echo 'lint: nothing to complain about'
 
 # Every benchmark; `bench` repeats less and takes smaller inputs: what it takes is some minutes, not twenty.
 BENCH := run.py --repetitions 2; linear_plants.py; feed_drives.py --repetitions 1; identification.py --draws 8; \
@@ -253,6 +255,12 @@ test-packages:
 	$(PIP) install --no-build-isolation --no-deps --force-reinstall --config-settings=build-dir=build/wheel \
 	  --config-settings=cmake.define.SHAPEGCODE_BUILT_MODULE="$$(ls $(CURDIR)/build/release/_core.*.so)" .
 	mv .venv/.building $@
+
+# What some tests compare with.
+fetched: dev
+	tests/tools/fetch_rs274.sh
+	tests/tools/fetch_peers.sh
+	tests/tools/fetch_axe.sh
 
 dev: .venv/.dev
 
