@@ -1,10 +1,11 @@
 """What changed since `make test-all` last passed: `full_pass.py write [core] | changed [core|python] | files`.
 
 `write` puts a hash of each group of files that the long checks guard into tests/full_pass.txt, which is committed: a
-folder of cpp/, or all of another place; `write core` of those only that `make test-all-core tidy-all` guards. `changed` prints what must run again (core, python) because a file of it is
-new, gone or another one; nothing: all of it passed as it is. `files` prints the sources and headers of the core's
-folders that changed or include a header of one that did, for clang-tidy, which reads a folder as one and finds in the
-others what it found before. A change of the core counts for the Python tests too.
+folder of cpp/, or all of another place; `write core` of those only that `make test-all-core tidy-all` guards.
+`changed` prints what must run again (core, python) because a file of it is new, gone or another one; nothing: all of it
+passed as it is. `files` prints the sources and headers of the core's folders that changed or include a header of one
+that did, for clang-tidy, which reads a folder as one and finds in the others what it found before. A change of the core
+counts for the Python tests too.
 """
 
 from __future__ import annotations
