@@ -120,6 +120,16 @@ def test_calls_are_told_with_their_callers(tmp_path: Path) -> None:
     assert "called by O1 line 5" in finding.message
 
 
+def test_a_called_program_may_be_in_a_folder_whose_name_is_no_utf_8(tmp_path: Path) -> None:
+    """A file system holds any bytes; the name is shown with its byte as an escape sequence."""
+    folder = tmp_path / "teile\udce9"
+    folder.mkdir()
+    (folder / "O0002.nc").write_text("%\nO2\nG99.9\nM99\n%\n")
+    (folder / "main.nc").write_text("%\nO1\nG21 G90 G94 G17\nM98P2\nM30\n%\n")
+    with pytest.raises(sg.ProgramError, match=r"teile\\udce9/O0002\.nc:3:1: "):
+        sg.Program.read(folder / "main.nc", machine())
+
+
 def test_a_program_that_was_read_is_checked_as_its_file(tmp_path: Path) -> None:
     (tmp_path / "main.nc").write_text(HEAD + "M98P2\nG1X10.F1000.\n" + END)
     (tmp_path / "O0002.nc").write_text("%\nO2\nG1X20.F99999.\nM99\n%\n")
