@@ -146,6 +146,11 @@ class KindCount:
         """Whether one program has some that the other lacks."""
         return not self.original == self.emitted == self.unchanged
 
+    @property
+    def changed(self) -> int:
+        """How many of the original are missing or different; those that only the other program has, if none are."""
+        return self.original - self.unchanged or self.emitted - self.unchanged
+
 
 @dataclass(frozen=True)
 class ProgramDifference:
@@ -226,11 +231,14 @@ class Comparison(Result):
     @property
     def answer(self) -> str:
         """Unchanged items, distance of the paths, and the first difference that is not allowed."""
-        shown_counts = [self.count(kind) for kind in _ALWAYS]
-        shown_counts += [each for each in self.counts if each.differs and each.kind not in (*_ALWAYS, "emission")]
-        counts = ", ".join(f"{each.unchanged} of {each.original} {_noun(each.kind)}" for each in shown_counts)
-        sentence = f"{counts} unchanged; programmed paths within {self.path_um:.1f} µm of each other"
+        always = (self.count(kind) for kind in _ALWAYS)
+        unchanged = ", ".join(f"{each.unchanged} of {each.original} {_noun(each.kind)}" for each in always)
+        others = (each for each in self.counts if each.differs and each.kind not in (*_ALWAYS, "emission"))
+        changed = ", ".join(f"{each.changed} of {each.original} {_noun(each.kind)}" for each in others)
         refused = list(self.refused)
+        if changed:
+            changed = f", {changed} changed{'' if refused else ' as allowed'}"
+        sentence = f"{unchanged} unchanged{changed}; programmed paths within {self.path_um:.1f} µm of each other"
         if not refused:
             return sentence
         first = next((each for each in refused if each.kind == "end"), refused[0])
