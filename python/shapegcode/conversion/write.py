@@ -144,7 +144,7 @@ _PIECE_PERIODS = 1 << 17  # of a region at a time: bounds the memory
 _CORNER_SHARE = 0.75  # deviations of several corners within one shaper duration add up
 
 
-_FADED = 1.0 / 3.0  # of the decay time to a millionth: decay to a hundredth
+_FADED = 1.0 / 3.0  # part of the time to decay to a millionth in which it decays to a hundredth
 
 _TARGETS = {
     "response": _core.ContourTarget.response,

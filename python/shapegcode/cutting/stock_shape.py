@@ -84,7 +84,7 @@ def _pieces(area: Area | MultiPolygon, z_mm: tuple[float, float]) -> list[StockP
 
 
 class _Allowance:
-    """Builds the area left by roughing (Kim and Ko, 2001, paper 001): the part thickened, with roughing's corners."""
+    """Builds the area left by roughing (Kim and Ko, 2001, paper 001): part plus layer, with the corners of roughing."""
 
     def __init__(self, stock: Stock, allowance: Allowance, radius_mm: float) -> None:
         self._stock, self._keys, self._radius = stock, allowance, radius_mm
@@ -337,7 +337,7 @@ def _turns(shape: Geometry, corners: Points) -> NDArray[np.intp]:
 
 
 def _meeting(corner: Points, pieces: NDArray[np.object_], tree: STRtree, distance_mm: float) -> Points:
-    """Move a corner to the distance from both adjacent lines; unchanged with only one line."""
+    """Move a corner until it has this distance from both adjacent lines; unchanged with only one line."""
     import shapely
 
     moved = corner

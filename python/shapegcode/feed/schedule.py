@@ -267,7 +267,7 @@ def _move(move: SurveyedMove, machine: Machine) -> result.KeptMove:
     misses = ["its force is unknown: no spindle speed"]
     if load is not None:
         misses = [
-            f"cut at its own feed: {words} {getattr(load.emitted, column).max():.4g} {unit}, limit {limit:.4g} {unit}"
+            f"cut at its old feed: {words} {getattr(load.emitted, column).max():.4g} {unit}, limit {limit:.4g} {unit}"
             for column, words, unit, limit in exceeded(move.tool, load.emitted, machine)
         ]
     return result.KeptMove(move.place, move.feed_mm_per_min, tuple(misses), load)

@@ -67,7 +67,7 @@ class _Amplitudes:
 
 
 def measured(sources: Sequence[Any], options: ReadOptions) -> list[Measured]:
-    """Records and frequency responses; files are read."""
+    """Split measurements into records and frequency responses; read those that are files."""
     found: list[Measured] = []
     for each in sources:
         found += [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options)

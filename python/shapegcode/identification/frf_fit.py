@@ -527,7 +527,7 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
     share = min(lines.independent for lines in window.parts)
     starts = [each for place, each in enumerate(starts_of(fit)) if place != index]
     apart = np.abs(fit.omega - omega) > zeta * omega + fit.zeta * fit.omega
-    # A mode within its width must not take its place.
+    # A neighbour within its width must not move to its frequency: few iterations.
     effort = (0, 1.0) if np.count_nonzero(~apart) == 1 else (10, 1e-4)
     without = fitted(window.parts, starts, effort)
     gain = np.inf if without is None else frf_search.evidence_of(without, share) - frf_search.evidence_of(fit, share)

@@ -46,7 +46,7 @@ class Lines:
 
     @cached_property
     def weighted_background(self) -> FloatArray:
-        """(2n, k) weighted columns of the background."""
+        """(2n, k) weighted columns of the background (modes outside the lines)."""
         return self.weighted(self.background)
 
     def weighted(self, columns: ComplexArray) -> FloatArray:

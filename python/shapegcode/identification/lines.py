@@ -64,7 +64,7 @@ class Hits:
     response: ComplexArray  # (impacts, n)
     kept: slice  # used lines of the transform
     starts: tuple[int, ...]  # first sample of each record
-    count: int  # samples samples per record
+    count: int  # samples per record
     period_s: float
     sigma: float  # 1/s: the window of the responses is exp(-sigma t)
     gain_error: FloatArray  # (n,) relative standard error of the force's spectrum: noise of its channel

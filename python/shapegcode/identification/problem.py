@@ -38,7 +38,7 @@ class FitProblem:
     starts_in_pulse: bool = False  # the record begins within the pulse
 
     def fit(self, starts: Starts, *, left_by: Fit | None = None, coloured: bool = False, quick: bool = False) -> Fit:
-        """The best model near some modes, residual white or coloured; or in a few steps, of another one's residual."""
+        """Fit a model, started at these modes, to the responses or to the residual of another; *quick*: few steps."""
         omega, zeta = np.array(starts).T
         responses, steps = self.left(left_by), _QUICK_STEPS if quick else _STEPS
         if self.forces is None:

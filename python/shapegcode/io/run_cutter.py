@@ -170,7 +170,7 @@ class RunCutter:
             yield from self._break_off(line, time, word)
 
     def _break_off(self, line: int, time: float, word: str) -> Iterator[RunLog]:
-        """End a run without completion (READY and the like), during a hold or not."""
+        """End a run whose status shows no completion (READY, for example); if it is held, it ends with the hold."""
         run = self._open
         assert run is not None
         name = self._status.name if self._status else ""

@@ -78,7 +78,7 @@ def choose_shaper(
         max_abs_sum: largest sum of the impulses' magnitudes.
         vibration_limit: limit of the worst residual ratio; None: the machine's
             `shaping.vibration_limit`, without a machine 0.05.
-        objective: "shortest", "contour" (least contour cost) or "robust" (least worst residual).
+        objective: "shortest", "contour" (least contour cost) or "robust" (smallest worst residual).
         allow_negative: allow a design with negative impulses.
         taps: a shaper of the user's own, compared with the others: as text ("0:.5,10.9ms:.5") or as it is.
         on_progress: called with the completed fraction, 0 to 1.

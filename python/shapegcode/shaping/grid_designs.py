@@ -318,7 +318,7 @@ def polished(
     taps: FloatArray, conditions: tuple[FloatArray, FloatArray], period_s: float, threshold: float,
     largest: float | None = None,
 ) -> Shaper | None:  # fmt: skip
-    """Re-solve the taps above a threshold to rounding; None if they then miss a condition or change sign.
+    """Re-solve the taps above a threshold to round-off accuracy; None if they miss a condition or change sign.
 
     Without a largest magnitude no tap is negative; taps at that magnitude are kept.
     """

@@ -328,7 +328,7 @@ def fit_motion(
         )  # fmt: skip
         return float(found.fun), found.x
 
-    # The misfit has several valleys: start at the best of many points, and restart at the end.
+    # The misfit has several minima: start at the best of many points, and restart at the end.
     generator = np.random.default_rng(1)
     points, valleys, restarts = (_PLACES, _VALLEYS, 2) if thorough else (_PLACES // 2, _VALLEYS // 2, 1)
     spread = generator.normal(0.0, _SEARCHED, (points, len(parameters))) * (reach / _TYPICAL_SPREAD)

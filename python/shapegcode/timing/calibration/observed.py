@@ -296,7 +296,7 @@ def observe(entry: RunEntry, log: RunLog, timed: TimedProgram, machine: Machine)
 
 
 def _lines(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) -> tuple[FloatArray, IntArray]:
-    """Times and lines of the reported lines, never descending."""
+    """Line numbers reported in the log, made non-descending, and their times."""
     line = line_numbers(log, timed)
     time_s = log.block.time_s
     within = (line >= 1) & (line <= timed.line_count)
