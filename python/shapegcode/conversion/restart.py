@@ -107,7 +107,7 @@ def system_of(state: _core.ModalState) -> str:
 def restart_points(
     program: Program, cuts: Iterable[tuple[Placed, CutRestarts, int | None]]
 ) -> tuple[RestartPoint, ...]:
-    """The restart points of a program with their modal states; the third entry of a cut is its tool."""
+    """The restart points of a program with their modal states. *cuts*: region, its restart points, T number."""
     return tuple(
         RestartPoint(
             number=mark.number,

@@ -379,7 +379,7 @@ class _Translator:
         return lines
 
     def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
-        """Original words of the program's own control, used instead of their translation."""
+        """Words of an original for this very control, restored in place of their translation from FANUC."""
         held = dict(words)
         found = {}
         if (tool := self._names.get(f"T{held.get('T', '')}")) is not None:

@@ -174,7 +174,7 @@ class _Marks:
         """N word at the start of the region, as written, to put before its prologue; empty: none."""
 
     def within(self, piece: _core.ShapedCommand, *, last: bool) -> tuple[list[_core.BlockMark], list[int]]:
-        """Marks of a piece and the periods at which its blocks must end for them, counted from its start."""
+        """Restart marks within a piece, and the periods from its start at which blocks must end for them."""
         first = piece.first_period
         end = first + len(piece.middle_mm)
         reached = piece.segment_periods

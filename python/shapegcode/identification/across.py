@@ -62,7 +62,7 @@ class _Amplitudes:
     variance: FloatArray  # (m,) of real and imaginary part together
 
     def turned(self, is_turned: bool) -> _Amplitudes:
-        """Amplitudes with the sensor's own sign, as along the other axes."""
+        """Amplitudes with the sign of the recorded signal, like those along the other axes."""
         return replace(self, value=-self.value) if is_turned else self
 
 

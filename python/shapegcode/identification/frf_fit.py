@@ -290,7 +290,7 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
-    """Reweight lines for the model residual: constant, proportional to the response, or half of each."""
+    """Reweight lines by the model residual: constant, proportional to the response, or half of each."""
     left = np.abs(lines.response - model) ** 2
     # Lines without a mode nearby have no model: they keep their assumed noise.
     left = np.where(left > 0.0, left, np.log(2.0) / lines.weight**2)

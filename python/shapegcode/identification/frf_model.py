@@ -62,7 +62,7 @@ class Lines:
 
     @property
     def independent(self) -> float:
-        """Independent fraction of the lines."""
+        """Fraction of the lines whose noise is statistically independent."""
         return 1.0 / float(1.0 + 2.0 * np.sum(np.abs(self.correlation[1:]) ** 2))
 
 

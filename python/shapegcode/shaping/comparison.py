@@ -236,7 +236,7 @@ def _least_worst(
     options: DesignOptions,
     found: Sequence[Design],
 ) -> list[Design]:
-    """Least worst design of the longest duration on each grid; none if a non-negative design meets the limit."""
+    """On each grid the longest design, with the smallest worst residual; none if a non-negative one meets the limit."""
     wanted = any(row.name == _ROBUST for row in rows) and any(band.uncertainty for band in bands)
     if not wanted or any(not each.negative and is_within(each, options.vibration_limit) for each in found):
         return []

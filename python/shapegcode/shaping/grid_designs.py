@@ -43,9 +43,9 @@ _HINT_PERIODS = 400  # longest grid that a refusal searches, periods
 def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s: float = 0.25) -> Shaper:
     """Design the shortest non-negative shaper on a grid with zero residual at every mode.
 
-    The number of periods is the smallest for which the conditions (sum 1, both parts of each mode's sum zero)
+    The number of periods is the smallest for which the conditions (sum 1, each mode's complex residual zero)
     have a non-negative solution. Among the solutions of that duration the one with the least second central
-    moment, the contour cost, is chosen, with the true centre, not a fixed one. Modes with the same
+    moment, the contour cost, is chosen, about the mean of its own taps. Modes with the same
     conditions on this grid (equal ones, or aliases of one another) count once. The optimiser's taps are
     re-solved in full precision and checked.
 

@@ -166,7 +166,7 @@ def longest(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
 
 
 def held_longest(signal: Signal, end_s: float | None) -> float:
-    """Value of a signal for the longest time."""
+    """The value that a signal had for the longest time in total."""
     until = np.append(signal.time_s[1:], end_s if end_s is not None else signal.time_s[-1])
     values = (round(value, 3) for value in signal.value.tolist())
     return longest(zip(values, np.maximum(until - signal.time_s, 0.0).tolist(), strict=True))[0]
