@@ -441,7 +441,7 @@ def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
 
 
 def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, float] | None:
-    """Command, following error and time step, one row for each constant command, to ignore its stairs."""
+    """Command, following error and time step, one row for each period of constant command."""
     if log.actual_mm is None or np.isnan(log.actual_mm[0, index]) or np.isnan(log.command_mm[0, index]):
         return None
     count, first = moves.held_samples(log)

@@ -153,7 +153,7 @@ class Aims:
     def keep_program_price(
         self, excess_s: float, gains_um: Mapping[int, float], keepable: Callable[[int], bool]
     ) -> bool:
-        """Loosen all cuts to a common tolerance until the program is within its price; then leave cuts unchanged."""
+        """Loosen the tolerance of all cuts to a common value until the price is kept; then leave cuts unchanged."""
         cuts = [index for index in gains_um if not self.reasons[index]]
         wanted_s = math.fsum(self.emitted_s[index] for index in cuts) - excess_s
 

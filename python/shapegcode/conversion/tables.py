@@ -178,7 +178,7 @@ def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
 
 
 def _other_command(machine: Machine, unmeasured: Mapping[str, KeyValue], key: str, other_s: float) -> Iterator[_Trial]:
-    """A trial of another time that also changes the set-points; none if measured, or if the time is invalid."""
+    """A trial with another time constant or period, which changes the set-points too; none if measured or invalid."""
     with suppress(MachineError):
         if key in unmeasured:
             yield _Trial(unmeasured[key], f"{other_s:g} s", machine.with_values(key, other_s), moves_command=True)

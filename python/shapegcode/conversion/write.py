@@ -67,7 +67,7 @@ class RegionText:
         self._parts = self._inside = None
 
     def stands_in(self, program: Program, begin: int) -> None:
-        """Take the text from a program's text, from byte *begin* on."""
+        """Hold the text as a part of the program's text from now on, starting at byte *begin*."""
         self._parts, self._inside = None, (program, begin)
 
 

@@ -44,7 +44,7 @@ class StockPiece:
 
 
 def stock_polygons(stock: Stock, paths: Sequence[_core.Path], tool_radius_mm: float) -> list[StockPiece]:
-    """The stock as prisms over polygons; for the kind `program` that before the roughing program."""
+    """The stock as prisms over polygons; for the kind `program`, the stock before the roughing program."""
     if stock.allowance is not None:
         return _pieces(_Allowance(stock, stock.allowance, tool_radius_mm).area(paths), stock.allowance.z_mm)
     solid: Solid | Stock = stock if stock.program is None else stock.program.on
@@ -218,7 +218,7 @@ def _extended(points: Points, length_mm: float) -> Points:
 
 
 def _with_touched(points: Points) -> Points:
-    """Insert points of a line at which it passes through itself, where it overlaps its start."""
+    """Insert into a line the points at which another part of it touches it, as where it overlaps its start."""
     import shapely
 
     pieces = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))

@@ -175,7 +175,7 @@ def _of_lines(each: FrequencyResponse, inside: npt.NDArray[np.bool_]) -> Frequen
 
 
 def _merged(used: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
-    """The mean of several responses of one point, with their differences as coherence."""
+    """The mean of several responses of one point, with a coherence from their differences."""
     stacked = np.array([each.response for each in used])
     mean = np.mean(stacked, axis=0)
     scatter = np.sum(np.abs(stacked - mean) ** 2, axis=0) / (len(used) - 1) / len(used)

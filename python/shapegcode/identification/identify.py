@@ -282,7 +282,7 @@ _FOLDED = 2.0 / 3.0
 _FILTER_ERROR = 3e-4  # largest error of a mass by decimation: the filters attenuate by 80 dB
 _FILTER_MOVES = (1e-6, 1e-4)  # ... and to a frequency and a damping ratio
 _FINER = 16  # steps per sampling period of the check by Wilson's method
-_POSSIBLY = 15.0  # allowed loss of evidence (twice the log odds) of another intersample course of the force
+_POSSIBLY = 15.0  # allowed loss of evidence (twice the log odds) of another intersample behaviour of the force
 
 
 def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sought) -> Identification:
@@ -362,13 +362,13 @@ def _warnings_of(ready: Prepared) -> list[str]:
 def _choose_course(
     problem: FitProblem, models: model_search.Search, sought: model_search.Sought
 ) -> tuple[FitProblem, model_search.Search, list[Fit]]:
-    """Choose the intersample course of the force by evidence; also returns fits of the other possible courses."""
+    """Choose the intersample behaviour of the force by evidence; also returns fits with the other possible ones."""
     courses = [(problem, models)]
     order = max(sought.order(models), 1)
     for other in problem.other_courses(models.fits[order - 1]):
         fits = tuple(other.fit(model_search.starts_of(fit)) for fit in models.fits[:order])
         evidence = tuple(model_search.evidence_of(other, fit) for fit in fits)
-        # Search only where another course may win: a wrong course needs extra modes.
+        # Search only where another behaviour may win: a wrong one needs extra modes.
         may_win = min(evidence) < min(models.evidence)
         courses.append((other, model_search.search(other, sought) if may_win else model_search.Search(fits, evidence)))
     best = min(courses, key=lambda course: min(course[1].evidence))

@@ -210,7 +210,7 @@ def _estimates(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Do
         spread[:2] = np.hypot(spread[:2], doubts.least)
         if len(row.values) > 2:
             spread[2:] = np.hypot(spread[2:], doubts.aliased(float(np.exp(row.values[0]))))
-        # The covariance does not include the force's course between samples.
+        # The covariance does not include the force's intersample behaviour.
         for other in others:
             apart = _logarithms(other, mode)
             spread = np.maximum(spread, np.abs(apart.values - row.values) + _half_widths(apart, quantile))

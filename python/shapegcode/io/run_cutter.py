@@ -73,7 +73,7 @@ class RunCutter:
     # --- steps of the clock, and limits ---
 
     def _odd_step(self, line: int, time: float, last: float, stamp: bytes) -> Iterator[RunLog]:
-        """A first event, a step back, or a long silence."""
+        """Handle the first event, a clock that went back, or a long silence."""
         if self._first is None:
             self._first = line, time, stamp.decode("latin-1").strip()
             return

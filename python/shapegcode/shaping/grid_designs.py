@@ -244,7 +244,7 @@ def halved(is_enough: Callable[[int], bool], too_few: int, enough: int, precisio
 
 
 def refined(columns: FloatArray, right: FloatArray, taps: FloatArray) -> FloatArray:
-    """Refine taps to meet ``columns @ taps == right`` to rounding."""
+    """Refine taps to meet ``columns @ taps == right`` to full precision."""
     for _ in range(3):  # the second removes the first one's rounding error, the third has no effect
         taps = taps + np.linalg.lstsq(columns, right - columns @ taps, rcond=1e-14)[0]
     return taps

@@ -219,7 +219,7 @@ class Task:
         return replace(self, period_s=period_s, pool=CutPool.around(self.wide))
 
     def finished(self, taps: FloatArray, lower: float) -> RobustDesign | None:
-        """Remove round-off, re-solve the zeros to rounding, and evaluate; None if the taps become invalid."""
+        """Remove round-off, re-solve the zeros to full precision, and evaluate; None if the taps become invalid."""
         if self.mirrored:
             taps = 0.5 * (taps + taps[::-1])
         largest = None if self.max_abs_sum is None else math.inf

@@ -508,7 +508,7 @@ def _names(runs: Sequence[ObservedRun]) -> list[str]:
 
 
 def _spans(run: ObservedRun) -> list[_Span]:
-    """Spans: adjacent readings with a function between, all between two cuts, and start and end of the run."""
+    """Spans: from a reading to the next across a function, from cut to cut, and at start and end of the run."""
     line, time_s, function = run.line, run.time_s, run.timed.function
     spans = []
 
