@@ -133,7 +133,7 @@ def test_what_is_given_up_is_said() -> None:
         assert entry["residual_um"] == whole["residual_vibration_um"]["original"]
         assert entry["bytes"] == emitted_size(free(), whole)
         assert str(limit) in entry["reason"]
-    (sentence,) = (warning for warning in report["warnings"] if "given up for the budget" in warning)
+    (sentence,) = (warning for warning in report["warnings"] if "effect of the budget" in warning)
     first, last = budget["left_unchanged"][0]["lines"]
     assert (
         f"{len(budget['left_unchanged'])} of {len(FEEDS)} cuts are left unchanged (lines {first} to {last}" in sentence
@@ -370,7 +370,7 @@ def test_command(tmp_path: Path) -> None:
     budget = json.loads((tmp_path / "report.json").read_text())["budget"]
     assert budget["limits"] == limits
     assert budget["left_unchanged"]
-    assert "given up for the budget" in done.stdout
+    assert "effect of the budget" in done.stdout
     assert (
         text
         == sg.convert(sg.Program.from_text(PART, MACHINE), MACHINE, budget=sg.Budget(**limits), shape_all=True).text

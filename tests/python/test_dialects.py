@@ -386,7 +386,7 @@ REFUSED = [
     ("siemens", "G58", "G58 is work coordinate system 5 on FANUC, and a programmable offset of single axes"),
     ("linuxcnc", "G43Z5.", "G43 without H"),
     ("siemens", "G43H7", "G43 H7 is offset 7 on FANUC and D1 of the tool in the spindle"),
-    ("isg", "G08P1", "acceleration at the begin of the block"),
+    ("isg", "G08P1", "acceleration at the beginning of the block"),
     ("isg", "G20", "G20 is inch on FANUC, and mirroring off"),
     ("isg", "G53X0.", "G53 is the machine coordinate system in this block on FANUC, and work offsets off"),
     ("klipper", "G28X0.", "G28 is the move to the reference position through the programmed one on FANUC, and homing"),

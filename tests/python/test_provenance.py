@@ -373,7 +373,7 @@ def test_rigid_changes_nothing_else(name: str, end: str) -> None:
     wanted, found = tomllib.loads(plain.text), tomllib.loads(update.text)
     said, here = (each.pop("origin")["axes"] for each in (wanted, found))
     assert here["x"] == said["x"]
-    assert [here[axis]["rigid"] for axis in "yz"] == ["stated: decided: no mode of it counts"] * 2
+    assert [here[axis]["rigid"] for axis in "yz"] == ["stated: decided: it has no significant mode"] * 2
     for axis in "yz":
         wanted["axes"][axis].pop("modes", None)
         wanted["axes"][axis]["rigid"] = True

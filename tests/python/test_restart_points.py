@@ -187,7 +187,7 @@ def test_without_a_place_of_rest_there_are_points_only_where_stops_are_asked_for
     text = circles(3)
     none = converted(text, restart_interval_s=5.0)
     note = next(each.text for each in none.at_the_control if each.topic == "restart")
-    assert len(none.restart_points) <= 1 and "emission.restart_stops = true stops there" in note
+    assert len(none.restart_points) <= 1 and "emission.restart_stops = true adds a stop" in note
     stopped = converted(text, restart_interval_s=5.0, restart_stops=True)
     note = next(each.text for each in stopped.at_the_control if each.topic == "restart")
     assert len(stopped.restart_points) >= 2

@@ -321,7 +321,7 @@ def test_robust_grid_falls_back_to_the_least_worst_and_says_so() -> None:
     assert choice.worst_residual == least.worst_residual > 0.05
     assert choice.note == (
         "no shaper within 20 ms keeps 46:0.02±10% Hz, 131:0.02±10% Hz below 5 % of the vibration on a 5 ms grid: "
-        "the one with the least worst residual, 9.1 %, is used"
+        "that with the smallest worst residual, 9.1 %, is used"
     )
     assert robust_candidate(PAPER_BANDS, choice.period_s, 0.02).note == choice.note
     assert all(each.worst_residual is None or each.worst_residual > 0.05 for each in choice.candidates)

@@ -165,7 +165,7 @@ _OF_ONE_RUN = (
 
 @dataclass(frozen=True)
 class _OnMachine:
-    """Common data of the runs on one machine: its name as given and in a run, and its folder in the results."""
+    """Common data of the runs on one machine: its name as given and in a run's command, and its folder of results."""
 
     given: str
     word: str

@@ -268,7 +268,7 @@ class LogFacts(Facts):
 
     @property
     def fine_s(self) -> float:
-        """Length up to which a second moving average may be interpolation between unknown periods."""
+        """Longest second moving average that may merely be interpolation between unknown periods."""
         if self.bent and self.period:
             return _FINE_BENT * self.period
         return 0.0 if self.held else _FINE * max(self.period or 0.0, 2.0 * self.sampling)
@@ -312,7 +312,7 @@ def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
 
 
 def _cutting_fits(facts: LogFacts, stops: list[moves.PartLog]) -> dict[str, list[moves.ShapeFit]]:
-    """Fit nominal duration and one or two times of each part, with each shape."""
+    """Fit nominal duration and one or two time constants to each part, with each shape of filter."""
     fits: dict[str, list[moves.ShapeFit]] = {"linear": [], "bell": [], "exponential": []}
     for part in stops:
         nominal = part.part.duration_s
@@ -441,7 +441,7 @@ def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
 
 
 def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, float] | None:
-    """Command, following error and time step, one row for each constant command, to ignore its stairs."""
+    """Command, following error and time step, one row for each period of constant command."""
     if log.actual_mm is None or np.isnan(log.actual_mm[0, index]) or np.isnan(log.command_mm[0, index]):
         return None
     count, first = moves.held_samples(log)

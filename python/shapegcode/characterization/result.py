@@ -34,7 +34,7 @@ class ControllerFact:
 
     @property
     def width(self) -> float:
-        """Width of the interval: infinite for an unknown value, 0 for a word."""
+        """Width of the interval: infinite for an unknown value, 0 for a value that is a word."""
         if self.value is None:
             return math.inf
         return 0.0 if self.low is None or self.high is None else self.high - self.low

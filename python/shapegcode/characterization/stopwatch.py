@@ -35,7 +35,7 @@ class WatchFacts(Facts):
     contradictions: list[str] = field(default_factory=list)  # times that do not agree with the others, in words
 
     def add_if_narrow(self, name: str, value: float, half: float, key: str, needs: str, note: str) -> None:
-        """Add a time in s; as unknown where its interval is too wide or below 0."""
+        """Add a time in s; if its interval is too wide or below 0, add it as unknown."""
         if half > _WIDE * max(abs(value), 0.002):
             self.add_unknown(name, f"needs {needs}; the interval would be ±{half * 1e3:.1f} ms", high=value + half)
         elif value < -half:

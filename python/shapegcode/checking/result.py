@@ -198,7 +198,7 @@ class Check(Result):
             return "drip feed the program (controller.dnc_baud), or split it."
         if "short_block" in worst:
             count = self.counts_by_code["short_block"]
-            stretches = "the stretch" if count == 1 else f"the {count} stretches"
+            stretches = "the sequence" if count == 1 else f"the {count} sequences"
             return f"post longer blocks, or lower the feed, in {stretches} with short blocks (controller.block_time_s)."
         if "axis_feed" in worst:
             return "lower F to the limits of the axes: the control does so anyway."

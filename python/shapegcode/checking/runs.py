@@ -23,8 +23,8 @@ from shapegcode.program import Program
 
 _KIND = _core.BlockKind
 _CUTTING, _RAPID, _DWELL = (kind.value for kind in (_KIND.cutting, _KIND.rapid, _KIND.dwell))
-# The time model rounds the end of a run up to a period, which has a minimum: so the program is timed in slow
-# motion, which makes the period a nanosecond.
+# The time model rounds the end of a run up to a period, which has a minimum. The program is therefore timed at a
+# tiny feed override: relative to the times at full feed, the period is then a nanosecond.
 _PERIOD_S = 1e-5
 _SLOW_MOTION = 1e-4
 _RESOLUTION_S = _PERIOD_S * _SLOW_MOTION
@@ -173,7 +173,7 @@ def _clamped_feeds(line: npt.NDArray[np.int64], feed: FloatArray, ratio: FloatAr
 
 
 def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDArray[Any]:
-    """Time every move (length over feed, no acceleration), one row per move, in slow motion."""
+    """Time every move (length over feed, no acceleration), one row per move, at a very low feed override."""
     model = fanuc_model(machine, feed_override=_SLOW_MOTION, shaped=False)
     model.planner = _core.PlannerRules()
     model.motion = _core.MotionKind.after_interpolation

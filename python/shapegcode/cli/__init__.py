@@ -72,7 +72,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("measure", "measure the simulated part: contour, radius, walls, roughness, vibration"),
     Command("time", "predict the cycle time of a program and show where the time goes"),
     Command("check", "list what the controller would refuse in a program, or not run as programmed"),
-    Command("compare", "prove that nothing else changed between two programs: path, rapids, tools, offsets, functions"),
+    Command("compare", "list what differs between two programs: path, rapids, tools, offsets, functions"),
     Command("setup", "make the first machine file by answering questions"),
     Command("machine", "write or explain a machine file, or import one from the control's parameters"),
     Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),

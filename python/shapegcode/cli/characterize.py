@@ -97,7 +97,7 @@ CHARACTERIZE = Interface(
     "their stopwatch times or servo logs: interpolation period, block time, time constants, in-position times. "
     "--servo takes any log of commands and actual positions: dead time, position gain, feed-forward, friction. "
     "--runs calibrates the cycle-time model (look-ahead, tool changes, M codes, spindle) with programs and their "
-    "logs. Exit code 1 if results contradict, no axis changes its speed, or a run is not predicted within 2 %.",
+    "logs. Exit code 1: results contradict each other, no axis changes its speed, or a time is off by over 2 %.",
     (
         OneOf("what to do", (
             ("--write", "DIR", None, "write the test programs, RESULTS.toml to fill in, and README.txt"),

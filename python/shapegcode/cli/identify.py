@@ -40,7 +40,7 @@ _OF_FILES = (
 
 def _identify(args: argparse.Namespace) -> int:
     if args.tap_plan and args.files:
-        raise ArgumentError("--tap-plan prints instructions and reads no file: omit one of both")
+        raise ArgumentError("--tap-plan prints instructions and reads no file: omit one of the two")
     runner.check_files(args, also_read=[*(args.across or ()), *([] if args.sweep is None else [args.sweep])])
     if args.tap_plan:
         from shapegcode.identification.plan import tap_plan
@@ -77,7 +77,7 @@ def _fit(args: argparse.Namespace) -> int:
     found = replace(found, options=_said_again(args))
     notes, wrote = list(found.notes), []
     if args.update is not None and found.modes and found.doubt and not args.force:
-        notes.append(f"{args.update}: not changed: {found.doubt} (--force writes all the same)")
+        notes.append(f"{args.update}: not changed: {found.doubt} (--force writes it nevertheless)")
     elif args.update is not None and found.modes:
         if args.axis is None or args.sweep is not None:
             _decide(args, machine, found.axis)
@@ -126,7 +126,7 @@ IDENTIFY = arguments.Interface(
         *options.MACHINE_OR_NONE,
         ("--modes", "N", arguments.count, "number of modes (default: by information criterion)"),
         ("--max-modes --most-modes", "N", {"dest": "max_modes", "type": arguments.count},
-         "largest number of modes (default: 40 over frequency, 8 over time)"),
+         "largest number of modes (default: 40 fitted over frequency, 8 fitted over time)"),
         ("--force", None, bool, "write modes with --update even if the verdict is 'do not use'"),
         ("--frequencies", "LOW:HIGH", arguments.frequency_band, "find modes between these frequencies, Hz"),
         ("--decay --ignore-force", None, {"dest": "ignore_force", "action": "store_true"},

@@ -103,8 +103,8 @@ class BudgetOutcome(OldNames):
     """Effect of a budget on a conversion."""
 
     limits: Budget  # the budget; null: no limit
-    # of the program with everything shaped; if the block period was made longer: with the shorter one, before any
-    # region is slowed for the contour tolerance
+    # of the program with every cut shaped; if the budget lengthens the block period: at the period without budget,
+    # before any region is slowed for the contour tolerance
     before: TextNeeds
     after: TextNeeds  # of the emitted program
     block_period_s: float  # block period of the program
@@ -138,7 +138,7 @@ class Spending:
         design: Callable[[float], Grid],
         write: Callable[[Grid], Written],
     ) -> Grid:
-        """Choose the block period with the largest gain within the rate limits; of equals the shortest shaper."""
+        """Choose the block period with the largest gain within the rate limits; among equals the shortest shaper."""
         weights = [residual * 1e3 / unit for unit, residual in zip(self._unit_um, residuals_mm, strict=True)]
         written = write(grid)
         loads = written.loads
@@ -163,7 +163,7 @@ class Spending:
             if self._worth(longer, loads, weights) > self._worth(best, best_loads, weights):
                 best, best_loads = longer, loads
         self._longer = best is not grid
-        if self._longer:  # else noted from the program that is judged
+        if self._longer:  # else set from the program that is judged
             self._before = _needs(grid, written)
         return best
 
@@ -212,9 +212,9 @@ class Spending:
             stays = max(max(entry.residual_um) for entry in entries)
             parts.append(
                 f"{len(entries)} of {len(self._program.regions)} cuts are left unchanged (lines {lines}) "
-                f"and up to {stays:.1f} um of residual vibration"
+                f"with up to {stays:.1f} um of residual vibration"
             )
-        return f"{self._program.source}: given up for the budget: {'; '.join(parts)}" if parts else ""
+        return f"{self._program.source}: effect of the budget: {'; '.join(parts)}" if parts else ""
 
     def _factors(self, loads: Mapping[int, TransferLoad]) -> list[float]:
         factors = (self.budget.excess(load) for load in loads.values())

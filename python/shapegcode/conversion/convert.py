@@ -221,7 +221,7 @@ def simulate(plan: ConversionPlan, written: Written, text: ReadBack, *, prefetch
 
 
 def keep_what_pays(plan: ConversionPlan, shaped: Shaped) -> Shaped:
-    """Loosen cuts or leave them unchanged because of the budget, small gain, or the program's price."""
+    """Loosen tolerances of cuts or leave cuts unchanged because of the budget, small gain, or the program's price."""
     while plan.spending is not None and plan.spending.give_up(plan.grid, shaped.written, plan.verdicts(shaped)):
         for index, left_unchanged in plan.spending.left_unchanged.items():
             plan.reasons[index] = left_unchanged.reason

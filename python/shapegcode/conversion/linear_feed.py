@@ -18,7 +18,7 @@ _MERE_MOVE = re.compile(r"(?:N\d+)?(?:G0?[123])?(?:[XYZIJKRF]-?(?:\d+\.\d*|\.\d+
 def linear_lines(
     lines: Mapping[int, str], path: _core.Path, blocks: Sequence[_core.LinearBlock], decimals: int
 ) -> dict[int, list[str]]:
-    """What takes the place of lines of shaped blocks, by their numbers; none where one is joined with another."""
+    """Replacements of the lines of shaped blocks, by line number; none for a line that is joined to another."""
     numbers = [int(number) for number in path.segment_lines]
     written: dict[int, list[str]] = {number: [] for number in numbers}
     is_linear, code, start = False, "", np.asarray(path.start_mm, dtype=float)
@@ -46,7 +46,7 @@ def linear_lines(
 
 
 def joints_of(lines: Mapping[int, str], numbers: Sequence[int]) -> list[int] | None:
-    """Blocks that must begin one: after other lines, and those with N words; None: a line is no mere move."""
+    """Blocks that must begin a joined block: after other lines, and with N words; None: a line is not only a move."""
     if not all(_MERE_MOVE.fullmatch(lines[number]) for number in numbers):
         return None
     pairs = enumerate(pairwise(numbers), start=1)

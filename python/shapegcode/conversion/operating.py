@@ -25,9 +25,9 @@ from shapegcode.verdict.figures import Placed, ProgramFigures
 
 _NAMED_LINES = 4
 _SHOWN_POINTS = 12
-_SINGLE_BLOCKS = 200  # so many of the fastest blocks are simulated
+_SINGLE_BLOCKS = 200  # number of the fastest blocks that are simulated
 _PRESSES_PER_S = 2.0
-_FAST_RATIO, _FAST_BLOCKS = 0.5, 4000  # ratio to the highest feed; largest number of them, evenly spread
+_FAST_RATIO, _FAST_BLOCKS = 0.5, 4000  # least ratio to the highest feed; largest number used
 _CHUNK = 1 << 16  # bytes
 _TAPE_CHARACTERS_PER_M = 1000.0 / 2.54  # a row of holes every tenth of an inch
 
@@ -177,7 +177,7 @@ def _restarts(emitted: Program, written: Written, machine: Machine) -> Iterator[
         yield (
             f"{count} restart point{'' if count == 1 else 's'} inside long cuts, where the command is nearly at "
             f"rest: spindle on, tool, H and coordinate system of the list in force{switched}, go to its position from "
-            f"above, then search the N number; a start there excites one vibration of up to {shakes_um:.0f} µm"
+            f"above, then search the N number; a start there excites one vibration of up to {shakes_um:.1f} µm"
         )
     if stops := sum(each.stops for each in restarts):
         cost_s = sum(each.stops_s for each in restarts)
@@ -192,8 +192,8 @@ def _restarts(emitted: Program, written: Written, machine: Machine) -> Iterator[
     ]
     for (first, last), each in sorted(long, key=lambda pair: -pair[1].longest_s)[:1]:
         more = f" (and {len(long) - 1} more cuts)" if len(long) > 1 else ""
-        why = each.reason or "no position where it is nearly at rest"
-        remedy = "" if each.reason or emission.restart_stops else "; emission.restart_stops = true stops there"
+        why = each.reason or "the command is nowhere nearly at rest"
+        remedy = "" if each.reason or emission.restart_stops else "; emission.restart_stops = true adds a stop"
         yield (
             f"no restart point for {_duration(each.longest_s)} in the cut of lines {first} to {last}{more}: "
             f"{why}{remedy}"

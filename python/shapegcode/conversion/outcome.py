@@ -41,7 +41,7 @@ from shapegcode.verdict.judge import (
 )
 
 _MOSTLY = 0.7  # ratio of the command's contour error to that of the machine table
-_TRIALS = (0.9, 0.7, 0.5)  # ratios to the time constant that a proportional rounding would allow
+_TRIALS = (0.9, 0.7, 0.5)  # tried ratios to the time constant that suffices if rounding is proportional to it
 # A warning is issued for a figure worse than the original's by this ratio and by this size in um.
 _WORSE_RATIO, _WORSE_UM = 1.2, 5.0
 # Permitted distance of the emitted path from the original's: the larger of both.

@@ -111,7 +111,7 @@ def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[mo
     if conversion.tolerance_curve is not None:
         sentence = conversion.tolerance_curve.sentence
         how = f"{sentence}. " if sentence else ""
-        how += "As asked: simulated; the others planned, for the cuts that can be shaped. Limits: table [price]."
+        how += "The time as asked was simulated, the others are planned. Limits: table [price]."
         yield model.Section("price", "Tolerance against time", (curve_table(conversion.tolerance_curve),), how=how)
 
 

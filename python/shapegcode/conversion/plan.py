@@ -127,7 +127,7 @@ class Aims:
         return tightened
 
     def keep_cut_price(self, written: Written, keepable: Callable[[int], bool], attempts_left: int) -> bool:
-        """Loosen cuts that exceed the price of one cut; leave those unchanged that exceed it at any tolerance."""
+        """Loosen the tolerance of cuts above the price of one cut; leave those unchanged that exceed it at any."""
         percent = self._machine.price.cut_time_percent
         changed = False
         for place in written.placed:
@@ -153,7 +153,7 @@ class Aims:
     def keep_program_price(
         self, excess_s: float, gains_um: Mapping[int, float], keepable: Callable[[int], bool]
     ) -> bool:
-        """Loosen all cuts to a common tolerance until the program is within its price; then leave cuts unchanged."""
+        """Loosen the tolerance of all cuts to a common value until the price is kept; then leave cuts unchanged."""
         cuts = [index for index in gains_um if not self.reasons[index]]
         wanted_s = math.fsum(self.emitted_s[index] for index in cuts) - excess_s
 
@@ -533,7 +533,7 @@ class ConversionPlan:
             self.leave_everything("every cut of the original keeps its limits")
 
     def leave_everything(self, reason: str) -> None:
-        """Leave all cuts unchanged that can be; those without a reason get this one."""
+        """Leave every cut unchanged for which that is possible; a cut without a reason gets this one."""
         for index in self.chosen:
             if self.is_keepable(index):
                 gained = self.gains_um.get(index)

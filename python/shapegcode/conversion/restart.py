@@ -107,7 +107,7 @@ def system_of(state: _core.ModalState) -> str:
 def restart_points(
     program: Program, cuts: Iterable[tuple[Placed, CutRestarts, int | None]]
 ) -> tuple[RestartPoint, ...]:
-    """The restart points of a program with their modal states; the third entry of a cut is its tool."""
+    """The restart points of a program with their modal states. *cuts*: region, its restart points, T number."""
     return tuple(
         RestartPoint(
             number=mark.number,
@@ -329,7 +329,7 @@ class _PointLines:
         return None
 
     def _in_force(self, pattern: re.Pattern[bytes], end: int, before: bytes) -> bytes:
-        """The last word of a kind up to a byte; *before* if the piece has none."""
+        """The last word of a kind before a byte of the piece; *before* if there is none."""
         while end > 0:
             begin = self._text.rfind(b"\n", 0, end) + 1
             line = self._text[begin:end].lstrip(b"\r")

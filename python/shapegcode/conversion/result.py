@@ -55,7 +55,7 @@ class ChangeProof:
 
     answer: str  # such as "42 of 42 rapids, 7 of 7 tool calls, 31 of 31 offsets unchanged; programmed …"
     counts: tuple[KindCount, ...]  # for each kind that occurs in one of the programs
-    path_um: float  # largest distance of the paths of a cut, seen from either; of the command, not of the machine table
+    path_um: float  # largest distance between the paths of a cut, both ways; of the command, not of the table
     refused: tuple[ProgramDifference, ...]  # differences not explained by shaping; none: proven
 
 
@@ -70,7 +70,7 @@ class DialectNotes:
 
     @property
     def sentence(self) -> str:
-        """The target control and the assumed topics, in one sentence."""
+        """The target control, and the topics whose rules are assumed, in one sentence."""
         assumed = f"; assumed: {', '.join(self.assumed)}" if self.assumed else ""
         return f"written for {self.control} (emission.dialect = {self.name}){assumed}"
 
@@ -404,7 +404,7 @@ class Conversion(ProgramFigures, Result):
             BeforeAfter("block period", "ms", None, self.block_period_s * 1e3, 3),
         ]
         if self.budget is not None:
-            rows.append(BeforeAfter("regions given up for the budget", "", None, len(self.budget.left_unchanged), 0))
+            rows.append(BeforeAfter("cuts left unchanged for the budget", "", None, len(self.budget.left_unchanged), 0))
         rows.append(BeforeAfter("duration of the shaper", "ms", None, self.shaper.duration_s * 1e3, 3))
         if self.shaper.per_axis_duration_s:
             shorter_ms = self.shaper.per_axis_duration_s * 1e3

@@ -25,7 +25,7 @@ from shapegcode.verdict.judge import Judge, RegionFigures
 _LEAST_SHARE = 0.01  # of a limit: smaller effects do not matter
 _MOST_SHOWN = 8
 _FREE_S = 60.0  # of motion: always simulated
-_FULL_RUNS = 2  # about half as many as the verdict simulates per region with its contour
+_FULL_RUNS = 2  # simulations of a whole region; the verdict needs about twice as many
 _FILTER_S = 0.024  # moving average of 1769 or 1622 on a machining centre, if the file has none
 _MODE = {"frequency_hz": 40.0, "damping_ratio": 0.02}  # of an axis of a machining centre, if none is known
 _USUAL_MODE = f"a mode of {_MODE['frequency_hz']:g} Hz"
@@ -178,7 +178,7 @@ def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
 
 
 def _other_command(machine: Machine, unmeasured: Mapping[str, KeyValue], key: str, other_s: float) -> Iterator[_Trial]:
-    """A trial of another time that also changes the set-points; none if measured, or if the time is invalid."""
+    """A trial with another time constant or period, which changes the set-points too; none if measured or invalid."""
     with suppress(MachineError):
         if key in unmeasured:
             yield _Trial(unmeasured[key], f"{other_s:g} s", machine.with_values(key, other_s), moves_command=True)

@@ -185,7 +185,7 @@ class _Translator:
         self._joined_um = 0.0
         self._rapid = min(axis.rapid_mm_per_min for axis in machine.axes.as_tuple())
         core = program.core
-        self._has_percent = core.find(b"%", 1 + core.find(b"%")) > 0  # a single one is the last
+        self._has_percent = core.find(b"%", 1 + core.find(b"%")) > 0  # a single % is the one at the end
         dwells = (each for each in core.steps if each[0] == _core.StepKind.move)
         others = core.other_moves
         self._dwells = {line: others[index][1] for _, index, line in dwells if others[index][1] > 0.0}
@@ -213,7 +213,7 @@ class _Translator:
             self._lasts |= {max(times, default=-1)}
 
     def _join(self, blocks: _core.Path, period_s: float) -> None:
-        """Write the blocks of a shaped cut with a feed that is linear along them, where their lines are mere moves."""
+        """Write the blocks of a shaped cut with a feed that is linear along them, where their lines are only moves."""
         text = self._program.expanded_text.decode("latin-1").split(self._program.core.line_end)
         numbers = [int(number) for number in blocks.segment_lines]
         lines = {number: text[number - 1].replace(" ", "") for number in numbers}
@@ -379,7 +379,7 @@ class _Translator:
         return lines
 
     def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
-        """Original words of the program's own control, used instead of their translation."""
+        """Words of an original for this very control, restored in place of their translation from FANUC."""
         held = dict(words)
         found = {}
         if (tool := self._names.get(f"T{held.get('T', '')}")) is not None:
@@ -495,7 +495,7 @@ class _Translator:
 
     def _offset(self, number: int, value: str) -> str:
         if self._own.get("G43", "G43") != "G43":
-            return ""  # what takes the place of G43 takes that of H too
+            return ""  # what replaces G43 replaces H too
         if self._dialect.arc_radius != "CR=":
             return f"H{value}"
         if value.lstrip("0") != self.state.tool:
@@ -592,7 +592,7 @@ def _arcs(program: Program) -> Iterator[tuple[int, _core.Segment]]:
 
 
 def _block_times(blocks: _core.Path, period_s: float) -> Iterator[tuple[int, str]]:
-    """Yield line and time of each block in whole periods; with F rounded up it ends just before."""
+    """Yield line and time of each block in whole periods; as F is rounded up, it ends slightly earlier."""
     for number, line in enumerate(blocks.segment_lines):
         segment = blocks[number]
         periods = max(1, round(segment.length_mm / segment.feed_mm_per_s / period_s))

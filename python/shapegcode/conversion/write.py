@@ -67,7 +67,7 @@ class RegionText:
         self._parts = self._inside = None
 
     def stands_in(self, program: Program, begin: int) -> None:
-        """Take the text from a program's text, from byte *begin* on."""
+        """Hold the text as a part of the program's text from now on, starting at byte *begin*."""
         self._parts, self._inside = None, (program, begin)
 
 
@@ -144,7 +144,7 @@ _PIECE_PERIODS = 1 << 17  # of a region at a time: bounds the memory
 _CORNER_SHARE = 0.75  # deviations of several corners within one shaper duration add up
 
 
-_FADED = 1.0 / 3.0  # of the decay time to a millionth: decay to a hundredth
+_FADED = 1.0 / 3.0  # part of the time to decay to a millionth in which it decays to a hundredth
 
 _TARGETS = {
     "response": _core.ContourTarget.response,
@@ -174,7 +174,7 @@ class _Marks:
         """N word at the start of the region, as written, to put before its prologue; empty: none."""
 
     def within(self, piece: _core.ShapedCommand, *, last: bool) -> tuple[list[_core.BlockMark], list[int]]:
-        """Marks of a piece and the periods at which its blocks must end for them, counted from its start."""
+        """Restart marks within a piece, and the periods from its start at which blocks must end for them."""
         first = piece.first_period
         end = first + len(piece.middle_mm)
         reached = piece.segment_periods

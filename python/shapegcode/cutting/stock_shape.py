@@ -44,7 +44,7 @@ class StockPiece:
 
 
 def stock_polygons(stock: Stock, paths: Sequence[_core.Path], tool_radius_mm: float) -> list[StockPiece]:
-    """The stock as prisms over polygons; for the kind `program` that before the roughing program."""
+    """The stock as prisms over polygons; for the kind `program`, the stock before the roughing program."""
     if stock.allowance is not None:
         return _pieces(_Allowance(stock, stock.allowance, tool_radius_mm).area(paths), stock.allowance.z_mm)
     solid: Solid | Stock = stock if stock.program is None else stock.program.on
@@ -84,7 +84,7 @@ def _pieces(area: Area | MultiPolygon, z_mm: tuple[float, float]) -> list[StockP
 
 
 class _Allowance:
-    """Builds the area left by roughing (Kim and Ko, 2001, paper 001): the part thickened, with roughing's corners."""
+    """Builds the area left by roughing (Kim and Ko, 2001, paper 001): part plus layer, with the corners of roughing."""
 
     def __init__(self, stock: Stock, allowance: Allowance, radius_mm: float) -> None:
         self._stock, self._keys, self._radius = stock, allowance, radius_mm
@@ -218,7 +218,7 @@ def _extended(points: Points, length_mm: float) -> Points:
 
 
 def _with_touched(points: Points) -> Points:
-    """Insert points of a line at which it passes through itself, where it overlaps its start."""
+    """Insert into a line the points at which another part of it touches it, as where it overlaps its start."""
     import shapely
 
     pieces = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
@@ -337,7 +337,7 @@ def _turns(shape: Geometry, corners: Points) -> NDArray[np.intp]:
 
 
 def _meeting(corner: Points, pieces: NDArray[np.object_], tree: STRtree, distance_mm: float) -> Points:
-    """Move a corner to the distance from both adjacent lines; unchanged with only one line."""
+    """Move a corner until it has this distance from both adjacent lines; unchanged with only one line."""
     import shapely
 
     moved = corner

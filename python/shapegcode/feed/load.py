@@ -224,7 +224,7 @@ def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTrac
 
 
 def _wall(force: _core.MillingForce, beam: _core.ToolBeam, arcs: Vector, feed: float, height: Vector) -> Vector:
-    """Error of the wall to the right of the feed, or to the left if only that is made."""
+    """Error of the wall to the right of the feed; of the left wall if only that is cut."""
     for side in (_core.WallSide.right, _core.WallSide.left):
         error = np.asarray(_core.wall_error_um(force, beam, arcs, feed, side, height))
         if np.isfinite(error).any():

@@ -17,7 +17,7 @@ from shapegcode.model.machine_model import MachineModel
 
 Vector = npt.NDArray[np.float64]
 _ATTEMPTS = 12
-_LONGEST_REACH = 2.0  # multiple of the lag beyond which more reach has no effect
+_LONGEST_REACH = 2.0  # multiple of the lag beyond which slowing down earlier has no effect
 _LOWERING = 3  # attempts that only slow down earlier, before feeds are reduced too
 _SAME_DIRECTION = 0.95  # cosine of a turn that does not change the load
 _MIN_SHARE = 0.9  # least ratio of one reduction of a feed
@@ -238,7 +238,7 @@ def goes_on(track: _core.EngagementTrack) -> npt.NDArray[np.bool_]:
 
 
 def _stepped(limit: Vector, programmed: Vector) -> Vector:
-    """Feeds rounded down to steps of half a percent below the programmed one, or the largest if that is more."""
+    """Feeds rounded down in steps of half a percent from the programmed feed; those above it, from the largest."""
     top = np.where(limit > programmed, limit.max(initial=0.0), programmed)
     steps = np.ceil(np.log(top / limit) / math.log1p(_STEP) - 1e-9)
     return np.asarray(top * (1.0 + _STEP) ** -steps)

@@ -126,7 +126,7 @@ def _feed_axis(panel: Axes, feeds: Vector) -> None:
 
 
 class _Along:
-    """Plot values over the distance: steps, or bands where an interval has several stations."""
+    """Plot values over the distance: steps, or bands where an interval contains several values."""
 
     def __init__(self, traces: FeedTraces, starts: npt.NDArray[np.intp]) -> None:
         self._starts = starts

@@ -267,7 +267,7 @@ def _move(move: SurveyedMove, machine: Machine) -> result.KeptMove:
     misses = ["its force is unknown: no spindle speed"]
     if load is not None:
         misses = [
-            f"cut at its own feed: {words} {getattr(load.emitted, column).max():.4g} {unit}, limit {limit:.4g} {unit}"
+            f"cut at its old feed: {words} {getattr(load.emitted, column).max():.4g} {unit}, limit {limit:.4g} {unit}"
             for column, words, unit, limit in exceeded(move.tool, load.emitted, machine)
         ]
     return result.KeptMove(move.place, move.feed_mm_per_min, tuple(misses), load)
@@ -332,7 +332,7 @@ def _resultant(loads: Sequence[Load]) -> result.ResultantForce:
 
 
 def _peak(column: str, loads: Sequence[tuple[Callable[[int], str], PathLoad]]) -> result.PeakLoad:
-    """Largest value of a column before and after, with the location of the latter; loads come with their locator."""
+    """Largest value of a column before and after, with the location of the latter. *loads*: a function that locates, and the load."""
     original, emitted, place = 0.0, 0.0, ""
     for place_of, load in loads:
         was, now = getattr(load.original, column), getattr(load.emitted, column)

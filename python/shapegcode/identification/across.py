@@ -62,12 +62,12 @@ class _Amplitudes:
     variance: FloatArray  # (m,) of real and imaginary part together
 
     def turned(self, is_turned: bool) -> _Amplitudes:
-        """Amplitudes with the sensor's own sign, as along the other axes."""
+        """Amplitudes with the sign of the recorded signal, like those along the other axes."""
         return replace(self, value=-self.value) if is_turned else self
 
 
 def measured(sources: Sequence[Any], options: ReadOptions) -> list[Measured]:
-    """Records and frequency responses; files are read."""
+    """Split measurements into records and frequency responses; read those that are files."""
     found: list[Measured] = []
     for each in sources:
         found += [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options)

@@ -99,7 +99,7 @@ def _response(
 
 
 def _windows(trace: ServoTrace, period_s: float) -> list[tuple[FloatArray, FloatArray]]:
-    """Changes of speed, mm per period, of both in each part between rests; tapered windows if there are no rests."""
+    """Changes of speed of command and actual position in each part between rests; tapered windows without rests."""
     found: list[tuple[FloatArray, FloatArray]] = []
     after, size = round(_AFTER_S / period_s), round(_WINDOW_S / period_s)
     for command, actual in zip(trace.command, trace.actual, strict=True):

@@ -297,14 +297,14 @@ def is_clipped(values: FloatArray) -> bool:
                 continue
             reach = (len(run) + 1) // 2
             sides = [k for k in (int(run[0]) - reach, int(run[-1]) + reach) if 0 <= k < len(signal)]
-            # Clipping is steep on both sides; a peak at a kink, where the force begins or ends, on one.
+            # Clipping is steep on both sides; a peak at a kink, where the force begins or ends, on one only.
             if sides and top - max(float(signal[k]) for k in sides) > _SMOOTH_FALL * step:
                 return True
     return False
 
 
 def _is_flat_topped(signal: FloatArray) -> bool:
-    """Whether the highest lobe is clipped under noise: half of its upper half is above 95 %, 0.3 of a smooth one"""
+    """Whether the highest lobe is clipped under noise: half of its upper half is above 95 %, 30 % of a smooth one's"""
     top, crest = float(np.max(signal)), int(np.argmax(signal))
     lobes = (label(signal > share * top)[0] for share in (_NEARLY_TOP, 0.5))
     high, half = (np.count_nonzero(lobe == lobe[crest]) for lobe in lobes)

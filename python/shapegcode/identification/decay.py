@@ -46,7 +46,7 @@ def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
 
 
 def _forward_rms(values: FloatArray, window: int) -> FloatArray:
-    """RMS over each sample and those after it."""
+    """RMS over a window that starts at each sample."""
     power = np.concatenate(([0.0], np.cumsum(values**2)))
     begins = np.arange(len(values))
     ends = np.minimum(begins + window, len(values))

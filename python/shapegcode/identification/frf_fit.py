@@ -175,7 +175,7 @@ def _of_lines(each: FrequencyResponse, inside: npt.NDArray[np.bool_]) -> Frequen
 
 
 def _merged(used: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
-    """The mean of several responses of one point, with their differences as coherence."""
+    """The mean of several responses of one point, with a coherence from their differences."""
     stacked = np.array([each.response for each in used])
     mean = np.mean(stacked, axis=0)
     scatter = np.sum(np.abs(stacked - mean) ** 2, axis=0) / (len(used) - 1) / len(used)
@@ -290,7 +290,7 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
-    """Reweight lines for the model residual: constant, proportional to the response, or half of each."""
+    """Reweight lines by the model residual: constant, proportional to the response, or half of each."""
     left = np.abs(lines.response - model) ** 2
     # Lines without a mode nearby have no model: they keep their assumed noise.
     left = np.where(left > 0.0, left, np.log(2.0) / lines.weight**2)
@@ -527,7 +527,7 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
     share = min(lines.independent for lines in window.parts)
     starts = [each for place, each in enumerate(starts_of(fit)) if place != index]
     apart = np.abs(fit.omega - omega) > zeta * omega + fit.zeta * fit.omega
-    # A mode within its width must not take its place.
+    # A neighbour within its width must not move to its frequency: few iterations.
     effort = (0, 1.0) if np.count_nonzero(~apart) == 1 else (10, 1e-4)
     without = fitted(window.parts, starts, effort)
     gain = np.inf if without is None else frf_search.evidence_of(without, share) - frf_search.evidence_of(fit, share)

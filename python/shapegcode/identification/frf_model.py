@@ -46,7 +46,7 @@ class Lines:
 
     @cached_property
     def weighted_background(self) -> FloatArray:
-        """(2n, k) weighted columns of the background."""
+        """(2n, k) weighted columns of the background (modes outside the lines)."""
         return self.weighted(self.background)
 
     def weighted(self, columns: ComplexArray) -> FloatArray:
@@ -62,7 +62,7 @@ class Lines:
 
     @property
     def independent(self) -> float:
-        """Independent fraction of the lines."""
+        """Fraction of the lines whose noise is statistically independent."""
         return 1.0 / float(1.0 + 2.0 * np.sum(np.abs(self.correlation[1:]) ** 2))
 
 

@@ -23,11 +23,11 @@ _MARGIN = 1.3  # a window's lines extend beyond its ends by this factor
 _BESIDE = 0.02, 3.0  # modes used beyond the lines: within this ratio of the frequency, and damping ratios
 STABLE = 0.34  # fraction of higher orders with a pole that is fitted from the start
 _SEEN = 0.12  # ... that is tried
-_CLEARLY = 40.0  # times ln of the samples: loss of fit without a mode, before the others are refitted
+_CLEARLY = 40.0  # times ln(samples): a mode is certainly needed if the fit without it, not refitted, is worse by more
 _QUICK, _FULL = (8, 1e-3), (40, 1e-8)  # iterations, and the gain that ends them
 _TRIED, _WEAKEST = 3, 2
 _MORE_REAL = 2  # real modes may exceed 1.5 times the complex ones by this number
-_UNUSUAL = 2.0  # times the median residual: near a mode that may be two
+_UNUSUAL = 2.0  # times the median residual: a mode with more near it may be two
 _LINES_PER_MODE = 4
 _FEW = 350  # lines of a window used in trials
 _BAND_LINES = 48  # least lines of a band or window
@@ -337,7 +337,7 @@ class _Selection:
 
 
 def _pruned(parts: Sequence[Lines], starts: Starts) -> Starts:
-    """Of too many poles those that explain most, unchanged, as many as the evidence supports."""
+    """Select the poles that explain most, as many as the evidence supports, without changing them."""
     if not starts:
         return []
     omega, zeta = np.array(starts).T

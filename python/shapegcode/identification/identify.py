@@ -74,7 +74,7 @@ def identify(
         start_s: time at which a decay begins; None: found automatically.
         stops: the records are of an ordinary run: every stop after which the machine rests is a decay, the 20
             strongest of each. Motion slower than 10 Hz, or than the lower end of `band_hz` is no vibration.
-        accepted_percent: a mode is refused whose damping ratio is less certain than this (95 %; of a fit over time its
+        accepted_percent: a mode is refused if half its 95 % interval of damping is wider (of a fit over time its
             stiffness too); None: 5 % over time, 50 % over frequency.
         sweep: the program that ran during the record and moves one axis, as from `write_sweep`: its command takes the
             place of the force, the logger's start and clock error are found from the record.
@@ -88,7 +88,7 @@ def identify(
 
     Raises:
         ArgumentError: a number of modes that is not from 1 to 99; a sweep without its machine.
-        RecordError: no record can be used; the message gives the fault and the need. No response along another axis.
+        RecordError: no record can be used; the message says why and what is needed. No response along another axis.
         OSError: a file cannot be read.
 
     Source: Back, Ko and Kim, 2003 (paper 003 in docs/evidence/references.md) for its ARMA models; the fit in
@@ -275,14 +275,14 @@ def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
 _FEW_MODES, _MORE, _START_DAMPING = 4, 2, 0.02  # most modes fitted over time; more than those visible in the spectrum
 _SAMPLES_IN_TIME = 20_000  # most samples of all records for a fit over time
 _EXPLAINED, _NOISE_SHARE = 0.003, 1.5  # largest residual of few modes, relative to the record's RMS, or to its noise
-_MANY = "many modes, or more than modes: fitted over frequency, band by band, within the excited band"
+_MANY = "many modes, or vibration that is no mode: fitted over frequency, band by band, within the excited band"
 _COLOURED = 4.0  # residuals count as coloured above so many standard errors of their autocorrelation
 _SPECTRUM = 4096  # points of the force's transform
 _FOLDED = 2.0 / 3.0
-_FILTER_ERROR = 3e-4  # largest error of a mass by decimation: the filters stop 80 dB
+_FILTER_ERROR = 3e-4  # largest error of a mass by decimation: the filters attenuate by 80 dB
 _FILTER_MOVES = (1e-6, 1e-4)  # ... and to a frequency and a damping ratio
 _FINER = 16  # steps per sampling period of the check by Wilson's method
-_POSSIBLY = 15.0  # allowed loss of evidence (twice the log odds) of another intersample course of the force
+_POSSIBLY = 15.0  # allowed loss of evidence (twice the log odds) of another intersample behaviour of the force
 
 
 def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sought) -> Identification:
@@ -362,13 +362,13 @@ def _warnings_of(ready: Prepared) -> list[str]:
 def _choose_course(
     problem: FitProblem, models: model_search.Search, sought: model_search.Sought
 ) -> tuple[FitProblem, model_search.Search, list[Fit]]:
-    """Choose the intersample course of the force by evidence; also returns fits of the other possible courses."""
+    """Choose the intersample behaviour of the force by evidence; also returns fits with the other possible ones."""
     courses = [(problem, models)]
     order = max(sought.order(models), 1)
     for other in problem.other_courses(models.fits[order - 1]):
         fits = tuple(other.fit(model_search.starts_of(fit)) for fit in models.fits[:order])
         evidence = tuple(model_search.evidence_of(other, fit) for fit in fits)
-        # Search only where another course may win: a wrong course needs extra modes.
+        # Search only where another behaviour may win: a wrong one needs extra modes.
         may_win = min(evidence) < min(models.evidence)
         courses.append((other, model_search.search(other, sought) if may_win else model_search.Search(fits, evidence)))
     best = min(courses, key=lambda course: min(course[1].evidence))

@@ -51,7 +51,7 @@ _EXPLAINED = 0.5  # least fraction of a part's power explained by the others
 _FEWEST_PARTS = 2
 _LOWEST_HZ, _NARROWEST = 4.0, 8.0  # lowest line; highest line over it
 _HELD = 0.002  # fraction of samples at a range end with an equal neighbour
-_LOUD, _QUIET, _LEVELLED_HZ = 0.1, 0.01, 1.0  # energy of a used part over the loudest; floor and width of levelling
+_LOUD, _QUIET, _LEVELLED_HZ = 0.1, 0.01, 1.0  # energy of a used part over the loudest; whitening: floor, width
 _SAME_START_S, _AWAY_S, _STANDS_OUT = 0.15, 0.5, 2.0
 _GAINS_PER_S = np.geomspace(10.0, 200.0, 14)
 _LOWEST_SHARE = 0.15  # relative to the power of the command
@@ -172,7 +172,7 @@ def _held_at_ends(values: FloatArray) -> bool:
 
 
 class _Clock:
-    """Clock of a record; near a part's middle, program time = middle + (logger's time - its place) * (1 + rate)."""
+    """Clock of a record; around a part's middle, program time = middle + (logger's time - its own) * (1 + rate)."""
 
     def __init__(self, command: KnownCommand, record: Record) -> None:
         if record.quantity != "acceleration":
@@ -210,7 +210,7 @@ class _Clock:
         self.correlation = float(np.mean(self.shares))
 
     def _coarse(self) -> tuple[float, float, float, FloatArray]:
-        """Rate, start, wait, squared correlation of each part; from below 40 Hz and 40 % of the sampling rate."""
+        """Find rate, start, wait, squared correlation of each part, below 40 Hz and 40 % of the sampling rate."""
         command, period = self.command, self.record.period_s
         thinner = max(1, int(0.4 / period / _COARSE_HZ))
         values = resample_poly(self.values, 1, thinner)
@@ -364,7 +364,7 @@ class _Clock:
         )
 
     def _refine(self, rows: npt.NDArray[np.intp], furthest: float) -> None:
-        """Find the rate at which each part agrees best with the next, whose start is free, and the wait between."""
+        """Find the clock's rate at which neighbouring parts agree best at any time between them; then that time."""
         band_hz = _LOWEST_HZ, _CLOCK_HZ
 
         def shares(rate: float) -> Spectra:  # response times conjugate command, over the power of all parts
@@ -439,7 +439,7 @@ class _Clock:
 
 
 def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
-    """Parts that are clear, or correlate best at their expected place and are significant or lie between such."""
+    """Parts that are clear, or correlate best at the expected time and are significant or between used parts."""
     lags = np.linspace(-_AWAY_S, _AWAY_S, 401)
     crossed = spectra.response * np.conj(spectra.command)
     height = np.abs(crossed @ np.exp(spectra.turn[:, None] * lags))
@@ -464,8 +464,8 @@ def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
         return lags
 
     lags = moved(np.zeros(len(rows)), each, _LONGEST_LAG_S)
-    # A rise dominates the other parts' harmonics in the band of its fall and determines the time between the two; all
-    # parts first get the median of that. Then both move together: alone, each would be kept in place by the other.
+    # In the band of a pair the rise and the fall outweigh the harmonics of other parts, so each determines the lag of
+    # the other: all parts first get the median of it. Then pairs are shifted as a whole: a single part would not move.
     between = [lags[pair[1]] - lags[pair[0]] for pair in pairs if len(pair) > 1]
     lags = np.asarray((float(np.median(between)) if between else 0.0) * (rows - np.mean(rows)), dtype=np.float64)
     lags = moved(lags, each, _IRREGULAR_S)

@@ -24,7 +24,7 @@ _MOST_STEADY = 12
 
 
 def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, list[float]]:
-    """Steady oscillations (hum, a pump), equal in both halves of the late part, and their frequencies."""
+    """Steady oscillations (hum, a pump) with their frequencies: equal in both halves of the record's late part."""
     samples = len(response)
     half = int(samples * (1.0 - _LATE)) // 2
     first, second = response[samples - 2 * half : samples - half], response[samples - half :]
@@ -64,7 +64,7 @@ class Hits:
     response: ComplexArray  # (impacts, n)
     kept: slice  # used lines of the transform
     starts: tuple[int, ...]  # first sample of each record
-    count: int  # samples samples per record
+    count: int  # samples per record
     period_s: float
     sigma: float  # 1/s: the window of the responses is exp(-sigma t)
     gain_error: FloatArray  # (n,) relative standard error of the force's spectrum: noise of its channel
@@ -140,7 +140,7 @@ def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
 
 
 def weighted(lines: Lines, noise: FloatArray) -> Lines:
-    """The same lines with weights for a noise power of each."""
+    """The same lines, weighted by the noise power of each line."""
     # As acceleration: noise of a displacement integrated from it may exceed all modes at the lowest lines.
     course = lines.omega ** (2.0 - lines.power)
     least = (_MIN_NOISE * float(np.max(np.abs(lines.response * course))) / course) ** 2

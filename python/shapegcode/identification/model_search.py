@@ -19,7 +19,7 @@ from shapegcode.io.units import FloatArray
 # Least fraction of the energy that a further mode explains: sensors are nonlinear by 0.1 % of amplitude.
 _MIN_SHARE = 1e-6
 _START_DAMPING = (0.01, 0.05)
-MAX_MODES = 8  # default limit of a model
+MAX_MODES = 8  # default largest number of modes of a model
 _TWINS = 0.25  # distance of coinciding modes, relative to the half-power half width
 _STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of a stable pole: largest relative change from one order lower
 _APART = np.pi  # rad: two modes must differ by this phase over the record
@@ -210,7 +210,7 @@ def _estimates(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Do
         spread[:2] = np.hypot(spread[:2], doubts.least)
         if len(row.values) > 2:
             spread[2:] = np.hypot(spread[2:], doubts.aliased(float(np.exp(row.values[0]))))
-        # The covariance does not include the force's course between samples.
+        # The covariance does not include the force's intersample behaviour.
         for other in others:
             apart = _logarithms(other, mode)
             spread = np.maximum(spread, np.abs(apart.values - row.values) + _half_widths(apart, quantile))
@@ -266,7 +266,7 @@ def _half_widths(row: _Logarithms, quantile: float) -> FloatArray:
 
 
 def _scatter(taps: Sequence[_Logarithms], white_share: float) -> FloatArray:
-    """Half widths from the scatter of single taps; 0 where noise explains it."""
+    """Half widths of the intervals from the scatter between taps; 0 where noise explains it."""
     values = np.array([tap.values for tap in taps])
     expected = np.mean([tap.variance for tap in taps], axis=0) / white_share
     seen = np.var(values, axis=0, ddof=1)

@@ -30,7 +30,7 @@ class AxisRecording:
 
 @dataclass(frozen=True)
 class RapidStop:
-    """How to let an axis decay without a hammer."""
+    """How to excite a free decay of an axis without a hammer."""
 
     axis: str  # "X", "Y" or "Z"
     distance_mm: float  # length of each rapid

@@ -286,7 +286,7 @@ def _spectrum(found: Identification) -> tuple[FloatArray, FloatArray]:
 
 
 def _seen(frequency_hz: FloatArray, found: Identification, peaks_hz: Sequence[float] = ()) -> slice:
-    """From the first bin above 0 to well above the highest mode."""
+    """Range of frequencies to draw: from the first bin above 0 to well above the highest mode."""
     marked = [*peaks_hz, *(mode.frequency_hz.value for mode in (*found.modes, *found.refused))]
     return slice(1, int(np.searchsorted(frequency_hz, _ROOM * max(marked, default=frequency_hz[-1] / _ROOM))))
 

@@ -33,12 +33,12 @@ class FitProblem:
     widened: float  # factor on intervals; see `Record`
     quantity: str = "acceleration"  # what the sensor measured; any for decays, whose amplitudes are fitted
     force_noise_n: float = 0.0  # RMS of the force outside the pulse
-    hold: str = "band_limited"  # course of the force between samples: "band_limited", "linear" or "impulse"
+    hold: str = "band_limited"  # force between samples: "band_limited", "linear" or "impulse"
     thinned: Thinned | None = None  # decimated records; None: every sample is fitted
     starts_in_pulse: bool = False  # the record begins within the pulse
 
     def fit(self, starts: Starts, *, left_by: Fit | None = None, coloured: bool = False, quick: bool = False) -> Fit:
-        """The best model near some modes, residual white or coloured; or in a few steps, of another one's residual."""
+        """Fit a model, started at these modes, to the responses or to the residual of another; *quick*: few steps."""
         omega, zeta = np.array(starts).T
         responses, steps = self.left(left_by), _QUICK_STEPS if quick else _STEPS
         if self.forces is None:
@@ -81,7 +81,7 @@ class FitProblem:
 
     @property
     def held(self) -> str:
-        """Intersample course of the fitted force: decimated records are always band-limited."""
+        """Intersample behaviour of the fitted force: decimated records are always band-limited."""
         return self.hold if self.thinned is None else "band_limited"
 
     def left(self, last: Fit | None) -> list[FloatArray]:
@@ -104,13 +104,13 @@ class FitProblem:
         return [float(2.0 * np.pi * frequency[index]) for index in highest]
 
     def other_courses(self, near: Fit) -> list[FitProblem]:
-        """The same taps with each other possible intersample course of the force."""
+        """The same taps with each other possible intersample behaviour of the force."""
         if self.thinned is None:
             return [replace(self, hold="linear"), replace(self, hold="impulse")]
         if self.hold == "impulse":
             return []
         straight, responses = self.thinned.straight, self.responses
-        # An acceleration contains force/mass at the samples, whatever the force's course between them.
+        # An acceleration contains force/mass at the samples, whatever the force does between them.
         if self.quantity == "acceleration" and isinstance(near, _core.ModalFit) and self.forces is not None:
             free = float(np.sum(near.inverse_mass))
             parts = zip(responses, self.forces, straight, strict=True)

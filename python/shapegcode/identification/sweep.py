@@ -32,7 +32,7 @@ _MIN_SHARE = 0.02  # least ratio to the axis' motion of a significant mode
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """Model of the log power: level, slope beyond the command's, and share, omega, zeta of each mode."""
+    """Model of the log power: level, slope in addition to the command's, and share, omega, zeta of each mode."""
 
     parameters: FloatArray
     covariance: FloatArray

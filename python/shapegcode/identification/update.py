@@ -259,7 +259,7 @@ class ModeTables:
         entries = self.home.value.body
         place = next((n for n, (key, item) in enumerate(entries) if _is_modes(key, item)), len(entries))
         entries[place : place + 1] = [(None, item) for _, item in left]
-        self._say_rigid(True, "decided: no mode of it counts")
+        self._say_rigid(True, "decided: it has no significant mode")
         return self._finished([], rigid=True)
 
     def _finished(self, tables: Sequence[Table], *, rigid: bool = False) -> str:

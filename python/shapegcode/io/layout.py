@@ -158,7 +158,7 @@ class Layout:
 
 @dataclass
 class _Rows:
-    """Start of the numbers under one delimiter."""
+    """Where the rows of numbers start, if this is the delimiter."""
 
     delimiter: str
     start: int

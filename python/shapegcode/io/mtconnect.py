@@ -262,7 +262,7 @@ def shdr_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Even
 
 
 class _Odd:
-    """Lines other than one item with its value."""
+    """Handles lines other than those of one item with its value."""
 
     def __init__(self, path: Path, table: ItemTable, notes: FileNotes, known: dict[bytes, Item | None]) -> None:
         self._path, self._table, self._notes, self._known = path, table, notes, known

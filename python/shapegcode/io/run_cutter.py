@@ -73,7 +73,7 @@ class RunCutter:
     # --- steps of the clock, and limits ---
 
     def _odd_step(self, line: int, time: float, last: float, stamp: bytes) -> Iterator[RunLog]:
-        """A first event, a step back, or a long silence."""
+        """Handle the first event, a clock that went back, or a long silence."""
         if self._first is None:
             self._first = line, time, stamp.decode("latin-1").strip()
             return
@@ -170,7 +170,7 @@ class RunCutter:
             yield from self._break_off(line, time, word)
 
     def _break_off(self, line: int, time: float, word: str) -> Iterator[RunLog]:
-        """End a run without completion (READY and the like), during a hold or not."""
+        """End a run whose status shows no completion (READY, for example); if it is held, it ends with the hold."""
         run = self._open
         assert run is not None
         name = self._status.name if self._status else ""

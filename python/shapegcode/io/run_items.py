@@ -81,7 +81,7 @@ def stated_feed_unit(text: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """A used item of a file."""
+    """A data item of a log that has a known role."""
 
     name: str  # in the file
     role: Role  # its meaning

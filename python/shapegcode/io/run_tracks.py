@@ -190,7 +190,7 @@ class RunPart:
         return self.holds[-1] if self.holds and self.holds[-1].end is None else None
 
     def restarted(self, tracks: Sequence[Track]) -> Iterator[RunPart]:
-        """Split it where the program restarted after a stop without an end in the log."""
+        """Split the run where the program restarted after a stop, although the log shows no end."""
         rest = self
         for hold in self.holds:
             if hold.end is None or not hold.resumed[0] or not _began_anew(hold, rest, tracks):

@@ -50,7 +50,7 @@ def parse_units(text: str) -> tuple[float, float]:
 
 
 def _names(name: str) -> Meaning | None:
-    """The time; or the commanded or actual position of an axis."""
+    """Meaning of a column name: the time, or the commanded or actual position of an axis."""
     words = set(words_of(name))
     if words & _TIME:
         return Meaning("time", "time")

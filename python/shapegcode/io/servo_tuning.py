@@ -115,7 +115,7 @@ def _axis(path: Path, root: Element) -> tuple[str | None, list[str]]:
 
 
 def _lines(path: Path, controller: Element | None, name: str) -> tuple[FloatArray, Any] | None:
-    """Frequencies and complex values of a response; the last one of its name, as the tuning used."""
+    """Frequencies and complex values of a response; the last one of its name, which the tuning used."""
     if controller is None:
         return None
     found = [each for each in controller.iter("FrequencyResponseFunction") if each.get("name") == name]

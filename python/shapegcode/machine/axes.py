@@ -74,7 +74,7 @@ class Drive(TomlTable):
         "speed within which the friction changes its sign (stribeck only)", assumed=0.1
     )
     friction_bristle_stiffness_n_per_um: Positive = key(
-        "force over displacement before the table slides (lugre only); static friction over it is the distance",
+        "force over displacement before the table slides (lugre only); static friction over it: presliding distance",
         assumed=30.0,
     )
     friction_bristle_damping_n_s_per_m: NonNegative = key(

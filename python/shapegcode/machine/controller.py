@@ -47,8 +47,8 @@ class LinuxcncPlanner(TomlTable):
         assumed=0.001,
     )
     naive_cam_tolerance_mm: Annotated[NonNegative, Field(le=100)] = key(
-        "G64 Q of the program (emitted programs have Q0), without it as P: lines of one feed within it become one, "
-        "and an arc in XY within it two lines; 0: off",
+        "G64 Q of the program (emitted: Q0; without Q: P): within it, lines of one feed become one line, and an arc "
+        "in XY becomes two lines; 0: off",
         assumed=0.0,
     )
     ramp_frequency_hz: Annotated[Positive, Field(ge=0.001, le=1e6)] = key(
@@ -80,8 +80,8 @@ class KlipperPlanner(TomlTable):
         "[printer] square_corner_velocity: speed at a corner of 90 degrees", assumed=5.0
     )
     minimum_cruise_ratio: Annotated[NonNegative, Field(lt=1)] = key(
-        "[printer] minimum_cruise_ratio: ratio of a move at constant speed; with max_accel_to_decel in its "
-        "place 1 - max_accel_to_decel / max_accel",
+        "[printer] minimum_cruise_ratio: least part of a move at constant speed; if max_accel_to_decel is given "
+        "instead: 1 - max_accel_to_decel / max_accel",
         assumed=0.5,
     )
     arc_resolution_mm: Annotated[Positive, Field(ge=0.001, le=100)] = key(
@@ -186,7 +186,7 @@ class Controller(TomlTable):
         "largest centripetal acceleration in arcs; it limits the feed there", fanuc="1735", assumed=1000.0
     )
     polyline_acceleration_mm_s2: Positive | None = optional(
-        "the same along polylines, where two lines meet; left out: as in arcs, under another corner_rule than "
+        "the same where two lines of a polyline meet; left out: as in arcs; with another corner_rule than "
         '"speed_difference" not limited'
     )
     junction_deviation_mm: Annotated[Positive, Field(le=10)] | None = optional(

@@ -175,10 +175,10 @@ class Emission(TomlTable):
     )
     epilogue: tuple[Text, ...] = key("lines written after each shaped cut", default=())
     override: Literal["ask", "any", "lock"] = key(
-        'treatment of the feed override in shaped cuts. "ask": the header asks the operator for 100 %; with a wider '
-        'verdict.override_percent as "any". "lock": lock_lines switch the feed override off before each shaped cut, '
-        'unlock_lines switch it on again after it; "any": blocks of equal duration and a block period for which other '
-        "overrides cause little vibration (a larger program)",
+        'treatment of the feed override in shaped cuts. "ask": the header asks the operator for 100 %; but as '
+        '"any" if verdict.override_percent is wider. "lock": lock_lines switch the feed override off before each '
+        'shaped cut, unlock_lines switch it on again after it; "any": blocks of equal duration and a block period for '
+        "which other overrides cause little vibration (a larger program)",
         default="ask",
     )
     lock_lines: tuple[Text, ...] = key(
@@ -328,14 +328,14 @@ class Shaping(TomlTable):
 
     max_duration_s: Annotated[Positive, Field(le=10)] = key("longest shaper that is accepted", default=0.25)
     family: _Family = key(
-        'family of the shaper (`shapegcode shaper` compares them). "auto": the shortest one without negative impulses '
-        "with zero residual at the modes, or below vibration_limit over their bands if these have "
+        'family of the shaper (`shapegcode shaper` compares them). "auto": the shortest one without negative impulses; '
+        "its residual is zero at the modes, or below vibration_limit over the bands of modes with "
         "frequency_uncertainty_percent",
         default="auto",
     )
     per_axis: Bool = key(
         "one shaper per axis, for that axis' modes only: shorter than one for all. Not with "
-        'contour = "off", a named family, stated bands, or modes that move with an axis',
+        'contour = "off", a named family, frequency_uncertainty_percent, or frequency_over an axis',
         default=False,
     )
     vibration_limit: Annotated[Positive, Field(lt=1)] = key(
@@ -347,8 +347,8 @@ class Shaping(TomlTable):
         "feed in arcs relative to the programmed feed, reached before the arc begins; 1: no reduction", default=1.0
     )
     contour: Literal["response", "command", "off"] = key(
-        'what contour compensation keeps on the path at the highest feed within tolerance.contour_um. "response": the '
-        'table with its modes, and so the part; "command": the set-points; "off": no compensation, a lower feed '
+        'what contour compensation keeps within tolerance.contour_um of the path at the highest feed. "response": the '
+        'machine table with its modes, so the part; "command": the set-points; "off": nothing; a lower feed instead '
         "keeps the command within the tolerance",
         default="response",
     )
@@ -392,7 +392,7 @@ class Tolerance(TomlTable):
     """Tolerances of an emitted program; if one is missed, the conversion reports it and exits with 1."""
 
     contour_um: Annotated[Positive, Field(ge=0.001, le=1e6)] = key(
-        "largest deviation from the programmed path of the target of shaping.contour: the response, or the command",
+        "largest contour error: of the response or of the command, as shaping.contour says",
         default=20.0,
     )
     residual_ratio: Annotated[NonNegative, Field(le=1)] = key(

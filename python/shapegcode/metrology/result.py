@@ -279,7 +279,7 @@ class MeasuredProgram:
         limit_um: float | None,
         warnings: tuple[str, ...],
     ) -> MeasuredProgram:
-        """Combine the figures of its regions; about: program, shaped or not, measured against."""
+        """Combine the figures of its regions; *about*: its name, whether shaped, what it is measured against."""
         figures = [region.figures for region in regions]
         contour = Tracks(
             SidedError.of([each.command for each in figures], [each.command_sides for each in figures]),

@@ -230,7 +230,7 @@ def _shown(value: object) -> str:
 
 
 def _apply(foreign: ForeignSettings, options: _core.ReaderOptions) -> None:
-    """Differences in reading if the expanded program was made from a program for another control."""
+    """Apply the settings that an expanded program made from one for another control needs."""
     if foreign.calculator_decimal_point is not None:
         options.calculator_decimal_point = foreign.calculator_decimal_point
     options.absolute_arc_centres = False

@@ -1,6 +1,6 @@
 """Serialiser of all JSON, and the schema of a result from its class: fields, and properties of `json_extra`.
 
-Numbers have nine digits except `json_exact`, no minus zero, nothing below a millionth; NaN and infinity are null.
+Numbers have nine digits except `json_exact`; values below a millionth and minus zero are 0; NaN, infinity are null.
 """
 
 from __future__ import annotations

@@ -123,7 +123,7 @@ def parse_mode_band(text: str, uncertainty: float = 0.0) -> ModeBand:
 
 
 def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
-    """The modes of all axes of a machine with its stated bands; equal ones once, with the wider band.
+    """The modes of all axes of a machine, with their bands; equal ones once, with the wider band.
 
     Bands as narrow as those of a tap test are ignored: there a shaper with zero residual at the nominal frequency is
     better than one for `shaping.vibration_limit` over the band. The verdict still simulates the ends of the band.

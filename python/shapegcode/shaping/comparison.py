@@ -78,7 +78,7 @@ def choose_shaper(
         max_abs_sum: largest sum of the impulses' magnitudes.
         vibration_limit: limit of the worst residual ratio; None: the machine's
             `shaping.vibration_limit`, without a machine 0.05.
-        objective: "shortest", "contour" (least contour cost) or "robust" (least worst residual).
+        objective: "shortest", "contour" (least contour cost) or "robust" (smallest worst residual).
         allow_negative: allow a design with negative impulses.
         taps: a shaper of the user's own, compared with the others: as text ("0:.5,10.9ms:.5") or as it is.
         on_progress: called with the completed fraction, 0 to 1.
@@ -236,7 +236,7 @@ def _least_worst(
     options: DesignOptions,
     found: Sequence[Design],
 ) -> list[Design]:
-    """Least worst design of the longest duration on each grid; none if a non-negative design meets the limit."""
+    """On each grid the longest design, with the smallest worst residual; none if a non-negative one meets the limit."""
     wanted = any(row.name == _ROBUST for row in rows) and any(band.uncertainty for band in bands)
     if not wanted or any(not each.negative and is_within(each, options.vibration_limit) for each in found):
         return []

@@ -174,7 +174,7 @@ _QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * math.pi
 
 
 class Bounds(NamedTuple):
-    """Result of a search for the least worst residual."""
+    """Result of a search for the smallest worst residual."""
 
     taps: FloatArray
     """Best taps at 0, 1 ... periods."""
@@ -270,7 +270,7 @@ class TapProblem:
         self._rows = [[] for _ in self.bands]
 
     def least_worst(self, limit: float | None = None) -> Bounds | None:
-        """Taps with the least worst residual, or None; a search with a limit ends once it is met or disproved."""
+        """Taps with the smallest worst residual, or None; a search with a limit ends once it is met or disproved."""
         best = np.zeros(self.last + 1)
         lower, upper = 0.0, math.inf
         # far below the limit the program would be degenerate, and the solver may cycle

@@ -76,7 +76,7 @@ def choose_block_period(
     fewest blocks.
 
     A mode without a band is cancelled exactly; if any has a band, the residual ratio is at most `vibration_limit`
-    within the bands. If no period has such a design within `max_duration_s`, the one with the least worst residual
+    within the bands. If no period has such a design within `max_duration_s`, the one with the smallest worst residual
     of that duration is used, and reported in `note`; among worst residuals within 2 % of each other the
     longest period wins.
 
@@ -193,7 +193,7 @@ def _candidate(
 def _fallback(
     refused: BlockPeriodCandidate, bands: Sequence[ModeBand], max_duration_s: float, limit: float
 ) -> BlockPeriodCandidate:
-    """The least worst design of the longest duration, with a note; else the unchanged refusal."""
+    """The design of the longest duration with the smallest worst residual, with a note; else the unchanged refusal."""
     from shapegcode.shaping.robust import Task, best_within, unreachable
 
     task = Task.checked(bands, refused.period_s)
@@ -203,7 +203,7 @@ def _fallback(
         return refused
     note = (
         f"no shaper within {ms(max_duration_s)} keeps {band_names(bands)} below {100.0 * limit:.3g} % of the vibration "
-        f"on a {ms(refused.period_s)} grid: the one with the least worst residual, {100.0 * found.worst_residual:.3g} "
+        f"on a {ms(refused.period_s)} grid: that with the smallest worst residual, {100.0 * found.worst_residual:.3g} "
         "%, is used"
     )
     return BlockPeriodCandidate(found.period_s, found.shaper, worst_residual=found.worst_residual, note=note)
@@ -303,7 +303,7 @@ def choose_grid(
     """Choose block period and shaper for all modes of a machine, and shapers that follow moving modes.
 
     With `shaping.family` = "auto" the shortest shaper without negative impulses with at most
-    `shaping.vibration_limit` residual ratio within the modes' stated bands; exact without a band. With
+    `shaping.vibration_limit` residual ratio within the modes' bands; exact without a band. With
     a named family its shortest one. An override-tolerant program (`Machine.bears_override`) gets the
     period that suits other feed overrides, see `best_for_overrides`.
 

@@ -43,9 +43,9 @@ _HINT_PERIODS = 400  # longest grid that a refusal searches, periods
 def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s: float = 0.25) -> Shaper:
     """Design the shortest non-negative shaper on a grid with zero residual at every mode.
 
-    The number of periods is the smallest for which the conditions (sum 1, both parts of each mode's sum zero)
+    The number of periods is the smallest for which the conditions (sum 1, each mode's complex residual zero)
     have a non-negative solution. Among the solutions of that duration the one with the least second central
-    moment, the contour cost, is chosen, with the true centre, not a fixed one. Modes with the same
+    moment, the contour cost, is chosen, about the mean of its own taps. Modes with the same
     conditions on this grid (equal ones, or aliases of one another) count once. The optimiser's taps are
     re-solved in full precision and checked.
 
@@ -244,7 +244,7 @@ def halved(is_enough: Callable[[int], bool], too_few: int, enough: int, precisio
 
 
 def refined(columns: FloatArray, right: FloatArray, taps: FloatArray) -> FloatArray:
-    """Refine taps to meet ``columns @ taps == right`` to rounding."""
+    """Refine taps to meet ``columns @ taps == right`` to full precision."""
     for _ in range(3):  # the second removes the first one's rounding error, the third has no effect
         taps = taps + np.linalg.lstsq(columns, right - columns @ taps, rcond=1e-14)[0]
     return taps
@@ -318,7 +318,7 @@ def polished(
     taps: FloatArray, conditions: tuple[FloatArray, FloatArray], period_s: float, threshold: float,
     largest: float | None = None,
 ) -> Shaper | None:  # fmt: skip
-    """Re-solve the taps above a threshold to rounding; None if they then miss a condition or change sign.
+    """Re-solve the taps above a threshold to round-off accuracy; None if they miss a condition or change sign.
 
     Without a largest magnitude no tap is negative; taps at that magnitude are kept.
     """

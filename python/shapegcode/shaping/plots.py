@@ -295,7 +295,7 @@ def _draw_branches(branches: MinimalBranches, result: Recommendation, ax: Axes |
 
 
 def _branches(result: Recommendation) -> MinimalBranches | None:
-    """All minimal shapers of two modes around their ratio, the slower one fixed; None for another number of modes."""
+    """All minimal shapers of two modes for frequency ratios near theirs; None for another number of modes."""
     if len(result.modes) != 2:
         return None
     slow, fast = sorted((band.mode for band in result.modes), key=lambda mode: mode.frequency_hz)

@@ -173,7 +173,7 @@ def family_named(name: str) -> Family:
 
 
 def distinct(bands: Sequence[ModeBand]) -> list[ModeBand]:
-    """The bands, modes whose poles agree within 1e-9 once, with the wider band: so that no mode is cancelled twice."""
+    """The bands; of modes whose poles agree within 1e-9 only the wider one, so that no mode is cancelled twice."""
     kept: list[ModeBand] = []
     for band in bands:
         pole = band.mode.pole

@@ -33,7 +33,7 @@ def _merits(each: Design) -> tuple[float, float, float, float]:
 OBJECTIVES = {
     "shortest": "the shortest",
     "contour": "the one with the least contour cost",
-    "robust": "the one with the least worst residual",
+    "robust": "the one with the smallest worst residual",
 }
 """Objectives by name, with the winner's description in the reason."""
 
@@ -74,7 +74,7 @@ def recommend(
 
     Candidates are the designs without negative impulses (all, with `allow_negative` or if every design has some) with a
     worst residual within the limit; of these, if any, those that cancel the modes without a stated band. The best by
-    the objective is taken; without a candidate, the one with the least worst residual. Of equally short designs on
+    the objective is taken; without a candidate, the one with the smallest worst residual. Of equally short designs on
     grids, to 2 %, the one with the longest period is taken (fewest blocks), then the family that `convert` uses, then
     one made for grids.
     """

@@ -1,4 +1,4 @@
-"""Robust shapers on a sample grid: the least worst residual over frequency bands, and the shortest one below a limit.
+"""Robust shapers on a sample grid: the smallest worst-case residual over bands, and the shortest one below a limit.
 
 The optimum is proven by `cutting_planes` and a sweep; a mode without a band (uncertainty 0) is cancelled exactly.
 """
@@ -42,7 +42,7 @@ _HINT_PERIODS = 500  # longest grid that a refusal searches, periods
 _NO_TAP = 1e-9  # smaller amplitudes are the solver's round-off
 _GROWTH = 1.4  # growth factor of the number of periods in the search
 _WHOLE = 1e-3  # tolerance of a whole number of cycles per period
-# If the optimum for a damped mode ends with periods of waiting, a tap this large marks their end.
+# If the optimum for a damped mode ends with periods without taps, a tap this large marks their end.
 _LAST_TAP = 1e-3
 _SAME_VARIANCE = 5e-3  # relative
 
@@ -56,10 +56,10 @@ def least_worst(
     max_abs_sum: float = 10.0,
     zeros_at_nominal: bool = False,
 ) -> RobustDesign:
-    """Design taps on a grid with the least worst residual over the bands, for a given duration.
+    """Design taps on a grid with the smallest worst residual over the bands, for a given duration.
 
     The optimum is proven to 0.1 %: `worst_residual` is at most that much above `least_possible` (a residual below
-    1e-6 counts as zero). The exception is a damped mode whose optimum ends with periods of waiting:
+    1e-6 counts as zero). The exception is a damped mode whose optimum ends with periods without taps:
     the residual is taken from the last tap, so the shaper is then shorter, or a last tap of 0.001 marks the end.
 
     Source: this project.
@@ -92,7 +92,7 @@ def minimax_robust(
 ) -> RobustDesign:
     """Design the shortest taps on a grid with at most a given residual ratio within the bands.
 
-    The number of periods is the smallest for which the least worst residual is below the limit (to 0.1 %). Among the
+    The number of periods is the smallest for which the smallest worst residual is below the limit (to 0.1 %). Among the
     non-negative designs of that duration the one with the least second central moment, the contour cost, is chosen
     (to 0.5 %); with negative impulses, the one with the least sum of magnitudes.
 
@@ -219,7 +219,7 @@ class Task:
         return replace(self, period_s=period_s, pool=CutPool.around(self.wide))
 
     def finished(self, taps: FloatArray, lower: float) -> RobustDesign | None:
-        """Remove round-off, re-solve the zeros to rounding, and evaluate; None if the taps become invalid."""
+        """Remove round-off, re-solve the zeros to full precision, and evaluate; None if the taps become invalid."""
         if self.mirrored:
             taps = 0.5 * (taps + taps[::-1])
         largest = None if self.max_abs_sum is None else math.inf
@@ -250,7 +250,7 @@ def shortest_below(task: Task, limit: float, max_duration_s: float, *, least_cos
 
 
 def best_within(task: Task, last: int) -> RobustDesign | None:
-    """The least worst residual within `last` periods; None if the exact zeros have no solution."""
+    """Minimise the worst residual within `last` periods; None if the exact zeros have no solution."""
     bounds = task.problem(last).least_worst()
     if bounds is None:
         return None
@@ -262,7 +262,7 @@ def best_within(task: Task, last: int) -> RobustDesign | None:
         )
     reached = max((1.0 + SAME_RESIDUAL) * bounds.upper, NO_RESIDUAL)
     if found.worst_residual > reached:
-        # The optimum ends with periods of waiting, and the residual is taken from the last tap.
+        # The optimum ends with periods without taps, and the residual is taken from the last tap.
         last = smallest_below(task, reached, last) or last
         for last_tap in (0.0, _LAST_TAP):
             ended = task.problem(last, last_tap).least_worst()

@@ -33,7 +33,7 @@ _CLEARLY = 1e-3  # of the largest sample: a negative sample beyond rounding erro
 _SINGULAR = 1e-12  # relative singular value below which two conditions coincide on this grid
 _SPANS = (1.0, 2.0)  # searched durations relative to the convolved ZV, in order
 _MOST_PERIODS = 100.0 - 1e-6  # of the fastest mode: the limit of minimal_shapers
-_PROVEN_MODES = 3  # more modes need too many boxes for a proof; they are searched from starts only
+_PROVEN_MODES = 3  # more modes need too many search boxes for a proof: searched from starting points only
 
 
 def _one_after_the_other(of_one: Callable[[_core.Mode, DesignOptions], _core.Shaper]) -> Solve:

@@ -141,7 +141,7 @@ class Simulation(Result):
         peak_vibration_um: largest before that.
         settling_time_s: time from then until it stays within the band; None: not within the limit, or no band.
         settling_band_um: band from the machine file (`tolerance.residual_floor_um`); 0: none.
-        settling_limit_s: observed time after a stop.
+        settling_limit_s: how long the motion after a stop is observed.
         contour_error_um: against the path of `measured_against`.
         orbit_error_percent: of the command on each arc.
         response_orbit_error_percent: of the table, likewise.

@@ -62,7 +62,7 @@ def optimize(
 
     Args:
         program: the program to convert, or its file.
-        machine: the machine; its tolerances count, whatever tolerance is planned.
+        machine: the machine; its tolerances decide, whatever tolerance a combination is planned for.
         vary: uncertain values of the simulated machine, as for `study`.
         choose: values to choose from, by key; None: see `shapegcode.studies.optimize.usual_choices`.
         probability: required probability of staying within tolerance.
@@ -76,8 +76,8 @@ def optimize(
         The settings, and the converted combinations.
 
     Raises:
-        ArgumentError: a probability outside 0 to 1, nothing to vary or to choose, or a value that only the converter
-            sees.
+        ArgumentError: a probability outside 0 to 1, nothing to vary or to choose, or varying a value that only the
+            converter reads.
         MachineError: an unknown key, or a sampled value that is invalid in a machine file.
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.

@@ -324,7 +324,7 @@ def parameter_sensitivity(
 
 
 def _indices(varied: Sequence[Varied], shares: FloatArray, seed: int) -> dict[str, tuple[float, ...]]:
-    """First-order and total index of each value by SALib, and their errors; empty if the ratio is constant."""
+    """First-order and total index of each value by SALib, and their errors; empty if the measure is constant."""
     sobol = salib("analyze")
     if float(np.ptp(shares)) == 0.0:
         return {}

@@ -83,7 +83,7 @@ def straight_engagement(tool: CutTool, radial_depth_mm: FloatArray, *, up: bool)
 def fully_engaged(
     cut: TestCut, measuring: MeasuringPass, x_mm: FloatArray, margin_mm: float = 0.0
 ) -> npt.NDArray[np.bool_]:
-    """Mask where the tool is fully engaged, at least a margin within the ends of the stock."""
+    """Mask where the tool is fully engaged: at least a margin away from the ends of the stock."""
     met = engagement(cut.tool, measuring, x_mm, up=cut.up)
     reach = cut.tool.radius_mm * np.maximum(np.cos(met.to_rad), np.cos(met.from_rad))
     # The engagement ends at the end of the stock: there it is not complete.
@@ -127,7 +127,7 @@ class ForceLaw:
 def mean_chip_mm(
     tool: CutTool, spindle_rev_per_min: float, axial_depth_mm: float, met: Engagement, feed_mm_per_min: FloatArray
 ) -> FloatArray:
-    """Mean chip thickness by the law at each engagement: the force with exponent 1 over that with 0, mm."""
+    """Mean chip thickness at each engagement, mm: force for exponent 1 of the law divided by that for exponent 0."""
     laws = (ForceLaw(tool, CuttingLaw(1.0, exponent), spindle_rev_per_min, axial_depth_mm) for exponent in (0.0, 1.0))
     once, twice = (law.forces(met, feed_mm_per_min).mean_torque_nm for law in laws)
     return np.asarray(np.divide(twice, once, out=np.zeros_like(once), where=once > 0.0))
@@ -180,7 +180,7 @@ def _by_speed(data: MeanForces) -> Iterator[tuple[float, npt.NDArray[np.intp], E
 
 
 class ForceModel:
-    """Mean forces over the parameters: ln k1 and ln k2 at the reference chip, their exponents, edge forces."""
+    """Mean forces as a function of the parameters: ln k1, ln k2 at the reference chip, exponents, edge forces."""
 
     def __init__(
         self, tool: CutTool, axial_depth_mm: float, data: MeanForces, thickness: Thickness, reference_mm: float

@@ -15,7 +15,7 @@ from shapegcode.program import Program
 
 _DEVIATIONS = 1.96  # standard deviations of a 95 % interval
 _KINDS = "kind of look-ahead"
-CUTS, BETWEEN, RUNS = "cuts of a tool, by themselves", "between cuts, by themselves", "repeated runs"
+CUTS, BETWEEN, RUNS = "scatter, cuts of a tool", "scatter between cuts", "repeated runs"
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def _half(*values: Iterable[float]) -> float:
 def time_interval(
     program: Program, machine: Machine, feed_override: float, rapid_override: float
 ) -> TimeInterval | None:
-    """Interval of a program's time; None: the machine file has no undetermined directions."""
+    """Interval of a program's time; None: the machine file holds no calibration scatter."""
     times = machine.times
     if times.scatter is None:
         return None

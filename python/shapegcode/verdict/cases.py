@@ -219,7 +219,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         columns,
         cases,
         caption=f"{len(cases) - shown} of {len(cases)} operating conditions count{brackets} ([verdict]); "
-        "ceil, carry: controller.block_end",
+        "ceil, carry: block timing (controller.block_end)",
         row_style=lambda case: _style(case, case is worst),
     )
 
@@ -367,7 +367,7 @@ def case_figures(run: _core.SimulationFigures, *, contour: bool = True, response
 
 
 def _starved(run: _core.SimulationFigures, waited_s: float) -> CaseFigures:
-    """Worst figures over all positions of the underrun; the residual is mostly that without one."""
+    """Worst figures over all positions of the underrun; the residual is usually that without an underrun."""
     runs: list[_core.SimulationFigures | _core.StarvedFigures] = [run, *run.starved]
     return CaseFigures(
         np.max([each.residual_mm for each in runs], axis=0),

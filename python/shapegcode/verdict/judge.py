@@ -352,7 +352,7 @@ def _largest(deviations: Iterable[Deviation | None]) -> Deviation | None:
 
 
 def _haste(figures: RegionFigures, place: Placed, block_period_s: float) -> list[str]:
-    """The miss of a region that is faster than programmed.
+    """The missed limit of a region that is faster than programmed.
 
     At feeds so slow that an increment takes several blocks, F words cannot represent whole periods. A rapid
     may take longer than its replacement, and an original longer than its feeds require: neither means too fast.

@@ -128,7 +128,7 @@ def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) 
     power = float(speed @ speed)
     lag = min(max(float(speed @ counted(trace.lag, use)) / power, 0.0), _LONGEST_DEAD_S) if power > 0.0 else 0.0
     starts = [(1e3 * share * lag, math.log(gain)) for share in (0.6, 0.9, 0.99) for gain in (20.0, 60.0)]
-    # Refine the two best valleys to their ends; other starts only reach the same ones later.
+    # Refine the two best starts to their minima; the other starts would only reach the same minima later.
     tried = [
         minimize(square, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-9, "maxiter": 300})
         for start in sorted(starts, key=lambda each: square(np.array(each)))[:2]

@@ -1,6 +1,6 @@
 """Translate programs for a Haas mill: as FANUC's, except for a few words that are replaced, line by line.
 
-Sources, by topic: docs/reference/input_dialects.md. A code for which no text was found is refused, not guessed.
+Sources, by topic: docs/reference/input_dialects.md. A code without documentation is refused, not guessed.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _NOT_THE_SAME = re.compile(
     r"|(?!(?:0*[0-3]|17|18|19|2[018]|4[0-39]|5[3-9]|6[14]|8[0-2]|9[0-2]|9[89])(?![\d.]))[\d.]+)"
     r"|(?<=M)[ \t]*0*9[678](?!\d)|(?<=F)[ \t]*[-+]?\d+(?![\d.])|(?<=P)[ \t]*\d*\.\d*)"
 )
-"""One look at a whole program in capitals: where nothing of this stands, it is FANUC's to the letter."""
+"""A program, in capitals, that contains none of these words means the same on FANUC."""
 
 _LINE = re.compile(r"[^\n]*\n|[^\n]+")
 _COMMENT = re.compile(r"\([^)\n]*\)?")
@@ -106,7 +106,7 @@ def _lines(source: str, file: str, notes: dict[str, Note]) -> tuple[list[str], d
 
 
 def _refuse_in_cycles(code: str, file: str) -> None:
-    """Modal words of drilling cycles whose meaning differs on FANUC."""
+    """Refuse modal words of drilling cycles whose meaning differs on FANUC."""
     cycle = ""
     for number, whole_line in enumerate(_LINE.findall(code), start=1):
         line = whole_line.partition(";")[0]
@@ -123,11 +123,11 @@ def _refuse_in_cycles(code: str, file: str) -> None:
             raise refusal(file, number, f"{word[0][0]} in a drilling cycle {what}: it is not read")
         if _VARIABLE_P.search(line) and re.search(r"M[ \t]*0*9[789](?!\d)", line) is None:
             what = f"the dwell of G{cycle} by a variable"
-            raise refusal(file, number, f"{what} is seconds or milliseconds, as the point of its value says")
+            raise refusal(file, number, f"{what} is in seconds or milliseconds, depending on the point of its value")
 
 
 def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
-    """One line; `code` is the same without its comments, as long as it."""
+    """Translate a line; `code` is the same line with its comments blanked out."""
     end = line[len(line.rstrip("\r\n")) :]
     text, code = line[: len(line) - len(end)], code[: len(line) - len(end)]
     if ";" in code:
@@ -141,7 +141,7 @@ def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
     for match in _LEFT_OUT.finditer(words):
         limits = match[1] == "103"
         what = "limits the blocks that the control looks ahead" if limits else "sets smoothness and corner rounding"
-        note(f"G{match[1]}", f"G{match[1]} {what}: no path, and left out here; no model of it acts on the time")
+        note(f"G{match[1]}", f"G{match[1]} {what}: left out; its effect on the time is not modelled")
     words = _LEFT_OUT.sub("", words)
     words = _OFFSET.sub(r"G54.1P\1", words)
     words = _OLD_OFFSET.sub(lambda match: f"G54.1P{int(match[1]) - 109}", words)
@@ -153,7 +153,7 @@ def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
         words = _PROGRAM.sub(lambda match: f"{match[0]}L1", words)
     words = _with_dwell(words, codes, note)
     if "52" in codes or "92" in codes:
-        note("setting 33", "G52 and G92 as setting 33 = FANUC or HAAS has them; YASNAC's G92 sets G52")
+        note("setting 33", "G52 and G92 are read as with setting 33 = FANUC or HAAS; YASNAC's G92 sets G52")
     return words.rstrip() + comments + end
 
 

@@ -1,4 +1,4 @@
-"""LinuxCNC programs: what the core is told of the machine, and the files that it asks for.
+"""Reads LinuxCNC programs with the core: its options from the machine file, called files, tool table.
 
 What is read and what is refused: docs/reference/input_dialects.md.
 """
@@ -32,7 +32,7 @@ _BEGINS_IN = {"plane": "G17", "distance": "G90", "feed_mode": "G94", "path_mode"
 
 
 def read_linuxcnc(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
-    """The expanded program of a LinuxCNC program."""
+    """Read a LinuxCNC program as an expanded program."""
     table = find_tool_table(machine.input.tool_table, machine.input.machine_unit, folder)
     options = _options(machine, table)
     options.file, folders = shown_name(file), program_folders(machine, folder)
@@ -50,7 +50,7 @@ def read_linuxcnc(source: str, *, file: str, machine: Machine, folder: Path | No
 
 
 def _options(machine: Machine, table: ToolTable | None) -> _core.LinuxcncOptions:
-    """At the first line: what the machine file says of modes, offsets and tools."""
+    """Modes, offsets and tools before the first line, from the machine file."""
     options, given = _core.LinuxcncOptions(), machine.input
     power_on = vars(machine.power_on)
     options.first_codes = "".join(code for name, code in _BEGINS_IN.items() if power_on[name] != code)
@@ -69,7 +69,7 @@ def _options(machine: Machine, table: ToolTable | None) -> _core.LinuxcncOptions
             {number: (tool.offset_mm, tool.diameter_mm) for number, tool in table.tools.items()},
         )
     options.tool_length_mm = {int(number): length for number, length in given.tool_length_mm.items()}
-    # The expanded program is read with the machine's own setting too, once it is emitted.
+    # The emitted program will be read with the machine's own setting.
     options.adds_points = not machine.controller.calculator_decimal_point
     options.block_skip = {"unknown": None, "on": True, "off": False}[given.block_skip]
     options.max_steps = machine.controller.max_program_steps

@@ -29,18 +29,18 @@ class Note:
 
 @dataclass(frozen=True)
 class ForeignSettings:
-    """How the plain program must be read, where the control differs from what the machine file says."""
+    """Settings to read the expanded program, where the control differs from the machine file."""
 
     # by H number; the machine file's own values come first
     tool_length_mm: Mapping[int, float] = field(default_factory=dict)
     tool_radius_mm: Mapping[int, float] = field(default_factory=dict)  # by D number, likewise
     peck_clearance_mm: float | None = None  # distance to which a peck of G73 and G83 returns; None: the machine file's
     calculator_decimal_point: bool | None = True  # whether X10 is 10 mm; None: as the machine file says
-    # writes a program of another file that it calls (text, name) in FANUC's words; None: it calls none
+    # translates a called program of another file (text, name) into FANUC's words; None: none is called
     called_text: Callable[[str, str], str] | None = None
-    # LinuxCNC: the one (P, Q) of all its G64, mm, None for a word that is left out; None: there are several, or none
+    # LinuxCNC: (P, Q) common to all its G64, mm, None for an absent word; None: they differ, or there is no G64
     path_tolerance_mm: tuple[float | None, float | None] | None = None
-    # words that stand for others of the source, for who writes for that control again: {"T901": 'T="MILL"'}
+    # substituted words, to be restored in a program for that control: {"T901": 'T="MILL"'}
     names: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -49,22 +49,22 @@ class ForeignProgram:
     """A program for another control, translated into an expanded program for FANUC.
 
     Its numbers have a point where their unit depends on it (`X10.`), I J K are distances from the start, dwells are
-    `G04 X` in seconds; it begins and ends with a line `%`. One that calls programs of its own may keep these calls.
+    `G04 X` in seconds; it begins and ends with a line `%`. Calls of other programs may remain in it.
     """
 
     dialect: str  # "linuxcnc", "haas", "siemens"
-    text: str  # the plain program
+    text: str  # the expanded program
     lines: Sequence[int]  # for each line of `text`, from 0, the line of the source, from 1
-    reason: str = ""  # why it was read so, in words
-    notes: tuple[Note, ...] = ()  # what to tell
+    reason: str = ""  # why it was read in this dialect
+    notes: tuple[Note, ...] = ()  # for the user
     files: tuple[str, ...] = ()  # names of other files whose lines are in it (subprograms)
-    # for each line of `text` its file: 0 the source, n the n-th of `files`; empty: all of the source
+    # for each line of `text` its file: 0 the source, n the n-th of `files`; empty: all are from the source
     line_files: Sequence[int] = ()
     settings: ForeignSettings = ForeignSettings()  # how to read it
 
 
 def program_of_core(dialect: str, expanded: _core.ExpandedProgram, settings: ForeignSettings) -> ForeignProgram:
-    """The expanded program of a reader in the core."""
+    """Convert the expanded program that a reader in the core returns."""
     return ForeignProgram(
         dialect,
         expanded.text.decode("latin-1"),
@@ -77,25 +77,25 @@ def program_of_core(dialect: str, expanded: _core.ExpandedProgram, settings: For
 
 
 def program_folders(machine: Machine, folder: Path | None) -> list[Path]:
-    """Where programs that another one calls are looked for: its own folder first."""
+    """Folders to search for called programs: the caller's own first."""
     own = [] if folder is None else [folder]
     return own + [Path(name).expanduser() for name in machine.input.program_folders]
 
 
 def called_program(path: Path, machine: Machine) -> tuple[str, bytes]:
-    """Name and text of a program that another one calls, as long as it may be."""
+    """Read a called program, within the size limit: its name and text."""
     most = min(_MAX_CALLED_BYTES, machine.controller.max_program_bytes)
     return shown_name(str(path)), read_file(path, most).removeprefix(BOM_UTF8)
 
 
 def shown_name(file: str) -> str:
-    """A file's name as the core has it: it may hold what cannot be written as UTF-8."""
+    """Name of a file for the core, in UTF-8: characters that cannot be encoded become escapes."""
     return file.encode("utf-8", "backslashreplace").decode()
 
 
 @contextmanager
 def located_errors(file: str) -> Iterator[None]:
-    """Errors of a reader in the core with file, line and column, the program's own file by its name."""
+    """Add file, line and column to errors of a reader in the core; the program's own file has its original name."""
     try:
         yield
     except ProgramError as error:
@@ -104,14 +104,14 @@ def located_errors(file: str) -> Iterator[None]:
 
 
 def refusal(file: str, line: int, message: str) -> ProgramError:
-    """The error that refuses a line of the source, from 1; what is wrong there, and what would help."""
+    """Error that refuses a line of the source, from 1, with the fault and the remedy."""
     return located_error(file, line, 1, message)
 
 
 InputDialect = Literal["fanuc", "linuxcnc", "haas", "siemens"]
 
 CONTROLS: dict[str, str] = {"fanuc": "FANUC", "linuxcnc": "LinuxCNC", "haas": "Haas", "siemens": "a Sinumerik"}
-"""Names of the controls for people."""
+"""Names of the controls in messages."""
 
 LOOKED_AT_BYTES = 65536
 _SHORT_DWELL = re.compile(rb"G0*4[ \t]*P[ \t]*0*([1-9])(?![\d.])")
@@ -121,7 +121,7 @@ _TURNS = re.compile(
 )
 _PERCENT = re.compile(rb"(?m)^[ \t]*%[ \t\r]*$")
 _WRITTEN_FOR = re.compile(rb"(?m)^[ \t]*[;(] ?DIALECT (KLIPPER|ISG)\b")
-COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one to the end of its line: linear
+COMMENT = re.compile(rb"\([^)\n]*+\)?+")  # an unclosed one ends with its line; linear time
 
 _PATH_TOLERANCE = "tolerance of the path; FANUC's G64 has no P"
 _DWELLS = (b"G4F", b"G04F", b"G4 ", b"G04 ")
@@ -156,7 +156,7 @@ _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ..
     ("siemens", (b"TRANS", b"AROT"), re.compile(rb"(?<![A-Z_])(?:A?TRANS|AROT)(?![A-Z_])"), "frame"),
     ("siemens", (b"G700", b"G710"), re.compile(rb"G7[01]0(?![\d.])"), "inch or mm"),
 )
-"""Words that no FANUC control knows: one of the short texts is in a program that has the word."""
+"""Words that no FANUC control knows, with short texts: every program with the word contains one of these."""
 
 _Sign = tuple[InputDialect, re.Pattern[bytes], str]
 _OF_FANUC: tuple[_Sign, ...] = (
@@ -174,23 +174,23 @@ _OF_FANUC: tuple[_Sign, ...] = (
 
 @dataclass(frozen=True)
 class Recognition:
-    """What shows for which control a program is written."""
+    """Evidence of the control for which a program is written."""
 
     dialect: InputDialect
     line: int  # of the first sign, from 1
     words: str
-    meaning: str  # what it is there
+    meaning: str  # meaning on that control
 
     @property
     def reason(self) -> str:
-        """In words: "line 12: `O100 WHILE` (O word of control flow): LinuxCNC"."""
+        """As text: "line 12: `O100 WHILE` (O word of control flow): LinuxCNC"."""
         return f"line {self.line}: `{self.words}` ({self.meaning}): {CONTROLS[self.dialect]}"
 
 
 def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]:
     """The first sign of every control for which a program may be written.
 
-    Only words that a control alone knows count; the first 64 KiB are looked at, comments left out.
+    Only words that a single control knows count; the first 64 KiB are searched, without comments.
     """
     code = re.sub(rb";[^\n]*", b"", COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
     ends = [match.end() for match in _PERCENT.finditer(code)] if b"%" in code else []
@@ -215,9 +215,9 @@ def _first_signs(code: bytes, signs: Iterable[_Sign]) -> dict[InputDialect, Reco
 
 
 def doubtful_word(text: bytes) -> tuple[int, str] | None:
-    """The first dwell or arc of a program that is allowed on FANUC, and usual with another meaning on LinuxCNC.
+    """The first dwell or arc of a program that FANUC allows, and that usually has another meaning on LinuxCNC.
 
-    A dwell of P1 to P9 is next to nothing in milliseconds, P of an arc are turns there.
+    A dwell of P1 to P9 is very short in milliseconds; P of an arc is the number of turns on LinuxCNC.
     """
     capitals = text[:LOOKED_AT_BYTES].upper()
     if b"P" not in capitals:
@@ -237,17 +237,17 @@ def doubtful_word(text: bytes) -> tuple[int, str] | None:
 
 
 def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | None) -> ForeignProgram | None:
-    """The expanded program of a program for another control; None: it is one for FANUC.
+    """Read a program for another control as an expanded program; None: it is for FANUC.
 
-    The dialect is that of `controller.dialect`; "auto": as words tell that only one control knows, and where none
-    does, that of a control whose planner is LinuxCNC's (`controller.kind`).
+    The dialect is that of `controller.dialect`; "auto": it is recognized by words that only one control knows; without
+    such words it is LinuxCNC's if `controller.kind` is "linuxcnc".
     """
     dialect, reason = input_dialect(data, machine, source)
     if dialect == "fanuc":
         refuse_words_behind_semicolon(data, source)
         return None
     text = data.removeprefix(BOM_UTF8).decode("latin-1")
-    # Loaded when a program of its dialect is read: most are FANUC's.
+    # Imported on demand, since most programs are FANUC's.
     read: Callable[..., ForeignProgram] = getattr(
         import_module(f"shapegcode.program.foreign.{dialect}"), f"read_{dialect}"
     )
@@ -256,7 +256,7 @@ def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | N
 
 
 def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
-    """A semicolon ends a block for FANUC, and begins a comment for other controls."""
+    """Refuse words after a semicolon: FANUC begins a block there, other controls a comment."""
     found = next((each for each in _BEHIND_SEMICOLON.finditer(data) if each[1]), None) if b";" in data else None
     if found is not None:
         message = (
@@ -267,13 +267,13 @@ def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
 
 
 def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]:
-    """The dialect of a program."""
+    """The dialect of a program, and the reason."""
     if written := _WRITTEN_FOR.search(data[:LOOKED_AT_BYTES]):
         control = {b"KLIPPER": "Klipper", b"ISG": "the ISG kernel"}[written[1]]
         message = f"emitted for {control}, whose programs are written and not read: keep the original"
         raise refusal(source, data.count(b"\n", 0, written.start()) + 1, message)
     stated = machine.controller.dialect
-    # A machine of FANUC's kind and a program without foreign words: the usual case takes one look.
+    # The usual case, a FANUC control and a program without foreign words, takes one search.
     expected = stated if stated != "auto" else machine.controller.kind
     signs = recognize(data, of_fanuc=expected in {"linuxcnc", "siemens"})
     if stated != "auto":

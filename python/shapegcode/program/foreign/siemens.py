@@ -1,6 +1,6 @@
 """SINUMERIK programs (DIN mode): executed by the core as the control would, and written as expanded programs for FANUC.
 
-What no page was found for is *assumed* and marked so in docs/reference/input_siemens.md.
+Rules without a published source are *assumed*, and marked so in docs/reference/input_siemens.md.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from shapegcode.program.foreign.read import (
 def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
     """Read a SINUMERIK program in DIN words.
 
-    Subprograms are looked for in the text, in `folder` and in `input.program_folders`: NAME.SPF, then NAME.MPF.
+    Subprograms are searched in the text, in `folder` and in `input.program_folders`: NAME.SPF, then NAME.MPF.
     """
     controller, settings, options = machine.controller, machine.input, _core.SiemensOptions()
     options.file = shown_name(file)
@@ -61,8 +61,8 @@ def _tables() -> tuple[dict[str, str], dict[str, str], dict[re.Pattern[str], str
 
 
 def _finder(machine: Machine, folder: Path | None) -> Callable[[str], tuple[str, bytes] | None]:
-    """What finds the file of a program that another one calls, and its text."""
-    files: dict[str, Path] = {}  # by name in capitals; found when the first one is looked for
+    """Make a finder of called programs' files: it returns name and text."""
+    files: dict[str, Path] = {}  # by name in capitals; filled at the first search
     folders = program_folders(machine, folder)
 
     def find(name: str) -> tuple[str, bytes] | None:

@@ -151,7 +151,7 @@ _SWATCHES = (
     for step in range(_STEPS)
 )
 _OVER = '<span class="swatch heat-over"><span class="mark">▲</span>over</span>'
-_LEGEND = f'<p class="legend">Share of the limit: {"".join(_SWATCHES)}{_OVER}</p>'
+_LEGEND = f'<p class="legend">Ratio to the limit: {"".join(_SWATCHES)}{_OVER}</p>'
 
 
 def _bars(bars: model.Bars) -> str:

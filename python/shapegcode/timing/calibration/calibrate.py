@@ -148,7 +148,7 @@ def calibrate_cycle_time(
 
 
 class _Meter:
-    """Progress by fits started, and by steps within one."""
+    """Progress: the number of fits started, and the steps of the current one."""
 
     def __init__(self, on_progress: Callable[[float], None] | None, fits: int) -> None:
         self._on_progress, self._fits, self._done, self._steps = on_progress, fits, 0, 0

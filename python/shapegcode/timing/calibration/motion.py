@@ -328,7 +328,7 @@ def fit_motion(
         )  # fmt: skip
         return float(found.fun), found.x
 
-    # The misfit has several valleys: start at the best of many points, and restart at the end.
+    # The misfit has several minima: start at the best of many points, and restart at the end.
     generator = np.random.default_rng(1)
     points, valleys, restarts = (_PLACES, _VALLEYS, 2) if thorough else (_PLACES // 2, _VALLEYS // 2, 1)
     spread = generator.normal(0.0, _SEARCHED, (points, len(parameters))) * (reach / _TYPICAL_SPREAD)
@@ -508,7 +508,7 @@ def _names(runs: Sequence[ObservedRun]) -> list[str]:
 
 
 def _spans(run: ObservedRun) -> list[_Span]:
-    """Spans: adjacent readings with a function between, all between two cuts, and start and end of the run."""
+    """Spans: from a reading to the next across a function, from cut to cut, and at start and end of the run."""
     line, time_s, function = run.line, run.time_s, run.timed.function
     spans = []
 

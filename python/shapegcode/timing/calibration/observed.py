@@ -166,7 +166,7 @@ def longest(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
 
 
 def held_longest(signal: Signal, end_s: float | None) -> float:
-    """Value of a signal for the longest time."""
+    """The value that a signal had for the longest time in total."""
     until = np.append(signal.time_s[1:], end_s if end_s is not None else signal.time_s[-1])
     values = (round(value, 3) for value in signal.value.tolist())
     return longest(zip(values, np.maximum(until - signal.time_s, 0.0).tolist(), strict=True))[0]
@@ -296,7 +296,7 @@ def observe(entry: RunEntry, log: RunLog, timed: TimedProgram, machine: Machine)
 
 
 def _lines(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) -> tuple[FloatArray, IntArray]:
-    """Times and lines of the reported lines, never descending."""
+    """Line numbers reported in the log, made non-descending, and their times."""
     line = line_numbers(log, timed)
     time_s = log.block.time_s
     within = (line >= 1) & (line <= timed.line_count)

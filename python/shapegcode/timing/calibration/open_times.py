@@ -23,7 +23,7 @@ from shapegcode.timing.calibration.observed import ObservedRun
 _Row = dict[str, object]  # of times.open
 
 _NO_STEP = 2e-3  # in a logarithm or s: smaller changes are omitted
-_ALONE, _SMALL = 0.1, 0.2  # steps of others that are negligible, and those for which times are linear
+_ALONE, _SMALL = 0.1, 0.2  # largest step of others that is negligible; largest for which times are linear
 _MIN_PART = 0.05  # least fraction of a step that keeps all times at 0 or above
 _KIND_SPREAD = 0.1  # a kind worse by this ratio in cross-validation has exp(-1/2) times the weight
 MIN_WEIGHT = 0.02  # least weight of a kind of look-ahead with a row
@@ -48,8 +48,8 @@ def motion_rows(fit: MotionFit, covariance: FloatArray, runs: Sequence[ObservedR
     rows = []
     for index, step in enumerate(_symmetric_root(covariance).T):
         parameter, others = parameters[index], np.delete(np.abs(step), index)
-        # Step to the slower side, in full: a limit not yet reached shows there. If others must compensate,
-        # use a small step only.
+        # A full step to the slower side, since a limit that was not reached has its effect there; a small one if
+        # other parameters must compensate.
         part = 1.0 if others.max(initial=0.0) < _ALONE else min(1.0, _SMALL / float(np.abs(step).max()))
         part *= 1.0 if parameter.unit == "s" else -1.0
         values = {
@@ -103,7 +103,7 @@ def _possible(value: FloatArray, step: FloatArray) -> float:
 
 
 def open_row(name: str, base: Mapping[str, object], other: Mapping[str, object], weight: float = 1.0) -> list[_Row]:
-    """A row with alternative values of the machine file; none if they are the same."""
+    """A row with the keys that differ from the machine file; none if none differs."""
     # Keys missing in the other kind are not used by it.
     values = [f"{key} = {toml(value)}" for key, value in other.items() if value is not None and value != base.get(key)]
     return [{"name": name, "values": values, "weight": float(f"{weight:.4g}")}] if values else []
