@@ -72,13 +72,6 @@ class Result(Outcome):
             return "amber", f"{count} warning{'s' if count > 1 else ''} to resolve first"
         return "green", "done, without a warning"
 
-    @property
-    def page_title(self) -> str:
-        """Heading of its page: kind of result and program."""
-        from shapegcode.results.page.default import title_of
-
-        return title_of(self)
-
     def key_figures(self) -> tuple[Figure, ...]:
         """The main figures at the top of its page; usually none."""
         return ()
@@ -121,15 +114,8 @@ class Result(Outcome):
         from shapegcode.results.page.default import page_of
 
         simulated = self.simulated if motion else None
-        return page_of(
-            self,
-            title=self.page_title,
-            light=self.light,
-            sections=self.page_sections(provenance),
-            scene=None if simulated is None else simulated.scene(on_progress),
-            provenance=provenance,
-            problems=problems,
-        )
+        scene = None if simulated is None else simulated.scene(on_progress)
+        return page_of(self, self.light, self.page_sections(provenance), scene, provenance, problems)
 
     def report(self, path: str | Path, script: Script = "inline") -> list[str]:
         """Write the page of the result: one HTML file, readable offline.
