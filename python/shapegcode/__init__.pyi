@@ -150,8 +150,7 @@ from shapegcode.io.edge_capture import (
     EdgeValue as EdgeValue,
 )
 from shapegcode.io.edge_json import read_edge_json as read_edge_json
-from shapegcode.io.frequency_response import FrequencyResponse as FrequencyResponse
-from shapegcode.io.record import ReadOptions as ReadOptions, Record as Record
+from shapegcode.io.record import FrequencyResponse as FrequencyResponse, ReadOptions as ReadOptions, Record as Record
 from shapegcode.io.run_log import (
     iter_run_logs as iter_run_logs,
     read_run_logs as read_run_logs,

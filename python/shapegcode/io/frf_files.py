@@ -13,20 +13,18 @@ from typing import Any
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.columns import Label, tap_label, words_of
 from shapegcode.io.data_file import open_file
-from shapegcode.io.frequency_response import (
+from shapegcode.io.record import (
     FEWEST_LINES,
     ComplexArray,
     FrequencyResponse,
+    ReadOptions,
     checked_lines,
     frequency_factor,
     scale_of,
 )
-from shapegcode.io.layout import utf8_text
-from shapegcode.io.record import ReadOptions
-from shapegcode.io.table import TextTable
-from shapegcode.io.units import FloatArray
+from shapegcode.io.table import TextTable, utf8_text
+from shapegcode.io.units import FloatArray, Label, tap_label, words_of
 
 _PARTS = {
     "frequency": "f freq frequency frequenz hz",

@@ -14,8 +14,8 @@ from xml.parsers import expat
 
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import MAX_DEPTH, MAX_TEXT_BYTES
-from shapegcode.io.layout import chunks, line_chunks
 from shapegcode.io.run_items import Event, FileNotes, Item, ItemTable, Stamps
+from shapegcode.io.table import chunks, line_chunks
 
 _MAX_OBSERVATIONS = 1_000_000  # the size of an agent's largest buffer
 _MAX_ITEMS = 100_000

@@ -18,8 +18,7 @@ import numpy as np
 
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import MAX_DEPTH, read_file
-from shapegcode.io.frequency_response import FrequencyResponse, checked_lines
-from shapegcode.io.record import ReadOptions
+from shapegcode.io.record import FrequencyResponse, ReadOptions, checked_lines
 from shapegcode.io.units import FloatArray
 
 _MAX_BYTES = 64 << 20

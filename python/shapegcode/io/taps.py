@@ -10,12 +10,10 @@ from typing import Literal
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.columns import Label, tap_label, unit_of
-from shapegcode.io.layout import is_clock_time
 from shapegcode.io.record import UNITS, Quantity, ReadOptions, Record, per_volt, stated_unit, volts_of
 from shapegcode.io.sampling import UnevenTimeError, even_grid, even_period, resample
-from shapegcode.io.table import TextTable
-from shapegcode.io.units import Measured, Unit
+from shapegcode.io.table import TextTable, is_clock_time
+from shapegcode.io.units import Label, Measured, Unit, tap_label, unit_of
 
 _EXAMPLE = "time_s,force_N,acc_m/s^2"
 _RESPONSES: tuple[Quantity, ...] = ("acceleration", "velocity", "displacement")

@@ -10,11 +10,20 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
-from shapegcode.io.columns import tap_label
-from shapegcode.io.frequency_response import FrequencyResponse, checked_lines, frequency_factor, scale_of
-from shapegcode.io.record import Quantity, ReadOptions, Record, per_volt, stated_unit, volts_of
+from shapegcode.io.record import (
+    FrequencyResponse,
+    Quantity,
+    ReadOptions,
+    Record,
+    checked_lines,
+    frequency_factor,
+    per_volt,
+    scale_of,
+    stated_unit,
+    volts_of,
+)
 from shapegcode.io.sampling import UnevenTimeError, even_period
-from shapegcode.io.units import FloatArray, find_unit, units_of
+from shapegcode.io.units import FloatArray, find_unit, tap_label, units_of
 
 _TIME_RESPONSE = 1
 _FUNCTIONS = {

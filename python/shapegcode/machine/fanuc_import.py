@@ -9,11 +9,8 @@ from typing import Any
 
 from shapegcode.errors import MachineError, Problem
 from shapegcode.io.data_file import read_file
-from shapegcode.machine import fanuc_motion, fanuc_program
-from shapegcode.machine.fanuc_draft import Draft, take_modes
-from shapegcode.machine.fanuc_dump import ControlTables, is_table, read_dump, read_table
-from shapegcode.machine.fanuc_motion import take_motion, take_tables
-from shapegcode.machine.fanuc_program import take_program
+from shapegcode.machine.fanuc_dump import ControlTables, Draft, is_table, read_dump, read_table, take_modes
+from shapegcode.machine.fanuc_keys import NUMBERS, take_parameters, take_tables
 from shapegcode.machine.machine import Machine
 from shapegcode.machine.result import DEFAULT_WHY, ParameterImport
 from shapegcode.settings.keys import inherited
@@ -62,9 +59,8 @@ def import_parameters(
         OSError: a file cannot be read.
     """
     data, file = (dump, source) if isinstance(dump, bytes) else (read_file(dump, _MAX_DUMP_BYTES), str(dump))
-    draft = Draft(read_dump(data, file, fanuc_motion.NUMBERS | fanuc_program.NUMBERS), _started(base, name, file))
-    take_program(draft)
-    take_motion(draft)
+    draft = Draft(read_dump(data, file, NUMBERS), _started(base, name, file))
+    take_parameters(draft)
     read = ControlTables()
     for path in tables:
         content = read_file(path, _MAX_DUMP_BYTES)
