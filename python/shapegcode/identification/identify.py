@@ -23,8 +23,7 @@ from shapegcode.identification.problem import HIGHEST_SHARE, Fit, FitProblem, ar
 from shapegcode.identification.result import Identification, MassCheck, by_support
 from shapegcode.identification.sweep import find_modes_of_captures, find_swept_modes, is_capture
 from shapegcode.io.data_file import open_file
-from shapegcode.io.record import FrequencyResponse, Quantity, ReadOptions, Record
-from shapegcode.io.sampling import UnevenTimeError, even_period
+from shapegcode.io.record import FrequencyResponse, Quantity, ReadOptions, Record, UnevenTimeError, even_period
 from shapegcode.io.taps import is_klipper, read_sweep
 from shapegcode.io.units import FloatArray
 

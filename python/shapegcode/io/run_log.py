@@ -20,9 +20,8 @@ from typing import Literal, get_args
 from shapegcode.errors import RecordError
 from shapegcode.io.edge_json import edge_runs
 from shapegcode.io.mtconnect import mtconnect_events, shdr_events
-from shapegcode.io.run_cutter import RunCutter
 from shapegcode.io.run_items import Event, FileNotes, Item, ItemTable, Stamps, stated_feed_unit
-from shapegcode.io.run_tracks import RunLog
+from shapegcode.io.runs import RunCutter, RunLog
 from shapegcode.io.table import cells_of, head_of, is_number, line_chunks, without_thousands
 from shapegcode.io.units import Label, Meaning, Measured, factor_between, read_label
 
