@@ -150,26 +150,23 @@ from shapegcode.io.edge_capture import (
     EdgeValue as EdgeValue,
 )
 from shapegcode.io.edge_json import read_edge_json as read_edge_json
-from shapegcode.io.frequency_response import FrequencyResponse as FrequencyResponse
-from shapegcode.io.record import ReadOptions as ReadOptions, Record as Record
+from shapegcode.io.record import FrequencyResponse as FrequencyResponse, ReadOptions as ReadOptions, Record as Record
 from shapegcode.io.run_log import (
     iter_run_logs as iter_run_logs,
     read_run_logs as read_run_logs,
 )
-from shapegcode.io.run_tracks import (
+from shapegcode.io.runs import (
     RunLog as RunLog,
     Signal as Signal,
 )
 from shapegcode.machine import Machine as Machine
-from shapegcode.machine.description_result import (
+from shapegcode.machine.control_import import import_parameters as import_parameters
+from shapegcode.machine.result import (
     MachineDescription as MachineDescription,
     MachineDifference as MachineDifference,
+    ParameterImport as ParameterImport,
     describe_machine as describe_machine,
     machine_difference as machine_difference,
-)
-from shapegcode.machine.fanuc_import import import_parameters as import_parameters
-from shapegcode.machine.result import (
-    ParameterImport as ParameterImport,
 )
 from shapegcode.metrology.measure import (
     measure as measure,
@@ -197,9 +194,8 @@ from shapegcode.results.motion_plots import (
 )
 from shapegcode.results.outcome import Pair as Pair, Xyz as Xyz
 from shapegcode.results.path_plots import plot_path as plot_path
-from shapegcode.results.report_result import Reports as Reports
 from shapegcode.results.result import Result as Result
-from shapegcode.results.revive import load_result as load_result
+from shapegcode.results.revive import Reports as Reports, load_result as load_result
 from shapegcode.results.table import Column as Column, Table as Table
 from shapegcode.setup.answers import Answers as Answers, AnswersError as AnswersError, read_answers as read_answers
 from shapegcode.setup.build import set_up as set_up

@@ -24,8 +24,7 @@ from table import markdown
 
 from shapegcode.identification.identify import identify
 from shapegcode.identification.result import Estimate, IdentifiedMode
-from shapegcode.io.frequency_response import FrequencyResponse
-from shapegcode.io.record import Quantity
+from shapegcode.io.record import FrequencyResponse, Quantity
 from tap_truth import TrueMode, random_modes, tap
 
 NAMES = ("frequency_hz", "damping_ratio", "stiffness_n_per_m")

@@ -7,7 +7,7 @@ import tomllib
 
 from shapegcode.errors import MachineError
 from shapegcode.machine import Machine
-from shapegcode.machine.fanuc_import import import_parameters
+from shapegcode.machine.control_import import import_parameters
 
 _BASE = Machine.load("vx500")
 

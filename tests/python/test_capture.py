@@ -11,8 +11,8 @@ import pytest
 import shapegcode as sg
 from command import run
 from held_loop import encoder_m
-from shapegcode.identification.capture import is_capture
 from shapegcode.identification.known_command import KnownCommand, known_command
+from shapegcode.identification.sweep import is_capture
 from shapegcode.identification.sweep_program import write_sweep
 
 FloatArray = npt.NDArray[np.float64]

@@ -10,8 +10,8 @@ import pytest
 
 import shapegcode as sg
 from shapegcode.cli import main
-from shapegcode.results.citations import METHODS, bibliography, entries_of
 from shapegcode.results.outcome import NotKeptError
+from shapegcode.results.result import METHODS, bibliography, entries_of
 from shapegcode.shaping import FAMILIES
 from shapegcode.shaping.registry import Family
 

@@ -16,8 +16,8 @@ from effort import cpu_s
 from shapegcode.cli import main
 from shapegcode.errors import MachineError
 from shapegcode.machine import Machine
+from shapegcode.machine.control_import import import_parameters
 from shapegcode.machine.fanuc_dump import ControlTables, read_table
-from shapegcode.machine.fanuc_import import import_parameters
 from shapegcode.machine.result import ParameterImport
 from shapegcode.results.json import schema
 

@@ -16,8 +16,7 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.identify import identify
 from shapegcode.identification.result import Identification
 from shapegcode.identification.update import update_machine
-from shapegcode.io.frequency_response import FrequencyResponse, ratio_unit
-from shapegcode.io.record import Quantity, ReadOptions
+from shapegcode.io.record import FrequencyResponse, Quantity, ReadOptions, ratio_unit
 from shapegcode.machine import Machine
 from tap_truth import TrueMode, random_modes
 

@@ -156,7 +156,7 @@ def _kinds() -> dict[str, Kind]:
     from shapegcode.identification.servo.record import read_servo_record
     from shapegcode.io.edge_json import read_edge_json
     from shapegcode.io.read import read_measurement
-    from shapegcode.machine.fanuc_import import import_parameters
+    from shapegcode.machine.control_import import import_parameters
     from shapegcode.setup.answers import read_answers
     from shapegcode.studies.study_file import load_study
     from shapegcode.testcut.cut import read_test_cut

@@ -21,8 +21,7 @@ from shapegcode.identification.model_search import Sought
 from shapegcode.identification.result import Identification
 from shapegcode.identification.sweep_program import write_sweep
 from shapegcode.identification.update import update_machine
-from shapegcode.io.frequency_response import FrequencyResponse
-from shapegcode.io.record import ReadOptions, Record
+from shapegcode.io.record import FrequencyResponse, ReadOptions, Record
 from shapegcode.machine import Machine
 
 FloatArray = npt.NDArray[np.float64]

@@ -14,7 +14,7 @@ import shapegcode as sg
 from acceptance import machine_with
 from command import run
 from shapegcode import _core
-from shapegcode.machine.linuxcnc_ini import read_ini
+from shapegcode.machine.control_import import read_ini
 from shapegcode.model.machine_model import fanuc_model
 
 INI = """\

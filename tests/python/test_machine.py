@@ -17,7 +17,7 @@ from shapegcode.cli.runner import write_json
 from shapegcode.errors import MachineError
 from shapegcode.io.data_file import write_text
 from shapegcode.machine import AxisMode, Machine
-from shapegcode.machine.description_result import MachineDescription
+from shapegcode.machine.result import MachineDescription
 from shapegcode.results.json import schema
 from shapegcode.settings.keys import PerAxis
 

@@ -13,8 +13,8 @@ from scipy.stats import binom
 import shapegcode as sg
 from hard_records import accelerance, hard_record, is_meant, to_find
 from shapegcode.cli import main
+from shapegcode.identification.frf_model import steady_sines
 from shapegcode.identification.identify import identify
-from shapegcode.identification.lines import steady_sines
 from shapegcode.identification.result import Identification, IdentifiedMode
 from tap_truth import TrueMode
 

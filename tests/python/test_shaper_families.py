@@ -34,8 +34,7 @@ from shapegcode.shaping import (
 )
 from shapegcode.shaping.bands import parse_taps
 from shapegcode.shaping.grid_designs import Conditions, Zero, shortest_on_grid
-from shapegcode.shaping.registry import distinct
-from shapegcode.shaping.solvers import simultaneous_zv
+from shapegcode.shaping.registry import distinct, simultaneous_zv
 from shaper_residual import is_feasible, left_of, simulated
 
 SLOW = parse_mode_band("46:0.02±5%")

@@ -18,12 +18,10 @@ from scipy.io import wavfile
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.identify import identify
-from shapegcode.io.columns import tap_label
 from shapegcode.io.read import read_records
-from shapegcode.io.record import ReadOptions, Record
-from shapegcode.io.sampling import UnevenTimeError, even_period
+from shapegcode.io.record import ReadOptions, Record, UnevenTimeError, even_period
 from shapegcode.io.servo_log import read_log
-from shapegcode.io.units import FloatArray, find_unit
+from shapegcode.io.units import FloatArray, find_unit, tap_label
 from shapegcode.testcut.record import read_forces
 from tap_truth import TrueMode, acceleration
 

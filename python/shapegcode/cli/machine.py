@@ -17,7 +17,7 @@ from shapegcode.io.data_file import read_file, write_text
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
-    from shapegcode.machine.description_result import MachineDescription
+    from shapegcode.machine.result import MachineDescription
     from shapegcode.settings.keys import TomlTable
 
 FILES = ("machine", "tool", "stock", "study")  # kinds of TOML files that have a schema
@@ -43,7 +43,7 @@ def _init(args: argparse.Namespace) -> int:
 
 def _import(args: argparse.Namespace) -> int:
     from shapegcode.machine import Machine
-    from shapegcode.machine.fanuc_import import import_parameters
+    from shapegcode.machine.control_import import import_parameters
 
     runner.check_files(args)
     dump, tables = _sorted(args.dump)
@@ -80,7 +80,7 @@ def _sorted(files: list[str]) -> tuple[str, list[str]]:
 
 
 def _show(args: argparse.Namespace) -> int:
-    from shapegcode.machine.description_result import describe_machine
+    from shapegcode.machine.result import describe_machine
 
     runner.check_files(args)
     if args.write_origins:
@@ -111,8 +111,8 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
     from shapegcode.conversion.convert import convert
     from shapegcode.conversion.tables import rank_unknown_axes
     from shapegcode.machine import Machine
-    from shapegcode.machine.description_result import OpenValue
     from shapegcode.machine.programs import ANY_PRICE
+    from shapegcode.machine.result import OpenValue
 
     machine, note = Machine.load(args.machine), ""
     with runner.progress(f"converting {args.input}", args):
@@ -139,7 +139,7 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
 
 
 def _diff(args: argparse.Namespace) -> int:
-    from shapegcode.machine.description_result import machine_difference
+    from shapegcode.machine.result import machine_difference
 
     runner.check_files(args)
     return runner.finish(machine_difference(*args.files), args)

@@ -93,8 +93,7 @@ SHAPER = Interface(
 
 def _report(args: argparse.Namespace) -> int:
     from shapegcode.results.page.html import save
-    from shapegcode.results.report_result import ReportPage, Reports
-    from shapegcode.results.revive import written_reports
+    from shapegcode.results.revive import ReportPage, Reports, written_reports
 
     jobs = [(Path(name), report) for name in args.inputs for report in written_reports(name)]
     if args.output is not None and len(jobs) > 1:

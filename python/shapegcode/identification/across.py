@@ -15,13 +15,11 @@ from scipy import stats
 from shapegcode.errors import RecordError
 from shapegcode.identification.checks import Prepared, Usable, is_clipped, prepare
 from shapegcode.identification.decay import part_of
-from shapegcode.identification.frf_model import mode_columns
+from shapegcode.identification.frf_model import measured_lines, mode_columns
 from shapegcode.identification.frf_search import cut
-from shapegcode.identification.lines import measured_lines
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode
-from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_measurement
-from shapegcode.io.record import UNITS, ReadOptions, Record
+from shapegcode.io.record import UNITS, ComplexArray, FrequencyResponse, ReadOptions, Record
 from shapegcode.io.units import FloatArray
 from shapegcode.results.outcome import Xyz
 

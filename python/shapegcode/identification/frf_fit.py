@@ -14,10 +14,10 @@ from scipy.signal import find_peaks
 from shapegcode.errors import RecordError
 from shapegcode.identification import frf_search, model_search
 from shapegcode.identification.checks import EXCITED, Prepared
-from shapegcode.identification.frf_model import Lines, ModalFit
-from shapegcode.identification.frf_search import Pole, StablePole, Uncertainty, Window, cut, fitted, starts_of
-from shapegcode.identification.lines import (
+from shapegcode.identification.frf_model import (
     Hits,
+    Lines,
+    ModalFit,
     correlation_of,
     hits_of,
     measured_lines,
@@ -25,10 +25,11 @@ from shapegcode.identification.lines import (
     steady_sines,
     weighted,
 )
+from shapegcode.identification.frf_search import Pole, StablePole, Uncertainty, Window, cut, fitted, starts_of
 from shapegcode.identification.model_search import OPPOSED, Sought, chart_of, interval_refusal, mode_estimates
 from shapegcode.identification.problem import MIN_SWINGS, Starts
 from shapegcode.identification.result import ChartPole, Identification, IdentifiedMode, by_support
-from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
+from shapegcode.io.record import ComplexArray, FrequencyResponse
 from shapegcode.io.units import FloatArray
 
 _BESIDE = 0.25  # also fit lines this far outside the requested band, relative to its ends

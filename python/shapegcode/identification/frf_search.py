@@ -11,7 +11,7 @@ import scipy.linalg
 from shapegcode.errors import ArgumentError
 from shapegcode.identification.frf_model import Lines, ModalFit, fit_modes, mode_columns
 from shapegcode.identification.problem import Starts
-from shapegcode.io.frequency_response import ComplexArray
+from shapegcode.io.record import ComplexArray
 from shapegcode.io.units import FloatArray
 
 _BAND = 1.8  # upper end of a band of poles over its lower end

@@ -25,9 +25,8 @@ from shapegcode.identification.model_search import Sought
 from shapegcode.identification.result import Estimate, Identification, as_sweep
 from shapegcode.identification.spectra import REST_S, Spectra, moving_parts, transforms
 from shapegcode.identification.sweep_program import commanded
-from shapegcode.io.frequency_response import FEWEST_LINES, ComplexArray, FrequencyResponse
 from shapegcode.io.read import read_records
-from shapegcode.io.record import ReadOptions, Record
+from shapegcode.io.record import FEWEST_LINES, ComplexArray, FrequencyResponse, ReadOptions, Record
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program

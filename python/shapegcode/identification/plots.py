@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from shapegcode.identification.result import Identification
 from shapegcode.identification.spectra import decay_spectrum, frf, mode_envelopes
@@ -16,9 +16,6 @@ from shapegcode.io.record import UNITS, Record
 from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
 from shapegcode.results.outcome import Plot
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _MAX_TRACES, _SEEN, _ROOM = 3, 0.02, 2.5
 _FILE_TIME = "time in the file in s"
@@ -166,10 +163,7 @@ def plot_stabilisation(found: Identification, ax: Axes | None = None) -> Axes:
     panel.axhline(found.order, color="black", linewidth=0.8, linestyle="--", label=f"chosen: {found.order}")
     panel.set(xlabel="frequency in Hz", ylabel="modes in the model", xlim=(frequency[seen][0], highest))
     panel.set_yticks(range(1, max((pole.order for pole in found.chart), default=1) + 1))
-    panel.legend(
-        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, frameon=False, borderaxespad=0.2, fontsize=9,
-        columnspacing=1.2, handletextpad=0.4,
-    )  # fmt: skip
+    plot.legend_above(panel, columns=5, columnspacing=1.2, handletextpad=0.4)
     return panel
 
 

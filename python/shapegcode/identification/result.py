@@ -12,8 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from shapegcode.identification.checks import Prepared, RecordUse
-from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
-from shapegcode.io.record import Record
+from shapegcode.io.record import ComplexArray, FrequencyResponse, Record
 from shapegcode.io.units import FloatArray
 from shapegcode.results.json import hidden, sparse
 from shapegcode.results.outcome import Plot, Xyz

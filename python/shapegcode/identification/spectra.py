@@ -12,8 +12,7 @@ from scipy import fft, signal
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from shapegcode.errors import RecordError
-from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
-from shapegcode.io.record import Record
+from shapegcode.io.record import ComplexArray, FrequencyResponse, Record
 from shapegcode.io.units import FloatArray
 
 _PEAK_SHARE, _PEAK_RISES = 0.01, 2.0  # relative to the largest (-40 dB); factor of a peak over its surroundings

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -155,7 +155,7 @@ class EdgeCapture:
     calls: tuple[EdgeCall, ...] = ()
     values: tuple[EdgeValue, ...] = ()
     gaps: tuple[EdgeGap, ...] = ()
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
 
     @functools.cached_property
     def stretches(self) -> tuple[slice, ...]:

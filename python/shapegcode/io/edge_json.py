@@ -22,7 +22,7 @@ import numpy.typing as npt
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import DataFile
 from shapegcode.io.edge_capture import EdgeAxis, EdgeBlock, EdgeCall, EdgeCapture, EdgeGap, EdgeValue, IntArray
-from shapegcode.io.run_tracks import RunLog, Signal
+from shapegcode.io.runs import RunLog, Signal
 from shapegcode.io.units import FloatArray
 
 _MIN_ROWS = 2

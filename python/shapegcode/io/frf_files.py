@@ -13,20 +13,18 @@ from typing import Any
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.columns import Label, tap_label, words_of
 from shapegcode.io.data_file import open_file
-from shapegcode.io.frequency_response import (
+from shapegcode.io.record import (
     FEWEST_LINES,
     ComplexArray,
     FrequencyResponse,
-    checked_lines,
+    ReadOptions,
+    checked_response,
     frequency_factor,
     scale_of,
 )
-from shapegcode.io.layout import utf8_text
-from shapegcode.io.record import ReadOptions
-from shapegcode.io.table import TextTable
-from shapegcode.io.units import FloatArray
+from shapegcode.io.table import TextTable, utf8_text
+from shapegcode.io.units import FloatArray, Label, tap_label, words_of
 
 _PARTS = {
     "frequency": "f freq frequency frequenz hz",
@@ -97,14 +95,10 @@ def read_frf_text(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
             f"{path}:{table.line_of(row)}: frequency {frequency[row]:.9g} Hz comes after {frequency[row - 1]:.9g} Hz: "
             "must ascend"
         )
-    lines, response, coherence, notes = checked_lines(str(path), frequency, values_of, column.get("coherence"))
     if not table.layout.header:
         warnings.append(f"{path}: no header: the columns are assumed to be frequency in Hz, real and imaginary part")
-    return [
-        FrequencyResponse(
-            str(path), lines, response * factor, quantity, coherence, options.axis, tuple(warnings), tuple(notes)
-        )
-    ]
+    lines = frequency, values_of, column.get("coherence")
+    return [checked_response(str(path), *lines, quantity, options.axis, warnings, factor=factor)]
 
 
 def _blank_cells(path: Path, table: TextTable) -> list[str]:
@@ -233,12 +227,8 @@ def read_frf_mat(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
         coherence = None
     label = " ".join(str(value) for key, value in held.items() if isinstance(value, str) and "unit" in key.lower())
     quantity, factor, warnings = scale_of(f"{path}: {found}", label or found, options)
-    frequency, response, coherence, notes = checked_lines(str(path), frequency, response, coherence)
-    return [
-        FrequencyResponse(
-            str(path), frequency, response * factor, quantity, coherence, options.axis, tuple(warnings), tuple(notes)
-        )
-    ]
+    lines = frequency, response, coherence
+    return [checked_response(str(path), *lines, quantity, options.axis, warnings, factor=factor)]
 
 
 def _variables(path: Path) -> dict[str, Any]:

@@ -14,8 +14,8 @@ from xml.parsers import expat
 
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import MAX_DEPTH, MAX_TEXT_BYTES
-from shapegcode.io.layout import chunks, line_chunks
 from shapegcode.io.run_items import Event, FileNotes, Item, ItemTable, Stamps
+from shapegcode.io.table import chunks, line_chunks
 
 _MAX_OBSERVATIONS = 1_000_000  # the size of an agent's largest buffer
 _MAX_ITEMS = 100_000
@@ -237,19 +237,10 @@ def shdr_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Even
             fields = line.split(b"|")
             if len(fields) != 3 or odd.until:
                 pairs = odd.pairs(number, line, fields)
-            elif fields[1] in known:
-                item = known[fields[1]]
-                if item is not None:  # nearly every line, so kept fast
-                    try:
-                        time = seconds(fields[0])
-                    except ValueError:
-                        odd.leave_out(number, fields[0])
-                        continue
-                    readable = True
-                    yield number, time, fields[0], item, fields[2]
-                continue
-            else:
-                pairs = odd.one(fields)
+            else:  # nearly every line, so kept fast
+                name = fields[1]
+                found = known[name] if name in known else odd.find(name)
+                pairs = () if found is None else ((found, fields[2]),)
             for item, text in pairs:
                 try:
                     time = seconds(fields[0])
@@ -269,11 +260,6 @@ class _Odd:
         self.until = b""  # end mark of a multi-line entry
         self._began, self._unreadable = 0, ""
 
-    def one(self, fields: list[bytes]) -> tuple[tuple[Item, bytes], ...]:
-        """(item, value) of a line with a new item; empty if it is not used."""
-        item = self._find(fields[1])
-        return () if item is None else ((item, fields[2]),)
-
     def leave_out(self, number: int, stamp: bytes) -> None:
         """Ignore a line with an unreadable time stamp."""
         shown = stamp[:40].decode("latin-1")
@@ -290,7 +276,7 @@ class _Odd:
                 f"{self.until[:40].decode('latin-1')!r}, so that nothing after it can be read; remove it"
             )
 
-    def _find(self, name: bytes) -> Item | None:
+    def find(self, name: bytes) -> Item | None:
         """Identify an item and cache it, with a limit for files that are no log."""
         item = self._table.find(name.decode("utf-8", errors="replace").strip())
         if len(self._known) < 10_000:
@@ -310,11 +296,11 @@ class _Odd:
             if _MARK in line:
                 self.until, self._began = line[line.index(_MARK) :].strip(), number
             self._notes.add("asset", number, "an asset, ignored")
-        elif len(rest) == _CONDITION_FIELDS and rest[1].strip().lower() in _CONDITION and self._find(rest[2]) is None:
+        elif len(rest) == _CONDITION_FIELDS and rest[1].strip().lower() in _CONDITION and self.find(rest[2]) is None:
             self._notes.add("condition", number, f"the condition {rest[0].decode('latin-1')}, ignored")
         elif len(rest) < 2 or len(rest) % 2:
             self._notes.add("odd", number, f"{line[:60].strip().decode('latin-1')!r} is not time|item|value, ignored")
         else:
-            found = ((self._find(name), text) for name, text in zip(rest[::2], rest[1::2], strict=True))
+            found = ((self.find(name), text) for name, text in zip(rest[::2], rest[1::2], strict=True))
             return tuple((item, text) for item, text in found if item is not None)
         return ()

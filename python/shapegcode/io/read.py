@@ -10,10 +10,8 @@ import numpy as np
 
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import open_file, read_file
-from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.frf_files import is_frf_text, is_mat, read_frf_mat, read_frf_text
-from shapegcode.io.record import ReadOptions, Record
-from shapegcode.io.sampling import STATED_RATE_TOLERANCE
+from shapegcode.io.record import STATED_RATE_TOLERANCE, FrequencyResponse, ReadOptions, Record
 from shapegcode.io.servo_tuning import is_xml, read_servo_tuning
 from shapegcode.io.taps import is_klipper, klipper_options, read_csv
 from shapegcode.io.uff import is_frf_uff, read_frf_uff, read_uff

@@ -10,9 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError, RecordError
-from shapegcode.io.columns import Label, Meaning, read_label, unit_of, words_of
 from shapegcode.io.table import TextTable
-from shapegcode.io.units import factor_between, find_unit, units_of
+from shapegcode.io.units import Label, Meaning, factor_between, find_unit, read_label, unit_of, units_of, words_of
 
 Array = npt.NDArray[np.float64]
 _ACTUAL = {"act", "actual", "fb", "feedback", "fbk", "measured", "meas", "ist", "real"}

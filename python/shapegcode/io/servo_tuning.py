@@ -18,8 +18,7 @@ import numpy as np
 
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import MAX_DEPTH, read_file
-from shapegcode.io.frequency_response import FrequencyResponse, checked_lines
-from shapegcode.io.record import ReadOptions
+from shapegcode.io.record import FrequencyResponse, ReadOptions, checked_response
 from shapegcode.io.units import FloatArray
 
 _MAX_BYTES = 64 << 20
@@ -61,14 +60,11 @@ def read_servo_tuning(path: Path, options: ReadOptions) -> list[FrequencyRespons
     kept = (hertz > 0.0) & (np.abs(values) > 0.0)
     hertz, values = hertz[kept], values[kept]
     response = -1.0 / (2j * np.pi * hertz * values)
-    lines = checked_lines(str(path), hertz, response, None if coherence is None else coherence[kept])
-    notes = [*lines[3], f"{path}: from motor torque and speed: modes with the motor held, without masses"]
-    return [
-        FrequencyResponse(
-            f"{path}: auto servo tuning", *lines[:2], "acceleration", lines[2], options.axis or axis,
-            () if options.axis else tuple(warnings), tuple(notes), scaled=False,
-        )
-    ]  # fmt: skip
+    lines = hertz, response, None if coherence is None else coherence[kept]
+    warnings = [] if options.axis else warnings
+    notes = [f"{path}: from motor torque and speed: modes with the motor held, without masses"]
+    source, along = f"{path}: auto servo tuning", options.axis or axis
+    return [checked_response(source, *lines, "acceleration", along, warnings, notes, where=str(path), scaled=False)]
 
 
 def _root(path: Path) -> Element:

@@ -10,15 +10,24 @@ from typing import Literal
 import numpy as np
 
 from shapegcode.errors import RecordError
-from shapegcode.io.columns import Label, tap_label, unit_of
-from shapegcode.io.layout import is_clock_time
-from shapegcode.io.record import UNITS, Quantity, ReadOptions, Record, per_volt, stated_unit, volts_of
-from shapegcode.io.sampling import UnevenTimeError, even_grid, even_period, resample
-from shapegcode.io.table import TextTable
-from shapegcode.io.units import Measured, Unit
+from shapegcode.io.record import (
+    RESPONSES,
+    UNITS,
+    Quantity,
+    ReadOptions,
+    Record,
+    UnevenTimeError,
+    even_grid,
+    even_period,
+    per_volt,
+    resample,
+    stated_unit,
+    volts_of,
+)
+from shapegcode.io.table import TextTable, is_clock_time
+from shapegcode.io.units import Label, Measured, Unit, tap_label, unit_of
 
 _EXAMPLE = "time_s,force_N,acc_m/s^2"
-_RESPONSES: tuple[Quantity, ...] = ("acceleration", "velocity", "displacement")
 _REMEDY = (
     "state the unit, or for a signal in volts the sensor's sensitivity (--force-sensitivity 2.25mV/N, "
     "--response-sensitivity 100mV/g) or the scale (--force-scale, --response-scale)"
@@ -82,21 +91,21 @@ class _Chooser:
     def _response(self, index: int) -> _Column:
         """Response column, with its quantity by option, name or unit."""
         options, label = self.options, self.labels[index]
-        said = next((each for each in _RESPONSES if each == label.measures), None)
+        said = next((each for each in RESPONSES if each == label.measures), None)
         quantity = options.quantity or said
         if options.response_sensitivity is not None:
-            of_volt, factor = per_volt("response_sensitivity", options.response_sensitivity, _RESPONSES)
-            measured = next(each for each in _RESPONSES if each == of_volt.measures)
+            of_volt, factor = per_volt("response_sensitivity", options.response_sensitivity, RESPONSES)
+            measured = next(each for each in RESPONSES if each == of_volt.measures)
             return _Column(index, label, self._volts(index) * factor, measured)
         if options.response_scale is not None:
             return _Column(index, label, options.response_scale, quantity or "acceleration")
         bound = options.quantity or (None if options.response_unit else said)
-        unit = self._unit(index, _RESPONSES if bound is None else (bound,), options.response_unit)
+        unit = self._unit(index, RESPONSES if bound is None else (bound,), options.response_unit)
         if unit is None:
             quantity = quantity or "acceleration"
             self.warnings.append(f"{self._name(index)} has no unit: {UNITS[quantity]} is assumed")
             return _Column(index, label, 1.0, quantity)
-        return _Column(index, label, unit.factor, next(each for each in _RESPONSES if each == unit.measures))
+        return _Column(index, label, unit.factor, next(each for each in RESPONSES if each == unit.measures))
 
     def _volts(self, index: int) -> float:
         """Scale of a column to volts, for a sensor whose sensitivity is stated."""
@@ -159,7 +168,7 @@ class _Chooser:
         if options.response_columns:
             found = [self._named(name, "--response-column") for name in options.response_columns]
         else:
-            kinds = {"response", *_RESPONSES}
+            kinds = {"response", *RESPONSES}
             found = [k for k, label in enumerate(self.labels) if label.measures in kinds and k not in taken]
             if options.axis is not None:
                 named = [k for k in found if self.labels[k].axis is not None]

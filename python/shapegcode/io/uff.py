@@ -10,11 +10,21 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import RecordError
-from shapegcode.io.columns import tap_label
-from shapegcode.io.frequency_response import FrequencyResponse, checked_lines, frequency_factor, scale_of
-from shapegcode.io.record import Quantity, ReadOptions, Record, per_volt, stated_unit, volts_of
-from shapegcode.io.sampling import UnevenTimeError, even_period
-from shapegcode.io.units import FloatArray, find_unit, units_of
+from shapegcode.io.record import (
+    FrequencyResponse,
+    Quantity,
+    ReadOptions,
+    Record,
+    UnevenTimeError,
+    checked_response,
+    even_period,
+    frequency_factor,
+    per_volt,
+    scale_of,
+    stated_unit,
+    volts_of,
+)
+from shapegcode.io.units import FloatArray, find_unit, tap_label, units_of
 
 _TIME_RESPONSE = 1
 _FUNCTIONS = {
@@ -343,13 +353,10 @@ def read_frf_uff(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
         quantity, factor, warnings = _scale(where, data, units, options)
         sign = -1.0 if int(data["rsp_dir"]) * int(data["ref_dir"]) < 0 else 1.0
         scaled = np.asarray(values * (sign * factor), dtype=np.complex128)
-        lines = checked_lines(where, frequency, scaled, _coherence(data, coherences, len(values)))
-        responses.append(
-            FrequencyResponse(
-                where if len(found) > 1 else str(path), *lines[:2], quantity, lines[2], _axis(data) or options.axis,
-                (*file.warnings, *warnings), (*notes, *lines[3]),
-            )
-        )  # fmt: skip
+        lines = frequency, scaled, _coherence(data, coherences, len(values))
+        source, axis = where if len(found) > 1 else str(path), _axis(data) or options.axis
+        warnings = [*file.warnings, *warnings]
+        responses.append(checked_response(source, *lines, quantity, axis, warnings, notes, where=where))
     return responses
 
 

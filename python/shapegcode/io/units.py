@@ -1,13 +1,21 @@
-"""Table of units, with the spellings of measuring programs: ``m/s^2``, ``m_s2``, ``mm/min``, ``kgf``, arrays."""
+"""Units with the spellings of measuring programs (``m/s^2``, ``m_s2``, ``kgf``), labels of columns with them, arrays.
+
+`read_label` splits every label in the same way: ``Acc_X [m/s^2]``, ``time_ms``, ``Kraft / N``, or a name with its unit
+in the row below. Meanings of names differ: ``x`` is an acceleration along X in a tap file, a position in a record of
+forces. So each file type has its own names; those of tap files are here, since universal files share them.
+"""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+
+from shapegcode.errors import RecordError
 
 FloatArray = npt.NDArray[np.float64]  # of doubles, of any shape
 
@@ -95,3 +103,160 @@ def is_foreign_unit(text: str, measures: str | None) -> bool:
     """Whether a text is a unit without conversion, such as V, for a quantity of this kind."""
     plain = re.sub(r"[\s^]", "", text.lower()).replace("²", "2").replace("μ", "µ")
     return plain in _FOREIGN or (measures == "time" and plain in _FOREIGN_TIMES)
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """The meaning of a column name."""
+
+    what: str  # quantity, by the name in the file's reader, such as "fx"
+    measures: Measured | Literal["response"]  # its kind; "response" for a response of unknown kind
+    axis: str | None = None  # "x", "y" or "z"; None: no axis
+
+
+Names = Callable[[str], Meaning | None]
+"""Names of one file type: maps a name without unit to its meaning; None: not used."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """Parsed label of a column or channel."""
+
+    text: str  # the label
+    meaning: Meaning | None  # None: unknown name
+    unit: Unit | None  # None: unknown or not stated
+    unknown_unit: str = ""  # text of an unknown unit
+
+    @property
+    def measures(self) -> Measured | Literal["response"] | None:
+        """Kind of the quantity; None: unknown."""
+        return None if self.meaning is None else self.meaning.measures
+
+    @property
+    def axis(self) -> str | None:
+        """ "x", "y" or "z"; None: no axis."""
+        return None if self.meaning is None else self.meaning.axis
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name, in lower case."""
+    return re.findall(r"[^\W\d_]+", name.lower())
+
+
+def read_label(text: str, unit_text: str, names: Names) -> Label:
+    """Read a label."""
+    if text.strip().lower() in {"x_value", "x value"}:  # LabVIEW's name of the time, which it writes in seconds
+        return Label(text, Meaning("time", "time"), find_unit(unit_text or "s"))
+    name, unit, unknown = _split_unit(text, names)
+    if unit_text.strip(" []()-"):
+        unit = find_unit(unit_text)
+        unknown = "" if unit else unit_text.strip()
+    return Label(text.strip(), names(name), unit, unknown)
+
+
+def _split_unit(text: str, names: Names) -> tuple[str, Unit | None, str]:
+    """Split a label into name, unit, text of an unknown unit."""
+    if names(text) is None and not _is_in(text) and (unit := find_unit(text)):
+        return "", unit, ""
+    unknown = ""
+    name = text
+    for match in re.finditer(r"[\[({<]([^\[\](){}<>]*)[\])}>]", text):
+        inner = match[1].strip()
+        if inner.lower() in {"x", "y", "z"} or inner.isdigit() or (len(inner) > 1 and _is_name(inner, names)):
+            continue
+        name = name.replace(match[0], " ")
+        if unit := find_unit(inner):
+            return name.rstrip(" /"), unit, ""
+        unknown = inner or unknown
+    if unknown:
+        return name, None, unknown
+    for split in re.finditer(r"[_ ,/]+", text):
+        head, tail = text[: split.start()], text[split.end() :]
+        if head and (unit := find_unit(tail)) and not (_is_in(tail) and _kind(head, names) != unit.measures):
+            return re.sub(r" in$", "", head), unit, ""
+    for split in re.finditer(r"[_ ,/.:-]+", text):
+        head, tail = text[: split.start()], text[split.end() :].strip()
+        kind = _kind(head, names)
+        # "x_v" is the velocity along X, "x_V" a response in V.
+        named = kind == "response" and _is_name(tail, names) and tail != "V"
+        if kind is not None and is_foreign_unit(tail, kind) and not named:
+            return head, None, tail
+    head, found, tail = text.partition("/")
+    if found and head and words_of(tail) != [tail.strip().lower()]:
+        return head, None, tail.strip()
+    return text, None, ""
+
+
+def _is_in(text: str) -> bool:
+    """Whether it is "in", a unit after a length, else a word."""
+    return text.strip().lower() == "in"
+
+
+def _kind(name: str, names: Names) -> str | None:
+    found = names(name)
+    return None if found is None else found.measures
+
+
+def _is_name(text: str, names: Names) -> bool:
+    """Whether it is a single word and a known name."""
+    return words_of(text) == [text.lower()] and names(text) is not None and find_unit(text) is None
+
+
+def unit_of(where: str, label: Label, allowed: tuple[Measured, ...], remedy: str = "") -> Unit | None:
+    """Unit of a label for a quantity; None: not stated."""
+    needed = f"needed is one of {units_of(*allowed)}"
+    if label.unit is None and label.unknown_unit:
+        raise RecordError(
+            f"{where}: {label.text!r}: the unit {label.unknown_unit!r} is not known; {needed}"
+            + (f"; {remedy}" if remedy else "")
+        )
+    if label.unit is not None and label.unit.measures not in allowed:
+        raise RecordError(
+            f"{where}: {label.text!r} has the unit {label.unit.name} of {label.unit.measures}, but must be of "
+            f"{' or '.join(allowed)}: name and unit must agree; {needed}"
+        )
+    return label.unit
+
+
+# --- the names in records of taps and decays --------------------------------------------------------------------------
+
+_NAMES: dict[str, Measured] = {}
+for _measures, _words in {
+    "time": "t time zeit timestamp",
+    "force": "f force kraft hammer",
+    "acceleration": "a acc accel acceleration accelerometer beschleunigung",
+    "velocity": "v vel velocity geschwindigkeit",
+    "displacement": "d u disp displacement weg deflection auslenkung",
+}.items():
+    _NAMES |= dict.fromkeys(_words.split(), _measures)  # type: ignore[arg-type]
+_ORDER: tuple[Measured, ...] = ("time", "force", "acceleration", "velocity", "displacement")
+_WEAK_FORCE = {"impact", "excitation", "anregung"}
+_RESPONSE = {"response", "antwort"}
+_WITH_AXIS = re.compile(r"(a|acc|accel|acceleration|v|vel|velocity|d|u|disp|displacement|f|force)([xyz])")
+
+
+def tap_label(text: str, unit_text: str = "") -> Label:
+    """Read a label of a tap file: if its name is unknown, or only "response", the quantity follows from the unit."""
+    label = read_label(text, unit_text, _tap_names)
+    if label.unit is None or label.measures not in {None, "response"}:
+        return label
+    return replace(label, meaning=Meaning(label.unit.measures, label.unit.measures, label.axis))
+
+
+def _tap_names(name: str) -> Meaning | None:
+    """The names of time, force and responses in English and German, alone or among other words."""
+    words = words_of(name)
+    axis = next((word for word in words if word in {"x", "y", "z"}), None)
+    found: list[Measured] = []
+    for word in words:
+        if word in _NAMES:
+            found.append(_NAMES[word])
+        elif joined := _WITH_AXIS.fullmatch(word):
+            found.append(_NAMES[joined[1]])
+            axis = axis or joined[2]
+    measures: Measured | Literal["response"] | None = next((each for each in _ORDER if each in found), None)
+    if measures is None:
+        strong = bool(_RESPONSE & set(words))
+        weak = bool(_WEAK_FORCE & set(words))
+        measures = "response" if strong else "force" if weak else "response" if axis else None
+    return None if measures is None else Meaning(measures, measures, axis)

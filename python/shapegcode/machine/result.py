@@ -1,17 +1,20 @@
-"""Result of the import of a parameter dump as a machine."""
+"""Results on machines: import of a parameter dump; values with unit, origin and meaning; two machines compared."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
+from pathlib import Path
+from typing import TypeVar
 
 from shapegcode.machine.machine import Machine
-from shapegcode.results.json import hidden
+from shapegcode.results.json import OldNames, hidden
 from shapegcode.results.outcome import Xyz
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
-from shapegcode.settings.keys import toml
+from shapegcode.settings.keys import KeyValue, toml
 
 DEFAULT_WHY = "default of the machine file"
 """Reason of a value that is not in the dump and needed no decision."""
@@ -223,3 +226,282 @@ def _shown(row: ReadParameter | AssumedValue) -> str:
         one = value.x == value.y == value.z
         return toml(value.x) if one else toml({axis: value[axis] for axis in "xyz"})
     return value if isinstance(value, str) else toml(value)
+
+
+_RANKED = 8
+_Keyed = TypeVar("_Keyed", "KeyValue", "DifferentValue")
+
+
+@dataclass(frozen=True)
+class OpenValue(OldNames):
+    """A value that was not measured on the machine, and its effect on a program."""
+
+    key: str  # dotted name
+    value: str  # as in the file, with its unit
+    origin: str  # "assumed", "inherited" or "default"
+    tested_value: str = ""  # the changed value, as text; empty: not tested
+    effect: str = ""  # its largest effect on a figure, as text; empty: not tested
+    share: float | None = None  # the changed figure relative to its limit; None: not tested
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class MachineDescription(Result):
+    """Every value of a machine with its unit, origin and meaning.
+
+    Attributes:
+        machine: the tables of the machine file, with defaults.
+        keys: every value by its dotted key, in the order of the file.
+        warnings: a warning if origins were read from comments, as in older files.
+        program: program for which the unverified values were ranked; None: not ranked.
+        matters: unverified values that change its verdict, largest effect first.
+        source: file of the machine, or its name, if known.
+    """
+
+    machine: Mapping[str, object]
+    keys: Mapping[str, KeyValue]
+    warnings: tuple[str, ...] = ()
+    program: str | None = None
+    matters: tuple[OpenValue, ...] = ()
+    source: str = "MACHINE"
+
+    @property
+    def ok(self) -> bool:
+        """Always true: a machine that cannot be used is refused."""
+        return True
+
+    @property
+    def answer(self) -> str:
+        """Number of unverified values, and the most important one."""
+        name, count = self.machine["name"], len(self._open())
+        if self.program is None:
+            if not count:
+                return f"{name}: every value is set"
+            sentence = f"{count} of {len(self.keys)} values are assumed or inherited"
+            return f"{name}: {sentence}; --for part.nc ranks them by their effect on your program"
+        if not self.matters:
+            return f"{name}: none of {count} unverified parameters matters for {Path(self.program).name}"
+        first = self.matters[0]
+        return (
+            f"{name}: {len(self.matters)} of {count} unverified parameters matter for "
+            f"{Path(self.program).name}, most of all {first.key} ({first.effect})"
+        )
+
+    def _open(self) -> list[KeyValue]:
+        return [value for value in self.keys.values() if value.unmeasured]
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if self.matters:
+            key = self.matters[0].key
+            how = "`shapegcode identify --tap-plan`" if ".modes" in key else "docs/howto/characterize.md"
+            return f"measure {key} first: {how} explains how."
+        if self._open() and self.program is None:
+            return f"`shapegcode machine show {self.source} --for part.nc` ranks them by their effect on your program."
+        return f"use it: shapegcode convert IN -m {self.source} -o OUT."
+
+    def tables(self, *, everything: bool = True) -> list[Table]:
+        """Tables of the unverified values and of the keys, grouped by table of the file.
+
+        Args:
+            everything: all keys; False: with a program, only the most important values.
+
+        Returns:
+            The tables.
+        """
+        if self.program is not None and not everything:
+            return self._ranking(_RANKED)
+        rows = list(_by_table(self.keys.values()))
+        heads = [rank for rank, row in enumerate(rows) if isinstance(row, str)]
+        columns = (
+            _KEY,
+            Column("value", value=_with_unit, text=True),
+            Column("origin", value=_origin, left=True, priority=2),
+            Column("meaning", value=lambda row: getattr(row, "meaning", None), text=True),
+        )
+        counts = Counter(_origin(value) or "" for value in self.keys.values())
+        summary = (Column("origin", value=lambda row: row[0], left=True), Column("keys", value=lambda row: row[1]))
+        return [
+            *self._ranking(),
+            Table("", columns, rows, sections=heads, row_style=_bold),
+            Table("origins", summary, counts.most_common()),
+        ]
+
+    def _ranking(self, limit: int | None = None) -> list[Table]:
+        """Unverified values: with a program the important ones, largest effect first; else all by table."""
+        if self.program is not None:
+            columns = (
+                Column("matters most", value="key", left=True),
+                Column(
+                    "assumed value → tested value",
+                    value=lambda row: f"{row.value} {row.origin} → {row.tested_value}",
+                    text=True,
+                ),
+                Column("then, µm", value="effect", text=True),
+            )
+            left_out = len(self.matters[limit:]) if limit is not None else 0
+            more = f"{left_out} more matter less; " if left_out else ""
+            caption = f"{more}--verbose: every value of the machine" if limit is not None else ""
+            return [Table("", columns, self.matters[:limit], caption=caption)] if self.matters else []
+        tables: dict[str, list[str]] = {}
+        for value in self._open():
+            tables.setdefault(value.key.rpartition(".")[0], []).append(_last(value.key))
+        listed = [(f"[{table}]", ", ".join(names)) for table, names in tables.items()]
+        by_table = (
+            Column("assumed in", value=lambda row: row[0], left=True),
+            Column("keys", value=lambda row: row[1], text=True),
+        )
+        return [Table("", by_table, listed)] if listed else []
+
+
+def _by_table(values: Iterable[_Keyed]) -> Iterator[str | _Keyed]:
+    """Yield values, with the name of each table before its first one."""
+    for table, rows in groupby(values, key=lambda value: value.key.rpartition(".")[0]):
+        yield from [table] if table else []
+        yield from rows
+
+
+def _last(key: str) -> str:
+    return key.rpartition(".")[2]
+
+
+_KEY = Column("key", value=lambda row: f"[{row}]" if isinstance(row, str) else _last(row.key), left=True)
+
+
+def _bold(row: object) -> str:
+    return "bold" if isinstance(row, str) else ""
+
+
+def _with_unit(row: str | KeyValue) -> str | None:
+    if isinstance(row, str):
+        return None
+    return f"{row.value} {row.unit}" if row.unit not in ("", "1") and row.value != "not set" else row.value
+
+
+def _origin(row: str | KeyValue) -> str | None:
+    return None if isinstance(row, str) else "assumed" if row.assumed else row.origin
+
+
+def describe_machine(machine: Machine | str | Path) -> MachineDescription:
+    """List every value of a machine with origin: file, default, or assumed default.
+
+    Args:
+        machine: a machine, its file, or the name of a built-in one.
+
+    Returns:
+        The values with their units and meanings.
+
+    Raises:
+        MachineError: the file is not TOML or has wrong keys or values; every problem is listed.
+        OSError: the file cannot be read.
+    """
+    loaded = Machine.of(machine)
+    keys = {value.key: value for value in loaded.values()}
+    warnings = (loaded.origin_warning,) if loaded.origin_warning else ()
+    return MachineDescription(loaded.model_dump(mode="json"), keys, warnings)
+
+
+_NONE = "-"
+
+
+@dataclass(frozen=True)
+class DifferentValue:
+    """A key with different values in two machines."""
+
+    key: str  # dotted name
+    unit: str  # of the values; "1" for a ratio
+    first: str  # value of the first machine, as TOML; "-": it has no such key
+    second: str  # value of the second machine, likewise
+    first_origin: str  # origin, see `shapegcode machine show`
+    second_origin: str  # origin in the second machine
+    meaning: str  # meaning of the key
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class MachineDifference(Result):
+    """Differences between two machines; origins are not compared.
+
+    Attributes:
+        first: name or file of the first machine.
+        second: name or file of the second machine.
+        keys: number of compared keys.
+        different: differing keys, in the order of the file.
+        warnings: none.
+    """
+
+    first: str
+    second: str
+    keys: int
+    different: tuple[DifferentValue, ...]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """True if they have the same values."""
+        return not self.different
+
+    @property
+    def answer(self) -> str:
+        """Number of differing keys."""
+        if self.ok:
+            return f"{self.first} and {self.second}: all {self.keys} values are the same"
+        return f"{self.first} and {self.second}: {len(self.different)} of {self.keys} values differ"
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if self.ok:
+            return "nothing: converted programs are the same for both."
+        return f"`shapegcode machine show {self.second}` explains each key."
+
+    def tables(self) -> list[Table]:
+        """The keys that differ, grouped by table of the file."""
+        rows = list(_by_table(self.different))
+        columns = (
+            _KEY,
+            Column(Path(self.first).name, value=lambda row: _of_one(row, "first"), text=True),
+            Column(Path(self.second).name, value=lambda row: _of_one(row, "second"), text=True),
+        )
+        return [Table("", columns, rows, row_style=_bold)] if rows else []
+
+
+def _of_one(row: str | DifferentValue, which: str) -> str | None:
+    """A value with unit and origin; *which*: "first" or "second"."""
+    if isinstance(row, str):
+        return None
+    value, origin = getattr(row, which), getattr(row, f"{which}_origin")
+    unit = "" if row.unit in ("", "1") or value in (_NONE, "not set") else f" {row.unit}"
+    return value if value == _NONE else f"{value}{unit} ({origin})"
+
+
+def machine_difference(first: Machine | str | Path, second: Machine | str | Path) -> MachineDifference:
+    """Compare two machines, defaults included.
+
+    Args:
+        first: a machine, its file, or the name of a built-in one.
+        second: likewise.
+
+    Returns:
+        The differences.
+
+    Raises:
+        MachineError: a file is not TOML or has wrong keys or values; every problem is listed.
+        OSError: a file cannot be read.
+    """
+    machines = [Machine.of(each) for each in (first, second)]
+    names = [each.name if isinstance(each, Machine) else str(each) for each in (first, second)]
+    ours, theirs = ({value.key: value for value in machine.values()} for machine in machines)
+    keys = list(dict.fromkeys([*ours, *theirs]))
+    return MachineDifference(names[0], names[1], len(keys), tuple(_different(keys, ours, theirs)))
+
+
+def _different(keys: list[str], ours: dict[str, KeyValue], theirs: dict[str, KeyValue]) -> Iterator[DifferentValue]:
+    for key in keys:
+        both = [ours.get(key), theirs.get(key)]
+        first, second = (_NONE if each is None else each.value for each in both)
+        if first == second or {first, second} == {_NONE, "not set"}:
+            continue  # equal, or missing in both
+        origin, other_origin = (_NONE if each is None else _origin(each) or "" for each in both)
+        known = both[0] or both[1]
+        assert known is not None
+        yield DifferentValue(key, known.unit, first, second, origin, other_origin, known.meaning)

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from shapegcode.io.units import FloatArray
 from shapegcode.metrology.figures import WallProfile
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
 from shapegcode.results import plot
 from shapegcode.results.outcome import Plot
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _SHARE_OF_TOOL = 0.8  # drawn size of the largest deviation, relative to the tool's radius
 _SHARE_OF_PART, _MIN_DRAWN_UM, _MAX_MARKED = 0.03, 1e-3, 12

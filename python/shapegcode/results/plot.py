@@ -113,11 +113,12 @@ def note(panel: Axes, text: str, x: float, y: float, *, shift: int = 4, **option
     )
 
 
-def legend_above(panel: Axes, *, columns: int = 4) -> None:
+def legend_above(panel: Axes, *, columns: int = 4, **options: Any) -> None:
     """Legend above the panel, where it hides no curve."""
     panel.legend(
-        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, frameon=False, borderaxespad=0.2, fontsize=9
-    )
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, frameon=False, borderaxespad=0.2, fontsize=9,
+        **options,
+    )  # fmt: skip
 
 
 def legend_below(panel: Axes, *, of: Axes | None = None, columns: int = 4) -> None:

@@ -1,9 +1,15 @@
-"""Base of every result: page, pictures, tables for pandas and xarray."""
+"""Base of every result: page, pictures, tables for pandas and xarray, BibTeX entries of its methods (``--cite``).
+
+The entries are in ``data/references.bib``, as text in docs/evidence/references.md.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+import functools
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -11,7 +17,7 @@ import numpy as np
 
 from shapegcode._core import ArgumentError
 from shapegcode.results.json import plain
-from shapegcode.results.outcome import NotKeptError, Outcome, Pair, Plot, Xyz
+from shapegcode.results.outcome import NotKeptError, Outcome
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,8 +27,6 @@ if TYPE_CHECKING:
     from shapegcode.results.json import Provenance
     from shapegcode.results.page.model import Figure, Light, Page, Script, Section
     from shapegcode.results.page.scene import Scene
-
-__all__ = ["Pair", "Plot", "Result", "Simulatable", "Xyz"]
 
 _UNITS = {
     "_mm_per_min": "mm/min", "_mm_per_s2": "mm/s²", "_mm_per_s": "mm/s", "_percent": "%", "_um": "µm", "_mm": "mm",
@@ -46,14 +50,12 @@ class Result(Outcome):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Published methods on which it is based, by their names in `shapegcode.results.citations.METHODS`."""
+        """Published methods on which it is based, by their names in `METHODS`."""
         return self.published
 
     @property
     def citations(self) -> tuple[str, ...]:
         """BibTeX entries of this program and of the papers on its methods, printed by ``--cite``."""
-        from shapegcode.results.citations import entries_of
-
         if self.from_json:
             raise NotKeptError("citations: the JSON of a result does not contain its methods; use --cite")
         return entries_of(self.methods)
@@ -71,13 +73,6 @@ class Result(Outcome):
         if count := len(self.warnings):
             return "amber", f"{count} warning{'s' if count > 1 else ''} to resolve first"
         return "green", "done, without a warning"
-
-    @property
-    def page_title(self) -> str:
-        """Heading of its page: kind of result and program."""
-        from shapegcode.results.page.default import title_of
-
-        return title_of(self)
 
     def key_figures(self) -> tuple[Figure, ...]:
         """The main figures at the top of its page; usually none."""
@@ -121,15 +116,8 @@ class Result(Outcome):
         from shapegcode.results.page.default import page_of
 
         simulated = self.simulated if motion else None
-        return page_of(
-            self,
-            title=self.page_title,
-            light=self.light,
-            sections=self.page_sections(provenance),
-            scene=None if simulated is None else simulated.scene(on_progress),
-            provenance=provenance,
-            problems=problems,
-        )
+        scene = None if simulated is None else simulated.scene(on_progress)
+        return page_of(self, self.light, self.page_sections(provenance), scene, provenance, problems)
 
     def report(self, path: str | Path, script: Script = "inline") -> list[str]:
         """Write the page of the result: one HTML file, readable offline.
@@ -257,3 +245,44 @@ def _unit(name: str) -> str:
     """Unit by the ending of the name; of a nested name by its innermost part with a unit."""
     parts = reversed(name.split("."))
     return next((unit for part in parts for ending, unit in _UNITS.items() if part.endswith(ending)), "")
+
+
+#: Keys of the entries of each method; empty: own method, or the user's.
+METHODS: Mapping[str, tuple[str, ...]] = {
+    "shaper zv": ("smith1958", "park2009"),
+    "shaper zvd": ("singer1990",),
+    "shaper zvdd": ("singer1990",),
+    "shaper mzv": ("klipper",),
+    "shaper ei": ("singhose1994vector",),
+    "shaper ei2": ("singhose1997",),
+    "shaper ei3": ("singhose1997",),
+    "shaper si": ("singhose1996",),
+    "shaper negative-zv": ("singhose1994negative",),
+    "shaper minimal": ("park2009",),
+    **{f"shaper smooth-{name}": ("kalico",) for name in ("zv", "mzv", "ei", "ei2", "si", "zvd-ei")},
+    "rounding of block ends": ("jelinek1971",),
+    "comparison of programs": ("myers1986",),
+    "block overlap": ("lee2022",),
+    "junction deviation": ("jeon2011",),
+    "LuGre friction": ("canudas1995",),
+    "cutting force": ("kim2001",),
+    "modes from records": ("back2003", "steiglitz1965", "roy1989", "golub2003"),
+    "modes from frequency responses": ("guillaume2003", "ewins", "golub2003"),
+    "circle fit": ("chernov2010",),
+    "path of paper 000": ("ko2023",),
+    "modes from a sweep": (),
+    **{f"shaper {name}": () for name in ("simultaneous", "polynomial", "non-negative", "robust", "mirrored", "taps")},
+}
+
+
+@functools.cache
+def bibliography() -> Mapping[str, str]:
+    """Every entry by its key, the program's own first."""
+    text = (resources.files("shapegcode") / "data" / "references.bib").read_text(encoding="utf-8")
+    return {re.split(r"[{,]", entry, maxsplit=2)[1]: entry for entry in text.strip().split("\n\n")}
+
+
+def entries_of(methods: Iterable[str]) -> tuple[str, ...]:
+    """The entries of the program and of the methods, each once, in the order of the file."""
+    keys = {"shapegcode", *(key for name in methods for key in METHODS[name])}
+    return tuple(entry for key, entry in bibliography().items() if key in keys)

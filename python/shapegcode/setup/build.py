@@ -11,8 +11,7 @@ from shapegcode.errors import ArgumentError, FileError, MachineError, Shapegcode
 from shapegcode.identification.identify import identify
 from shapegcode.identification.update import update_modes
 from shapegcode.machine import Machine
-from shapegcode.machine.fanuc_import import import_parameters
-from shapegcode.machine.linuxcnc_ini import read_ini
+from shapegcode.machine.control_import import import_parameters, read_ini
 from shapegcode.machine.result import ParameterImport
 from shapegcode.setup.answers import EXPLAINED, Answers, is_mode, mode_of
 from shapegcode.setup.result import MachineSetup, OpenQuestion

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from shapegcode import _core
 from shapegcode._core import ArgumentError, MinimalBranches, Mode, Shaper, minimal_branches
@@ -15,9 +15,6 @@ from shapegcode.results import plot
 from shapegcode.results.outcome import Plot
 from shapegcode.shaping.bands import Design, ModeBand, mode_band
 from shapegcode.shaping.result import Recommendation, times_name
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _CURVES = 6
 _LEAST_RATIO = 1.02

@@ -128,16 +128,13 @@ def design_track(
 def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s: float | None = None) -> Shaper | None:
     """Non-negative shaper with a given mean delay and zero residual at every mode, of least second central moment."""
     found = taps_of_mean(modes, period_s, periods, mean_s)
-    if found is None or found[0][0] != 0:
-        return None
-    shaper = Shaper((found[0] * period_s).tolist(), found[1].tolist())
-    return shaper if max(shaper.residual_ratio(mode) for mode in modes) <= RESIDUAL_LIMIT else None
+    return None if found is None or found[0][0] != 0 else found[2]
 
 
 def taps_of_mean(
     modes: Sequence[Mode], period_s: float, periods: int, mean_s: float | None = None
-) -> tuple[NDArray[np.intp], FloatArray] | None:
-    """Delays in periods and taps of `shaper_of_mean`; the first delay may be above zero."""
+) -> tuple[NDArray[np.intp], FloatArray, Shaper] | None:
+    """Delays in periods, taps and shaper of `shaper_of_mean`; the first delay may be above zero, not the shaper's."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
     cost = steps / periods
@@ -151,7 +148,11 @@ def taps_of_mean(
     taps = refined(matrix[:, support], right, taps[support])
     if not (np.all(taps > 0.0) and abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT):
         return None
-    return support, taps / taps.sum()
+    taps = taps / taps.sum()
+    # A mode's residual does not depend on the time of the first tap.
+    shaper = Shaper(((support - support[0]) * period_s).tolist(), taps.tolist())
+    exact = max(shaper.residual_ratio(mode) for mode in modes) <= RESIDUAL_LIMIT
+    return (support, taps, shaper) if exact else None
 
 
 def _vertices(matrix: FloatArray, right: FloatArray, *costs: FloatArray) -> list[FloatArray | None]:
@@ -262,10 +263,5 @@ def _of_mean(axis_modes: Sequence[Sequence[Mode]], period_s: float, periods: int
         found = taps_of_mean(modes, period_s, periods, mean * period_s)
         if found is None:
             return None
-        delays, taps = found
-        # A mode's residual does not depend on the time of the first tap.
-        shaper = Shaper(((delays - delays[0]) * period_s).tolist(), taps.tolist())
-        if max(shaper.residual_ratio(mode) for mode in modes) > RESIDUAL_LIMIT:
-            return None
-        filters.append(Fir(delays.tolist(), taps.tolist()))
+        filters.append(Fir(found[0].tolist(), found[1].tolist()))
     return filters

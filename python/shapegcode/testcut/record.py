@@ -10,10 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
-from shapegcode.io.columns import Meaning, read_label, unit_of
-from shapegcode.io.sampling import UnevenTimeError, even_period
+from shapegcode.io.record import UnevenTimeError, even_period
 from shapegcode.io.table import TextTable
-from shapegcode.io.units import FloatArray, Measured, factor_between
+from shapegcode.io.units import FloatArray, Meaning, Measured, factor_between, read_label, unit_of
 from shapegcode.testcut.cut import MeasuringPass, TestCut
 from shapegcode.testcut.forces import Expected, fully_engaged
 

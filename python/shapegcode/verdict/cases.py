@@ -20,7 +20,7 @@ from shapegcode.machine import Machine
 from shapegcode.machine.controller import PLANNER_NAMES
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import Offset
-from shapegcode.results.outcome import Deviation
+from shapegcode.results.outcome import CONTOURS, Deviation
 from shapegcode.results.table import NO_BREAK, Column, Table
 from shapegcode.verdict.figures import CaseVerdict
 
@@ -28,7 +28,6 @@ Target = Literal["command", "response"]
 
 ALL_MODES = "all"
 _OVERRIDES_PERCENT = (50.0, 60.0, 70.0, 80.0, 90.0, 110.0, 120.0)
-_QUANTITIES = {"command": "contour error of the command", "response": "contour error of the machine table"}
 
 
 @dataclass(frozen=True)
@@ -173,7 +172,7 @@ def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[LimitCheck]
     ]
     deviation = figures.command if limits.target == "command" else figures.response
     if deviation is not None:
-        check.append(LimitCheck(_QUANTITIES[limits.target], deviation.largest_mm * 1e3, limits.contour_um, decimals=1))
+        check.append(LimitCheck(CONTOURS[limits.target], deviation.largest_mm * 1e3, limits.contour_um, decimals=1))
     return check
 
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from matplotlib.axes import Axes
 
 from shapegcode.identification.servo.result import ServoFit
 from shapegcode.results import plot
 from shapegcode.results.outcome import Plot
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _OWN, _OURS = "control: contour deviation", "residual of our model, not fitted there"
 

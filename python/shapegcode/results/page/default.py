@@ -116,15 +116,9 @@ def provenance_section(provenance: Provenance) -> model.Section:
 
 
 def page_of(
-    result: Outcome,
-    *,
-    title: str,
-    light: tuple[model.Light, str],
-    sections: Sequence[model.Section],
-    scene: Scene | None = None,
-    provenance: Provenance | None = None,
-    problems: Sequence[str] = (),
-) -> model.Page:
+    result: Outcome, light: tuple[model.Light, str], sections: tuple[model.Section, ...], scene: Scene | None,
+    provenance: Provenance | None, problems: Sequence[str],
+) -> model.Page:  # fmt: skip
     """The page of a result."""
     report: dict[str, Any] = result.to_json()
     if provenance is not None:
@@ -132,10 +126,8 @@ def page_of(
         sections = (*sections, provenance_section(provenance))
         scene = _named(scene, provenance)
     above = next((rank + 1 for rank, section in enumerate(sections) if section.key == "next"), 0)
-    return model.Page(
-        title, light[0], result.answer, light[1], tuple(sections), report, scene, before_scene=above,
-        problems=tuple(problems),
-    )  # fmt: skip
+    said = title_of(result), light[0], result.answer, light[1]
+    return model.Page(*said, sections, report, scene, above, tuple(problems))
 
 
 def _named(scene: Scene | None, provenance: Provenance) -> Scene | None:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import RecordError
-from shapegcode.io.run_tracks import RunLog, Signal
+from shapegcode.io.runs import RunLog, Signal
 from shapegcode.io.units import MM_PER_INCH, FloatArray, find_unit
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import fanuc_model

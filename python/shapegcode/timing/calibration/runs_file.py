@@ -20,7 +20,7 @@ from shapegcode.errors import Problem, RecordError, RunsFileError
 from shapegcode.io.data_file import open_file
 from shapegcode.io.run_items import ItemTable, stated_feed_unit
 from shapegcode.io.run_log import LogFormat, read_run_logs
-from shapegcode.io.run_tracks import RunLog
+from shapegcode.io.runs import RunLog
 from shapegcode.settings.keys import Positive, Text, TomlTable, key, toml
 from shapegcode.settings.load import KeyProblem, line_of, parsed, read_text, validated
 
