@@ -201,11 +201,7 @@ def test_no_output_is_left_where_a_second_result_cannot_be_written(folder: Path,
 
 
 def test_full_device(folder: Path) -> None:
-    refused(
-        run(folder, "convert", "good.nc", "-m", "vx500", "-o", "/dev/full"),
-        "/dev/full",
-        os.strerror(errno.ENOSPC),
-    )
+    refused(run(folder, "convert", "good.nc", "-m", "vx500", "-o", "/dev/full"), "/dev/full", os.strerror(errno.ENOSPC))
     assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
 
 

@@ -44,7 +44,6 @@ def needed(kind: str) -> set[str]:
 def test_every_entry_is_bibtex(key: str) -> None:
     entry = bibliography()[key]
     parsed = ENTRY.fullmatch(entry)
-    assert parsed is not None
     assert parsed[2] == key
     assert needed(parsed[1]) <= set(fields_of(entry))
 

@@ -324,8 +324,6 @@ def test_the_tutorial_runs(built: Path, tmp_path: Path, monkeypatch: pytest.Monk
 
 def plot_script() -> types.ModuleType:
     spec = importlib.util.spec_from_file_location("plot_run", EXAMPLE / "plot_run.py")
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

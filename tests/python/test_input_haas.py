@@ -42,7 +42,6 @@ def read(body: str, **keys: Any) -> sg.Program:
 def plain(body: str) -> list[str]:
     """The lines of a body in FANUC's words."""
     foreign = read(body).foreign
-    assert foreign is not None
     return foreign.text.splitlines()[LINE - 1 : -1]
 
 

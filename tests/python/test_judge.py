@@ -9,12 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from judge import (
-    JudgeError,
-    Move,
-    interpret,
-    verify_conversion,
-)
+from judge import JudgeError, Move, interpret, verify_conversion
 from judge.generate import programs
 from judge.records import PLANES
 from judge.samples import SAMPLES, centre_of, read_sample

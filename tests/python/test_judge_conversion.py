@@ -10,13 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from judge import (
-    Move,
-    interpret,
-    regions,
-    split,
-    verify_conversion,
-)
+from judge import Move, interpret, regions, split, verify_conversion
 from judge.generate import programs
 from judge.samples import SAMPLES, centre_of, read_sample
 

@@ -233,8 +233,7 @@ def test_remarks_stand_at_their_lines() -> None:
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
 @pytest.mark.parametrize(
-    "key",
-    [v.key for v in Machine.load("vx500").values() if v.value.replace(".", "").isdigit() and "." in v.value],
+    "key", [v.key for v in Machine.load("vx500").values() if v.value.replace(".", "").isdigit() and "." in v.value]
 )
 def test_no_number_may_be_nan_or_infinite(key: str, number: str) -> None:
     data = Machine.load("vx500").model_dump(mode="python")
@@ -309,14 +308,8 @@ def test_message_has_file_line_key_value_and_limit(old: str, new: str, message: 
             "[[axes.x.modes]]\nfrequency_hz = 46\ndamping_ratio = 0.1\n[[axes.x.modes]]\nfrequency_hz = true\n",
             "19: axes.x.modes.2.frequency_hz = true: must be a number (unit: Hz)",
         ),
-        (
-            "[controller]\nlaw = 'fast'\n",
-            '16: controller.law = "fast": must be "constant_time" or "jerk_limited"',
-        ),
-        (
-            "[controller]\nin_position_s = -1\n",
-            "16: controller.in_position_s = -1: must be 0 or more (unit: s)",
-        ),
+        ("[controller]\nlaw = 'fast'\n", '16: controller.law = "fast": must be "constant_time" or "jerk_limited"'),
+        ("[controller]\nin_position_s = -1\n", "16: controller.in_position_s = -1: must be 0 or more (unit: s)"),
         (
             "[controller]\nin_position_s = {x = 1, y = -1, z = 1}\n",
             "16: controller.in_position_s.y = -1: must be 0 or more (unit: s)",
@@ -341,10 +334,7 @@ def test_message_has_file_line_key_value_and_limit(old: str, new: str, message: 
             "[controller]\ncontour_acceleration_mm_s2 = {x = 1, y = 1, z = 0}\n",
             "16: controller.contour_acceleration_mm_s2.z = 0: must be greater than 0 (unit: mm/s²)",
         ),
-        (
-            "[controller]\nno_buffer_m_codes = [46, -1]\n",
-            "16: controller.no_buffer_m_codes.2 = -1: must be 0 or more",
-        ),
+        ("[controller]\nno_buffer_m_codes = [46, -1]\n", "16: controller.no_buffer_m_codes.2 = -1: must be 0 or more"),
         (
             "[controller]\nnesting_limit_subprogram = 0\n",
             "16: controller.nesting_limit_subprogram = 0: must be 1 or more (unit: levels)",
@@ -411,13 +401,7 @@ def test_every_problem_is_listed_once() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "start"),
-    [
-        ("a = 1\n\n[b\n", "3: "),
-        ('name = """', "1: "),
-        ("x = 1\nx = 2\n", "2: "),
-        ("\ufeff", " "),
-    ],
+    ("text", "start"), [("a = 1\n\n[b\n", "3: "), ('name = """', "1: "), ("x = 1\nx = 2\n", "2: "), ("\ufeff", " ")]
 )
 def test_bad_toml_gives_the_line(text: str, start: str, tmp_path: Path) -> None:
     file = tmp_path / "bad.toml"
@@ -525,10 +509,7 @@ def test_show_json_is_alone_on_standard_output(capsys: pytest.CaptureFixture[str
     ("argv", "parts"),
     [
         (["machine", "show", "nothing.toml"], ["nothing.toml: no such file"]),
-        (
-            ["machine", "show", "no/such/machine.toml"],
-            ["no/such/machine.toml: the folder no/such does not exist"],
-        ),
+        (["machine", "show", "no/such/machine.toml"], ["no/such/machine.toml: the folder no/such does not exist"]),
         (["machine", "show", "vx600"], ["vx600", "built in: kimm004, vx500"]),
         (["machine", "show", "vx500", "--json", "no/x.json"], ["no/x.json: the folder no does not exist"]),
         (["machine", "init", "-o", "no/x.toml"], ["no/x.toml: the folder no does not exist"]),

@@ -338,7 +338,6 @@ def specimen(feed: int, name: str) -> MeasuredRegion:
 
 def arc_of(region: MeasuredRegion) -> FittedCircle:
     arc = region.sections[1].arc
-    assert arc is not None
     assert arc.response is not None
     return arc.response
 

@@ -44,10 +44,7 @@ def traces(samples: int = 900) -> list[Trace]:
     t = np.arange(samples) * 1e-3
     swing = np.zeros_like(command)
     swing[:, 0] = 0.02 * np.sin(2 * np.pi * 46 * t)
-    return [
-        Trace("original", 1e-3, command, command + swing),
-        Trace("emitted", 1e-3, command, command + swing / 10),
-    ]
+    return [Trace("original", 1e-3, command, command + swing), Trace("emitted", 1e-3, command, command + swing / 10)]
 
 
 @pytest.mark.parametrize("ending", ["png", "svg"])

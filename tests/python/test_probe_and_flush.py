@@ -37,7 +37,6 @@ def test_a_probe_stops_the_motion_on_its_path(filters: dict[str, Any], lead: int
     seen.append(step(400))
     assert made.state.activity == sg.Activity.idle
     position = made.flushed()
-    assert position is not None
     assert made.flushed() is None
     rest = seen[-1][-1]
     np.testing.assert_allclose(position, rest, atol=1e-9)
@@ -60,7 +59,6 @@ def test_a_flush_at_rest_in_a_dwell_and_twice() -> None:
     made.flush()
     made.step(2)
     position = made.flushed()
-    assert position is not None
     np.testing.assert_array_equal(position, np.zeros(3))
     made.push_line([5, 0, 0], 50.0, stop_at_end=True)
     made.push_dwell(math.pi)
@@ -75,7 +73,6 @@ def test_a_flush_at_rest_in_a_dwell_and_twice() -> None:
     assert made.push_line([6, 0, 0], 50.0) == sg.PushResult.flushing
     made.step(3)
     position = made.flushed()
-    assert position is not None
     np.testing.assert_array_equal(position, [5.0, 0.0, 0.0])
     made.push_line([5, 3, 0], 50.0, stop_at_end=True)
     np.testing.assert_array_equal(made.run()[-1], [5.0, 3.0, 0.0])

@@ -33,11 +33,7 @@ CASES = {
     "sum of dwells": (subprogram("M98 P0002 L9999\n", "G04 X99.\n"), "max_program_s", 8),
     "full turns of R -99999": (f"{HEAD}G01 X0 Y0 F200\nG03 X.01 R-99999.\n{END}", "max_program_s", 6),
     "inverse time slip": (f"{HEAD}G93 G01 X5. F.00001\n{END}", "max_program_s", 5),
-    "rapids to and fro": (
-        f"{HEAD}#1=0\nWHILE[#1EQ0]DO1\nG00 X9999.\nX0\nEND1\n{END}",
-        "max_program_s",
-        0,
-    ),
+    "rapids to and fro": (f"{HEAD}#1=0\nWHILE[#1EQ0]DO1\nG00 X9999.\nX0\nEND1\n{END}", "max_program_s", 0),
     "helix of a hundred thousand turns": (
         subprogram("G01 X20. F500\nG91\nM98 P0002 L99999\n", TURN),
         "max_program_s",

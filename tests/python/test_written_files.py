@@ -163,7 +163,6 @@ def _interrupted(folder: Path, number: int, after_s: float) -> subprocess.Comple
         [sys.executable, "-c", code, *words], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=hear_ctrl_c,  # noqa: PLW1509 - no thread of this test runs yet
     )  # fmt: skip
-    assert process.stdout is not None
     process.stdout.readline()
     time.sleep(after_s)
     process.send_signal(number)
