@@ -1,7 +1,5 @@
 """Faults for tests: commands with their memory and time, files that are none, bombs, changed bytes."""
 
-from __future__ import annotations
-
 import dataclasses
 import gzip
 import io

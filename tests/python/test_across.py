@@ -4,8 +4,6 @@ Simulated by SciPy and NumPy alone: a mode with the shape (x, y, z) at a point a
 the residue phi_y phi_k / m.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

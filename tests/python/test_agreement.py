@@ -1,7 +1,5 @@
 """Commands that are given an emitted program say of it what the conversion said."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import re

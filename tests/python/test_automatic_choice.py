@@ -1,7 +1,5 @@
 """What `convert` chooses by itself is what `choose_shaper` recommends for the same machine."""
 
-from __future__ import annotations
-
 import typing
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is wrong with the input is said once, with its place, and nothing is left behind."""
 
-from __future__ import annotations
-
 import errno
 import os
 import random

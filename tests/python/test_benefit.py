@@ -1,7 +1,5 @@
 """Cuts that gain nothing are left unchanged."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Budgets of a conversion, measured on the emitted text by a reader and a clock that share no code with it."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import json

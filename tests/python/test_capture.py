@@ -1,7 +1,5 @@
 """Modes from a control's own capture of command and encoder; the loop and what hangs on it are simulated by SciPy."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a control would refuse, and what it would not run as programmed: each kind by hand."""
 
-from __future__ import annotations
-
 import json
 import random
 from pathlib import Path

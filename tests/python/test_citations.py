@@ -1,7 +1,5 @@
 """What `--cite` prints: BibTeX of the papers behind the methods of a run, with the facts of the page of references."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command as a shell sees it: exit codes, files, JSON."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """Two programs compared: against LinuxCNC's interpreter, the judge's, and programs with one thing changed."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

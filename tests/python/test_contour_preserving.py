@@ -1,7 +1,5 @@
 """Contour-preserving shaping, held against its figures on the emitted text by the judge's player and plant."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

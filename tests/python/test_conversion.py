@@ -1,7 +1,5 @@
 """The whole conversion, judged by an interpreter, a player and a plant that share no code with it."""
 
-from __future__ import annotations
-
 import functools
 import re
 from typing import Any

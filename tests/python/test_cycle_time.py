@@ -1,7 +1,5 @@
 """Cycle time: closed form against NumPy convolutions, the paper's formulas, hand sums and the full interpolation."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Cycle-time models calibrated with logs, held against simulated controls whose facts are known."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path

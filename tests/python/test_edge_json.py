@@ -1,7 +1,5 @@
 """Captures of Sinumerik controls: what is in the file comes out, what cannot be is refused with its place."""
 
-from __future__ import annotations
-
 import copy
 import gzip
 import json

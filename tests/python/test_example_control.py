@@ -1,8 +1,6 @@
 """integrations/example_control, built against the installed library as a user would: real programs with an operator's
 commands, its record held against closed forms, NumPy and SciPy."""
 
-from __future__ import annotations
-
 import fcntl
 import importlib.util
 import math

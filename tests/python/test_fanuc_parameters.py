@@ -1,7 +1,5 @@
 """Parameter dumps of the control: both grammars, which value counts, and how a bad dump is refused."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

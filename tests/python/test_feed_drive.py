@@ -1,7 +1,5 @@
 """The feed drive against SciPy: Radau on a second implementation of the equations, lsim; and its machine file."""
 
-from __future__ import annotations
-
 import copy
 import math
 from typing import Any

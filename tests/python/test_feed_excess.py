@@ -1,7 +1,5 @@
 """Speed along the path beside the programmed feed: kept, reported with its line, and a miss where it is not kept."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

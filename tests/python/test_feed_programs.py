@@ -1,7 +1,5 @@
 """What real programs hold beside plain moves, and what a feed schedule makes of it."""
 
-from __future__ import annotations
-
 import pytest
 
 import shapegcode as sg

@@ -1,7 +1,5 @@
 """Feed scheduling through Python and the command; the independent judge of its forces is in test_feed_judge."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

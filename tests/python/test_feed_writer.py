@@ -1,7 +1,5 @@
 """Feeds written into programs, held against the judge's interpreter, which shares no code with the writer."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

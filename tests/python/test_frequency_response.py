@@ -1,7 +1,5 @@
 """Frequency responses without time record: closed forms by SciPy, files by pyuff and SciPy, what is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Modes from taps and decays whose truth is known (SciPy's simulation), and refusals where the data hold too little."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """``shapegcode identify``: exit codes, JSON, table, pictures, machine file; the records are made by SciPy."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

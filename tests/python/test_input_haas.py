@@ -1,7 +1,5 @@
 """Programs in a Haas mill's words: goldens derived from what its manuals and articles say, each with its source."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

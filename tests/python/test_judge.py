@@ -1,7 +1,5 @@
 """Tests of the judge's interpreter: closed forms, samples, programs at random."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Tests of the judge's verdict on conversions, good and bad ones."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """The dialect's judge itself: places worked out by hand, brute force for compensation, alarms."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Modes from a record beside a program whose command is known; axis, drive and logger are simulated by NumPy alone."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

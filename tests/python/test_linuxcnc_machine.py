@@ -1,7 +1,5 @@
 """LinuxCNC as a target: a machine from its INI file, and the lines of it that a shaped program needs."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The machine file: what it accepts, how it refuses, and the commands that write and show it."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

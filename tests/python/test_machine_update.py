@@ -1,7 +1,5 @@
 """Identified modes in a machine file: what changes, what stays byte for byte, what is refused."""
 
-from __future__ import annotations
-
 import difflib
 import tomllib
 from pathlib import Path

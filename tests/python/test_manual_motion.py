@@ -1,7 +1,5 @@
 """Axes beside the path: jog, soft limits, offset, backlash, emergency braking; against closed forms and differences."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

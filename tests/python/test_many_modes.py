@@ -1,7 +1,5 @@
 """Structures with many modes: found over frequency, none asserted that is not there, each within its interval."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Messages name what is in the program: its own words, who calls what, what kind of program it is."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 

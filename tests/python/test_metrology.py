@@ -1,7 +1,5 @@
 """Virtual metrology against closed forms, SciPy and brute force."""
 
-from __future__ import annotations
-
 import functools
 import math
 import random

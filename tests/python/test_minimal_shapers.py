@@ -1,7 +1,5 @@
 """Minimal multi-mode shapers: the figures of paper 002, SciPy's own searches, and vibration simulated step by step."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

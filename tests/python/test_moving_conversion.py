@@ -1,7 +1,5 @@
 """Programs of a machine whose mode moves: shaped by shapers that follow, judged with the mode where it is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Modes that move: the machine's tables, the plant that varies, the shapers that follow, and what they leave."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

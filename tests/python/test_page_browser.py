@@ -1,7 +1,5 @@
 """Pages of results in a browser, opened from the disk without a network: quiet, complete, on paper, on a phone."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

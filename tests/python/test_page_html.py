@@ -1,7 +1,5 @@
 """The file of a page without a browser: what it refuses, what it escapes, what it writes."""
 
-from __future__ import annotations
-
 import html
 import json
 import re

@@ -1,7 +1,5 @@
 """Motion on a page, in a browser: path, texts, sliders and curves show the same place, and what one clicks finds it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

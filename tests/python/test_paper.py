@@ -1,7 +1,5 @@
 """Ko, Lim and Hong, 2023 (paper 000): orbit error, program listing, emitted blocks, times."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The planners of open controls as they are modelled, beside their own and beside independent calculations."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math

@@ -1,7 +1,5 @@
 """Pictures: complete files, honest curves, the right figures."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 from itertools import pairwise

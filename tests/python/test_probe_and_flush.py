@@ -1,7 +1,5 @@
 """A probe and a flush, by closed forms; random sessions of an operator: tests/cpp/operator_session.cpp."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """``shapegcode report`` and ``--html``: pages made at once and later, and what is said when something has changed."""
 
-from __future__ import annotations
-
 import html
 import json
 import re

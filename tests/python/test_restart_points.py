@@ -1,7 +1,5 @@
 """Restart points inside of shaped cuts, and what single block does there, by the judge's interpreter and player."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

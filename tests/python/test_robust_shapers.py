@@ -1,7 +1,5 @@
 """Robust and least-worst grid shapers, held against the residual formula, other linear programs and EI shapers."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Logs of runs: what is read of them, what is bridged and said, what is refused."""
 
-from __future__ import annotations
-
 import csv
 import gzip
 import re

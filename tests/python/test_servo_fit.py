@@ -1,7 +1,5 @@
 """Logs of commands and actual positions: what the position loop is, what it explains, and what cannot be told."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The guided start: answers become a short machine file; a dialogue asks again; no other machine is taken."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty

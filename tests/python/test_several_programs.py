@@ -1,7 +1,5 @@
 """A file of several O programs: `--program all`, and one number in two folders of a memory punch."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Shaper designs: the reference figures of 46 and 131 Hz, and residuals judged by NumPy and by simulation alone."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import pickle

@@ -3,8 +3,6 @@
 The shape of an allowance is held against plane geometry: distances from walls and from the centres of arcs, and areas.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

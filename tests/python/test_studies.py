@@ -1,7 +1,5 @@
 """Studies: against closed forms, SciPy, and the interpreter, player and plant of the tests."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Checks of taps and decays on records whose truth is known, their spectra, and the plan of a test."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any

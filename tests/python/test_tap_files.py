@@ -1,7 +1,5 @@
 """Records from files: dialects of CSV, universal files, WAV, and every way in which they may be wrong."""
 
-from __future__ import annotations
-
 import csv
 import io
 import struct

@@ -1,7 +1,5 @@
 """Cycle time: paper 004's equations by hand, the same by every set-point, and the command that shows both."""
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import io

@@ -1,7 +1,5 @@
 """Tool files: what they hold, what is said about a bad one, and the library of work materials."""
 
-from __future__ import annotations
-
 import math
 import re
 from importlib import resources

@@ -1,7 +1,5 @@
 """The verdict behind feed drives: contour with the servo's lag, residual as the swing of the table behind its motor."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

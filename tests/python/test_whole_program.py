@@ -1,7 +1,5 @@
 """The verdict is of the whole program that was written: cuts left unchanged, its price, and one of five grades."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

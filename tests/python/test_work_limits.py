@@ -4,8 +4,6 @@ The counting itself is held against hand figures in tests/cpp/test_work_limits.c
 and the message, and that nothing is written. Nothing is timed: a bound that does not hold would never come back.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Files that are written: many writers, full disks, links in a circle, Ctrl-C and kills at random instants."""
 
-from __future__ import annotations
-
 import errno
 import os
 import random
