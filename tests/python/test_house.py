@@ -253,7 +253,7 @@ def loaded_after(statement: str) -> set[str]:
     return set(run.stdout.split())
 
 
-HEAVY = {"numpy", "scipy", "matplotlib", "pydantic"}
+HEAVY = {"numpy", "scipy", "matplotlib", "pydantic", "rich"}
 
 
 @pytest.mark.parametrize(
