@@ -1,7 +1,5 @@
 """A control with limits that its tests hold by differences."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The command for tests: within this process, which is fast, or as a process of its own."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

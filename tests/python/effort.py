@@ -1,7 +1,5 @@
 """How much CPU time a piece of work takes; a busy machine does not change it, so a ratio of two may be a test."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Faults for tests: commands with their memory and time, files that are none, bombs, changed bytes."""
 
-from __future__ import annotations
-
 import dataclasses
 import gzip
 import io
@@ -105,36 +103,10 @@ def changed(seed: bytes, draw: random.Random) -> bytes:
 
 
 _SIZES = (0, 1, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0xFFFFFFFE, 255, 65536, 1 << 24)
-_NUMBERS = (
-    b"9" * 400,
-    b"1" * 5000,
-    b"-1",
-    b"1e308",
-    b"1e999",
-    b"nan",
-    b"-0",
-    b"0",
-    b"7",
-    b"12.5",
-    b"0x1",
-    b"\xc2\xb2",
-    b"",
-    b"1.2.3",
-)
-_PIECES = (
-    b"\0",
-    b"\xff\xfe",
-    b"[" * 2000,
-    b"{" * 2000,
-    b'"',
-    b"<",
-    b"&",
-    b"\n",
-    b"\r",
-    b"a." * 3000,
-    b";" * 5000,
-    b"]",
-)
+_PLAIN = b"-1 1e308 1e999 nan -0 0 7 12.5 0x1 \xc2\xb2 1.2.3"
+_NUMBERS = (b"9" * 400, b"1" * 5000, b"", *_PLAIN.split(b" "))
+_LONG = (b"[" * 2000, b"{" * 2000, b"a." * 3000, b";" * 5000, b"\xff\xfe")
+_PIECES = (*_LONG, *(bytes([one]) for one in b'\0"<&\n\r]'))
 
 
 # ---- files of some megabytes that would become gigabytes, or take minutes ----------------------------------------

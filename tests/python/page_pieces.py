@@ -1,7 +1,5 @@
 """What a page holds beside what it shows."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Steps of a control beside a thread that plans, in one."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """A small program for the tests of pages, and what they ask of one that is open."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from browser import Browser

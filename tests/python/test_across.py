@@ -4,8 +4,6 @@ Simulated by SciPy and NumPy alone: a mode with the shape (x, y, z) at a point a
 the residue phi_y phi_k / m.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -45,7 +43,6 @@ def hit(modes: Structure, seed: int, *, axes: str = AXES, snr_db: float = 35.0) 
         k = AXES.index(letter)
         seen = [replace(mode, mass_kg=mode.mass_kg / (shape[1] * shape[k])) for mode, shape in modes if shape[k]]
         clean = tap(seen or [TrueMode(50.0, 0.02, 1e12)], rng, peak_n=peak_n)
-        assert clean.force_n is not None
         level = 10.0 ** (-snr_db / 20.0)
         noise = level * np.std(tap([replace(m, mass_kg=m.mass_kg / s[1] ** 2) for m, s in modes], rng).response)
         force = clean.force_n + 0.001 * peak_n * np.random.default_rng(seed).standard_normal(len(clean.force_n))
@@ -62,9 +59,7 @@ def check(found: Identification, modes: Structure, within: float = 0.02) -> None
     assert len(found.modes) == len(modes), found
     for mode, (truth, shape) in zip(found.modes, modes, strict=True):
         assert mode.frequency_hz.value == pytest.approx(truth.frequency_hz, rel=0.005)
-        assert mode.moves is not None
         for estimate, share in zip(mode.moves, shape, strict=True):
-            assert estimate is not None
             assert estimate.value == pytest.approx(share / shape[1], abs=within)
 
 
@@ -111,9 +106,7 @@ def test_intervals_hold_the_truth() -> None:
         found = sg.identify(along(records, "y"), across=records)
         for mode in found.modes:
             shape = min((abs(truth.frequency_hz - mode.frequency_hz.value), shape) for truth, shape in modes)[1]
-            assert mode.moves is not None
             for k, estimate in ((0, mode.moves.x), (2, mode.moves.z)):
-                assert estimate is not None
                 held += estimate.low <= shape[k] / shape[1] <= estimate.high
                 total += 1
     assert total >= 60

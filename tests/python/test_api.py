@@ -1,7 +1,5 @@
 """`import shapegcode as sg`: public names, arrays, and forms that agree to the last bit."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import math

@@ -1,7 +1,5 @@
 """What `convert` chooses by itself is what `choose_shaper` recommends for the same machine."""
 
-from __future__ import annotations
-
 import typing
 
 import numpy as np
@@ -33,11 +31,7 @@ VARIANTS: dict[str, tuple[Axis, Axis, dict[str, float]]] = {
         [(62.0, 0.0, 4.0)],
         {"controller.block_time_s": 0.002, "shaping.vibration_limit": 0.02},
     ),
-    "durations that differ by less than 2 %": (
-        [(7.5, 0.02, None)],
-        [],
-        {"controller.block_time_s": 0.001},
-    ),
+    "durations that differ by less than 2 %": ([(7.5, 0.02, None)], [], {"controller.block_time_s": 0.001}),
     "nothing is short enough": ([(*X, 10.0)], [(*Y, 10.0)], {"shaping.max_duration_s": 0.02}),
 }
 

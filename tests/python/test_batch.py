@@ -1,7 +1,5 @@
 """``shapegcode batch``: the bytes of the single command, nothing done twice, and no run that ends the others."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,7 +1,5 @@
 """A batch on a real Dask scheduler with two workers: the same bytes, also when a worker or the client is killed."""
 
-from __future__ import annotations
-
 import shutil
 import signal
 import socket

@@ -4,8 +4,6 @@ Kill -9 is what a power cut or the system's memory killer does: no handler runs.
 small (a tmpfs); where the system lets nobody mount one, writing fails at random instead.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import random

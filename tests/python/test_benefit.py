@@ -1,7 +1,5 @@
 """Cuts that gain nothing are left unchanged."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -101,8 +99,7 @@ def test_the_command_says_it_first(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["TEST_G90.NC", *(pytest.param(name, marks=pytest.mark.slow) for name in ("PARALLEL.NC", "PROGRAM2.NC"))],
+    "name", ["TEST_G90.NC", *(pytest.param(name, marks=pytest.mark.slow) for name in ("PARALLEL.NC", "PROGRAM2.NC"))]
 )
 def test_what_stays_shaped_is_shaped_as_before(name: str) -> None:
     program = sg.Program.read(PROGRAMS / name, MACHINE)
@@ -137,8 +134,7 @@ def test_no_benefit_asks_for_the_unit_first() -> None:
 
 
 @pytest.mark.parametrize(
-    ("prologue", "off"),
-    [(["G05.1 Q0"], True), (["G08P0"], True), (["G05.1Q1"], False), (["G64"], False), ([], False)],
+    ("prologue", "off"), [(["G05.1 Q0"], True), (["G08P0"], True), (["G05.1Q1"], False), (["G64"], False), ([], False)]
 )
 def test_no_advice_to_do_what_the_prologue_does(prologue: list[str], off: bool) -> None:
     machine = machine_with({"emission.prologue": prologue, "controller.corner_speed_difference_mm_per_min": 1.0})

@@ -1,7 +1,5 @@
 """Budgets of a conversion, measured on the emitted text by a reader and a clock that share no code with it."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import json
@@ -281,11 +279,7 @@ def test_what_misses_its_tolerance_only_for_the_longer_period_is_kept() -> None:
 
 def test_what_runs_too_fast_only_for_the_longer_period_is_kept() -> None:
     """A circle at F1, at whose feed blocks of that length do not last as long as they should."""
-    keys = {
-        "axes.x.modes": [],
-        "axes.y.modes": [],
-        "axes.z.modes": [{"frequency_hz": 46.0, "damping_ratio": 0.02}],
-    }
+    keys = {"axes.x.modes": [], "axes.y.modes": [], "axes.z.modes": [{"frequency_hz": 46.0, "damping_ratio": 0.02}]}
     circles = "G1X5.F3000\n" + "G2X5.Y0I5.\n" * 6 + "G1X0\n"
     text = HEAD + "G03I.166J.116F1.\nG0Z5.\nX0Y0\n" + circles + TAIL
     assert convert(text, machine_with(keys)).conversion.ok
@@ -321,10 +315,7 @@ def test_comments_travel_on_the_line_too() -> None:
     assert loads[1] > loads[0]
 
 
-@given(
-    st.lists(st.tuples(st.integers(1, 30), st.integers(0, 60)), min_size=1, max_size=30),
-    st.integers(1, 50),
-)
+@given(st.lists(st.tuples(st.integers(1, 30), st.integers(0, 60)), min_size=1, max_size=30), st.integers(1, 50))
 def test_busiest_stretch_is_that_of_every_stretch_tried(blocks: list[tuple[int, int]], stretch: int) -> None:
     ticks = np.array([duration for duration, _ in blocks])
     flow = np.repeat([amount / duration for duration, amount in blocks], ticks)

@@ -1,7 +1,5 @@
 """Modes from a control's own capture of command and encoder; the loop and what hangs on it are simulated by SciPy."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -81,10 +79,7 @@ def test_a_rigid_axis_shows_no_mode(command: KnownCommand, tmp_path: Path) -> No
     assert found.modes == ()
 
 
-@pytest.mark.parametrize(
-    ("axis", "words"),
-    [(None, "add --axis x, y or z"), ("y", "called Y")],
-)
+@pytest.mark.parametrize(("axis", "words"), [(None, "add --axis x, y or z"), ("y", "called Y")])
 def test_the_axis_must_be_said(
     command: KnownCommand, actual_m: FloatArray, tmp_path: Path, axis: str | None, words: str
 ) -> None:

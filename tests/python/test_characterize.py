@@ -1,7 +1,5 @@
 """`shapegcode characterize`: programs that stay in their box, and fits held against controllers with hidden facts."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """What a control would refuse, and what it would not run as programmed: each kind by hand."""
 
-from __future__ import annotations
-
 import json
 import random
 from pathlib import Path
@@ -227,7 +225,6 @@ def test_short_blocks_by_hand() -> None:
     check = checked("G1X10.F6000.\nX10.4\nX10.5\nX11.\nX21.\n", block_time_s=0.005)
     assert told(check, "short_block") == [(6, "warning", 0)]
     short = check.short_blocks
-    assert short is not None
     assert (short.count, short.blocks, short.region_count) == (2, 5, 1)
     assert short.share == pytest.approx(0.4)
     assert short.shortest_s == pytest.approx(0.001, abs=1e-8)
@@ -246,14 +243,12 @@ def test_short_blocks_of_each_region_and_its_lines_in_the_source() -> None:
     text = HEAD + "M98P2\nG0Z5.\nM98P2\nM30\n" + sub + "%\n"
     check = sg.check_text(text, machine(block_time_s=0.005), source="part.nc")
     assert told(check, "short_block") == [(11, "warning", 0)] * 2
-    assert check.short_blocks is not None
     assert [row.lines for row in check.short_blocks.regions] == [(10, 11)] * 2
 
 
 def test_moves_of_rotary_axes_alone_have_no_length_to_judge() -> None:
     check = checked("G1X10.F6000.\nA90.\nX20.\n", block_time_s=0.005)
     assert check.counts.warning == 0
-    assert check.short_blocks is not None
     assert check.short_blocks.blocks == 2
 
 
@@ -329,14 +324,12 @@ def test_serial_line_by_hand() -> None:
     rate = 8 * 10 / 0.040
     for baud, starves in ((19_200, True), (38_400, False)):
         check = checked(body, dnc_baud=baud, block_time_s=0.004)
-        assert check.dnc is not None
         assert check.dnc.characters_per_s == pytest.approx(baud / 11)
         assert check.dnc.needed_characters_per_s == pytest.approx(rate, rel=1e-6)
         assert check.dnc.factor == pytest.approx(rate * 11 / baud, rel=1e-6)
         assert told(check, "dnc_rate") == ([(6, "warning", 0)] if starves else [])
         assert check.dnc.region_count == len(check.dnc.regions) == int(starves)
     starving = checked(body, dnc_baud=19_200)
-    assert starving.dnc is not None
     (row,) = starving.dnc.regions
     assert (row.lines, row.bytes) == ((6, 13), 80)
     assert row.programmed_s == pytest.approx(0.040, abs=1e-8)
@@ -351,7 +344,6 @@ def test_serial_line_by_hand() -> None:
 def test_a_long_program_quickly(mode: str) -> None:
     body = f"{mode}G1F3000.\n" + "".join(f"X{k % 1000 * 0.1:.1f}Y{k % 2}.\n" for k in range(1, 40_001))
     check = checked(body)
-    assert check.short_blocks is not None
     assert check.short_blocks.blocks == 40_000
     # Ten times as long takes about ten times as long, not a hundred times.
     tenth = "".join(body.splitlines(keepends=True)[:-36_000])
@@ -442,12 +434,10 @@ def test_shaped_blocks_ask_for_the_rate_of_their_busiest_stretch(tmp_path: Path)
     asked = int(said.removeprefix("needs ").partition(" baud")[0])
     for baud, count in ((9600, 1), (asked - 100, 1), (asked + 100, 0)):
         check = sg.check_text(conversion.text, machine(dnc_baud=baud), source="out.nc")
-        assert check.dnc is not None
         assert check.counts_by_code.get("dnc_rate", 0) == check.dnc.region_count == count
         assert check.dnc.needed_characters_per_s * 11 == pytest.approx(asked, rel=0.002)
     # Blocks of the program itself may be bridged by the buffer: their average counts, as before.
     plain = sg.check_text(HEAD + "G1X10.F6000.\nX20.F600.\n" + END, machine(dnc_baud=115_200))
-    assert plain.dnc is not None
     assert plain.dnc.needed_characters_per_s == pytest.approx(24 / 1.1, rel=0.1)
 
 

@@ -1,7 +1,5 @@
 """What `--cite` prints: BibTeX of the papers behind the methods of a run, with the facts of the page of references."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -44,7 +42,6 @@ def needed(kind: str) -> set[str]:
 def test_every_entry_is_bibtex(key: str) -> None:
     entry = bibliography()[key]
     parsed = ENTRY.fullmatch(entry)
-    assert parsed is not None
     assert parsed[2] == key
     assert needed(parsed[1]) <= set(fields_of(entry))
 

@@ -1,12 +1,9 @@
 """The command as a shell sees it: exit codes, files, JSON."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
 import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -50,10 +47,6 @@ def test_convert_writes_the_program_of_the_api(folder: Path) -> None:
         assert said in done.stdout
 
 
-def numbers(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
 def check_report(report: dict[str, Any]) -> None:
     """What the schema does not say."""
     jsonschema.validate(report, schema(sg.Conversion))
@@ -75,11 +68,8 @@ def test_json_file(folder: Path) -> None:
     assert report["blocks"]["read"] == 8
     assert report["output"] == "out.nc"
     assert report["within_tolerance"]
-    assert [e["override"] for e in report["override_residual"]] == sorted(
-        e["override"] for e in report["override_residual"]
-    )
-    assert min(e["override"] for e in report["override_residual"]) <= 0.8
-    assert max(e["override"] for e in report["override_residual"]) >= 1.2
+    overrides = [each["override"] for each in report["override_residual"]]
+    assert overrides == sorted(overrides) and overrides[0] <= 0.8 and overrides[-1] >= 1.2
     assert report["cycle_time_s"]["emitted"] > report["cycle_time_s"]["original"] > 0.7
 
 
@@ -249,22 +239,6 @@ def test_simulate_writes_plots_and_prints_a_table(folder: Path) -> None:
 # ---- machine, demo, the rest -------------------------------------------------------------------------------
 
 
-def test_machine_init_and_show(folder: Path) -> None:
-    assert run(folder, "machine", "init").returncode == 0
-    assert tomllib.loads((folder / "machine.toml").read_text())["name"] == "VX500"
-    assert run(folder, "machine", "init").returncode == 2
-    assert run(folder, "machine", "init", "--force", "-o", "other.toml").returncode == 0
-    shown = run(folder, "machine", "show", "machine.toml", "--json", "-")
-    assert shown.returncode == 0
-    keys = json.loads(shown.stdout)["keys"]
-    assert keys["controller.interpolation_period_s"]["unit"] == "s"
-    assert run(folder, "machine", "show", "nothing.toml").returncode == 2
-    done = run(folder, "convert", "part.nc", "-m", "machine.toml", "-o", "a.nc")
-    assert done.returncode == 0
-    assert run(folder, "convert", "part.nc", "-m", "vx500", "-o", "b.nc").returncode == 0
-    assert (folder / "a.nc").read_bytes() == (folder / "b.nc").read_bytes()
-
-
 def test_expand(folder: Path) -> None:
     (folder / "main.nc").write_text("%\nO1\nG21G17G90G94\nG0X0Y0Z0\nM98P2\nM30\nO2\nG1X10.F600\nM99\n%\n")
     machine = sg.Machine.load("vx500")
@@ -296,10 +270,9 @@ def test_demo_path(folder: Path) -> None:
     assert len(result["conditions"]) == 4
     for row in result["conditions"]:
         for which in ("ideal", "emitted"):
-            assert numbers(row[which]["orbit_error_percent"])
-            assert numbers(row[which]["time_s"])
+            assert row[which]["orbit_error_percent"] >= 0.0 < row[which]["time_s"]
             assert set(row[which]["residual_vibration_um"]) == AXES
-        assert numbers(row["published_orbit_error_percent"])
+        assert row["published_orbit_error_percent"] > 0.0
     table = run(folder, "demo", "path")
     assert table.returncode == 0
     assert "0.0270" in table.stdout
@@ -315,10 +288,11 @@ def test_demo_of_another_paper_names_its_page(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [(), ("nothing",), ("convert",), ("convert", "part.nc"), ("demo", "nothing"), ("convert", "--bogus")]
+    "words",
+    ["", "nothing", "convert", "convert part.nc", "demo nothing", "convert --bogus", "machine", "machine show a b"],
 )
-def test_wrong_usage_is_exit_code_2(folder: Path, words: tuple[str, ...]) -> None:
-    done = run(folder, *words)
+def test_wrong_usage_is_exit_code_2(folder: Path, words: str) -> None:
+    done = run(folder, *words.split())
     assert done.returncode == 2
     assert done.stdout == ""
     assert "usage: shapegcode" in done.stderr
@@ -330,6 +304,7 @@ def test_help(folder: Path, command: str) -> None:
     done = run(folder, command, "--help", COLUMNS="100")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"usage: shapegcode {command}")
+    assert all(each.name in run(folder, "--help").stdout for each in COMMANDS)
 
 
 def test_version_and_debug(folder: Path) -> None:

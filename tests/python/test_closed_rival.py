@@ -1,7 +1,5 @@
 """What docs/evidence/comparison.md claims beside the Vibration Guard, by a residual formula of its own."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Cutting coefficients from measured forces, against closed forms and simulated records."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

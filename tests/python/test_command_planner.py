@@ -1,7 +1,5 @@
 """Cuts planned by the time-optimal planner: the emitted text, judged by what shares no code with the tool."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Cells of docs/evidence/comparison.md by the judge, which reads, simulates and measures by code of its own."""
 
-from __future__ import annotations
-
 import functools
 import re
 from pathlib import Path

@@ -1,21 +1,10 @@
 """Contour-preserving shaping, held against its figures on the emitted text by the judge's player and plant."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
 import pytest
-from contour_figures import (
-    TOLERANCES_UM,
-    Figures,
-    arcs_and_corners,
-    corner,
-    paper,
-    paper_text,
-    paper_unshaped,
-    within,
-)
+from contour_figures import TOLERANCES_UM, Figures, arcs_and_corners, corner, paper, paper_text, paper_unshaped, within
 
 import shapegcode as sg
 from acceptance import BLOCK_ENDS, machine_with
@@ -140,7 +129,6 @@ def test_off_is_the_plain_shaper() -> None:
     tolerance = writer.tolerance(1e6)
     path = program.regions[-1].path
     piece = _core.RegionShaper(path, grid.fir, [], writer.options(limits, tolerance)).next(10**6)
-    assert piece is not None
     raw = np.asarray(_core.interpolate(path, _core.plan_speed(path, limits, tolerance), 0.005))
     expected = np.asarray(grid.fir.apply(np.asfortranarray(raw)))
     assert np.abs(np.asarray(piece.grid_mm)[: len(expected)] - expected).max() < 1e-9

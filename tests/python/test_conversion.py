@@ -1,7 +1,5 @@
 """The whole conversion, judged by an interpreter, a player and a plant that share no code with it."""
 
-from __future__ import annotations
-
 import functools
 import re
 from typing import Any
@@ -148,18 +146,12 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "three planes": (part("G1X10.F900\nG18G2X20.Z0I5.\nG17G3X25.Y5.J5.\nG19G2Y10.Z5.K5.\nG17G1X0\n"), {}),
     "helices": (part("G1X10.F900\n" + "".join(f"G2X10.Y0Z-{k + 1}.I-5.\n" for k in range(8))), {}),
     "helix G18": (part("G1X10.F900\nG18\n" + "".join(f"G3X10.Z0Y{k + 1}.I-5.\n" for k in range(4))), {}),
-    "dense N": (
-        part("".join(f"N{10 + k}G1X{(k + 1) * 0.003:.3f}Y{k % 3 * 0.002:.3f}F3000\n" for k in range(300))),
-        {},
-    ),
+    "dense N": (part("".join(f"N{10 + k}G1X{(k + 1) * 0.003:.3f}Y{k % 3 * 0.002:.3f}F3000\n" for k in range(300))), {}),
     "comments": (part("G1X1.F600\n(AAA)\nX2.(BBB)\n\nY5.\n(CCC)\n"), {}),
     "comments around words": (part("G1X10.F600(A)\n(A)G1X20.(B)\n(C)\nX30.(D)(E)\n"), {}),
     "N alone": (part("N5G1X1.F600\nN10\nN20(X)\nX2.\nN30 G90\nY5.\nN40\n"), {}),
     "N repeated": (part("N5G1X1.F600\nN5X2.\nN5\nN7Y5.\nN7X0\n"), {}),
-    "large coordinates": (
-        part("G1X90010.F600\nY-89990.\nG3X90020.I5.\n", HEAD.replace("X0Y0", "X90000.Y-90000.")),
-        {},
-    ),
+    "large coordinates": (part("G1X90010.F600\nY-89990.\nG3X90020.I5.\n", HEAD.replace("X0Y0", "X90000.Y-90000.")), {}),
     "edge of the range": (part("G1X99999.F600\nY-99999.\n", HEAD.replace("X0Y0", "X99990.Y-99990.")), {}),
     "F1": (part("G1X.5F1.0\nY.3\n"), {}),
     "F5": (part("G1X.5F5.0\nY.3\n"), {}),
@@ -199,10 +191,7 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "own filter 24 ms": (part("G1X10.F600\nY10.\nX20.\nG2X30.I5.\n"), {"controller.shaped_time_constant_s": 0.024}),
     "carry": (part("G1X10.F600\nY10.\nX20.\nG2X30.I5.\n"), {"controller.block_end": "carry"}),
     "IS-C": (part("G1X10.F600\nY10.0004\nX20.1234\nG2X30.1234I5.\n"), {"controller.least_increment_mm": 0.0001}),
-    "IS-C inch": (
-        part("G1X1.F40.\nY1.\nG2X2.Y0.I0.J-1.F20.\n", INCH),
-        {"controller.least_increment_inch": 0.00001},
-    ),
+    "IS-C inch": (part("G1X1.F40.\nY1.\nG2X2.Y0.I0.J-1.F20.\n", INCH), {"controller.least_increment_inch": 0.00001}),
     "IS-A": (part("G1X10.F600\nY10.\nX20.12\nG2X30.12I5.\n"), {"controller.least_increment_mm": 0.01}),
     "F without decimals": (part("G1X10.F600\nY10.\nG2X20.I5.\n"), {"controller.feed_decimals_mm": 0}),
     "no header": (part("G1X10.F600\nY10.\n"), {"emission.header": False}),

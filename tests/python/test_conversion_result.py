@@ -1,7 +1,5 @@
 """What a conversion says of itself: answer, tables, next step, JSON, and the options that override machine keys."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """A conversion on one core and on several: the same bytes, the same verdict, the same refusal."""
 
-from __future__ import annotations
-
 import random
 import threading
 import zlib

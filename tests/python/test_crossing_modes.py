@@ -3,8 +3,6 @@
 References: SciPy's `lsim`, and the judge's plant, interpreter and player, which share nothing with the package.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

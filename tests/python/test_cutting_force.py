@@ -1,7 +1,5 @@
 """Cutting force, deflection and form of the wall against a tool cut into discs (milling_brute_force)."""
 
-from __future__ import annotations
-
 import threading
 from math import asin, pi, radians, tan
 

@@ -1,7 +1,5 @@
 """Cycle time: closed form against NumPy convolutions, the paper's formulas, hand sums and the full interpolation."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math
@@ -119,10 +117,7 @@ def test_block_overlap_of_10000_sequences_is_the_moving_average(
     check_block_overlap(case)
 
 
-@given(
-    st.lists(st.tuples(st.floats(0.01, 50.0), st.floats(0.5, 300.0)), min_size=1, max_size=20),
-    st.integers(1, 100),
-)
+@given(st.lists(st.tuples(st.floats(0.01, 50.0), st.floats(0.5, 300.0)), min_size=1, max_size=20), st.integers(1, 100))
 def test_block_overlap_is_the_sum_of_the_specification(blocks: list[tuple[float, float]], length: int) -> None:
     """Sum of ceil(l / (F T)) T plus A; nothing is added where there is no acceleration."""
     lengths, feeds = (np.array(column) for column in zip(*blocks, strict=True))

@@ -1,7 +1,5 @@
 """Attacks on readers: files that are none, bombs, damaged records. A message with the file, exit code 2, at once."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

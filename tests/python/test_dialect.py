@@ -1,7 +1,5 @@
 """Programs in the full dialect: what the package reads against what the independent judge simulates."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One battery over every dialect of output: read back by readers that share nothing with the package; refusals."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Set

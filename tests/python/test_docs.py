@@ -1,7 +1,5 @@
 """The pages of the book hang together: links and anchors lead somewhere, every page is in the contents. No Sphinx."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import os

@@ -1,7 +1,5 @@
 """Captures of Sinumerik controls: what is in the file comes out, what cannot be is refused with its place."""
 
-from __future__ import annotations
-
 import copy
 import gzip
 import json
@@ -151,10 +149,7 @@ BAD: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     (_row(lambda row: row.__setitem__(1, True)), r"DES_POS\|1 = True: must be a number"),
     (_row(lambda row: row.__setitem__(2, float("inf"))), r"HFData\[7\]: ENC_POS\|1 = inf: must be finite"),
     (_row(lambda row: row.__setitem__(2, -1e13)), r"ENC_POS\|1 = -1e\+13: must be finite and at most 1e\+12"),
-    (
-        _row(lambda row: row.__setitem__(1, 10**400)),
-        r"whole number 100000000000\.\.\. \(401 digits\): must be",
-    ),
+    (_row(lambda row: row.__setitem__(1, 10**400)), r"whole number 100000000000\.\.\. \(401 digits\): must be"),
     (_row(lambda row: row.__setitem__(0, 5_000_090)), r"HFData\[7\]: CYCLE = 5000090 after 5000107: the counter goes"),
     (_row(lambda row: row.__setitem__(0, 5_000_107)), r"HFData\[7\]: CYCLE = 5000107 .* other values under the same"),
     (_row(lambda row: row.__setitem__(0, 5_000_107.5)), r"CYCLE = .*: must be a whole number"),

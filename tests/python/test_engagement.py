@@ -1,7 +1,5 @@
 """Material and engagement from Python: against a reference without a grid, and the shapes of what comes out."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -1,8 +1,6 @@
 """integrations/example_control, built against the installed library as a user would: real programs with an operator's
 commands, its record held against closed forms, NumPy and SciPy."""
 
-from __future__ import annotations
-
 import fcntl
 import importlib.util
 import math
@@ -324,8 +322,6 @@ def test_the_tutorial_runs(built: Path, tmp_path: Path, monkeypatch: pytest.Monk
 
 def plot_script() -> types.ModuleType:
     spec = importlib.util.spec_from_file_location("plot_run", EXAMPLE / "plot_run.py")
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -1,7 +1,5 @@
 """Parameter dumps of the control: both grammars, which value counts, and how a bad dump is refused."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -250,11 +248,7 @@ def taken(text: str, **options: Any) -> ParameterImport:
         ("N06050Q1P120\nN06059Q1P0", "input.g_macros", {"120": 9010}),
         ("N06001Q1P00100000", "input.tool_program", 9000),
         ("N00000Q1P00000100", "power_on.units", "G20"),
-        (
-            "N01220Q1A1M1.0A2M0.0A3M0.0\nN01221Q1A1M-10.5A2M2.0A3M0.25",
-            "input.work_offsets",
-            {"G54": (-9.5, 2.0, 0.25)},
-        ),
+        ("N01220Q1A1M1.0A2M0.0A3M0.0\nN01221Q1A1M-10.5A2M2.0A3M0.25", "input.work_offsets", {"G54": (-9.5, 2.0, 0.25)}),
         ("N01222 A1 P -10500 A2 P 0 A3 P 0", "input.work_offsets", {"G55": (-10.5, 0.0, 0.0)}),
         # Filter of the look-ahead: linear, bell, exponential with the same second moment.
         (

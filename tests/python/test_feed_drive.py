@@ -1,7 +1,5 @@
 """The feed drive against SciPy: Radau on a second implementation of the equations, lsim; and its machine file."""
 
-from __future__ import annotations
-
 import copy
 import math
 from typing import Any
@@ -192,13 +190,11 @@ def test_machine_file_to_drives() -> None:
     machine = Machine.load("vx500")
     drives = drive_parameters(machine)
     table = machine.axes.x.drive
-    assert table is not None
     x = drives[0]
     # One turn is a lead: the kinetic energy is the same either way.
     speed, lead_m = 0.2, table.screw_lead_mm * 1e-3
     turning = 0.5 * table.motor_inertia_kg_m2 * (2 * math.pi * speed / lead_m) ** 2
     assert 0.5 * x.motor_mass_kg * speed**2 == pytest.approx(turning)
-    assert table.torque_limit_n_m is not None
     assert x.force_limit_n * lead_m == pytest.approx(2 * math.pi * table.torque_limit_n_m)  # work of one turn
     assert x.stiffness_n_per_m == pytest.approx(150e6)
     assert x.table_friction.bristle_stiffness_n_per_m == pytest.approx(30e6)

@@ -1,7 +1,5 @@
 """Speed along the path beside the programmed feed: kept, reported with its line, and a miss where it is not kept."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -50,7 +48,6 @@ def cuts(text: str, lines: list[int]) -> list[Move]:
 def test_corrections_on_small_arcs_keep_the_feed() -> None:
     free, measured = converted(SMALL_ARCS, tolerance__feed_excess_ratio=10.0)
     assert measured.ratio > 1.07, "the case has lost its point"
-    assert free.feed_excess is not None
     assert free.feed_excess.ratio == pytest.approx(measured.ratio, abs=0.05)
     assert free.feed_excess.line == measured.line
     kept, measured = converted(SMALL_ARCS)
@@ -63,7 +60,6 @@ def test_corrections_on_small_arcs_keep_the_feed() -> None:
 def test_a_lower_feed_is_reached_before_it_begins_and_kept_to_its_end() -> None:
     free, measured = converted(FEED_DROP, tolerance__feed_excess_ratio=10.0)
     assert measured.ratio > 1.1 and measured.line == 6
-    assert free.feed_excess is not None
     assert (free.feed_excess.line, free.feed_excess.programmed_mm_per_min) == (6, pytest.approx(300.0))
     kept, measured = converted(FEED_DROP)
     assert measured.ratio <= 1.05

@@ -4,8 +4,6 @@ The judge computes engagement pointwise from the definition, forces with a tool 
 really runs from the blocks of the written text.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The feed override and shaped text: blocks that bear a turned dial, and a dial that is locked; held by the judge."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

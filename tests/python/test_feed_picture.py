@@ -56,7 +56,6 @@ def test_groups_hold_every_station_once_and_envelopes_lose_nothing() -> None:
 
 def test_traces_are_those_of_the_regions_in_a_row(pocket: FeedSchedule) -> None:
     traces = pocket.traces
-    assert traces is not None
     regions = [part for part in pocket.survey.regions if part.track is not None]
     assert traces.distance_mm[-1] == pytest.approx(sum(part.region.path.length_mm for part in regions), rel=1e-9)
     assert traces.length_mm.sum() == pytest.approx(traces.distance_mm[-1], rel=1e-12)
@@ -81,7 +80,6 @@ def test_limits_of_the_spindle_are_drawn_as_they_are_kept(pocket: FeedSchedule) 
         FEED / "POCKET.NC", machine, Tool.load(FEED / "pocket_tool.toml"),
         Stock.load(FEED / "pocket_stock.toml"), resolution_mm=0.16,
     )  # fmt: skip
-    assert schedule.traces is not None
     assert schedule.peak.mean_power_w.emitted <= 150.0 < schedule.peak.mean_power_w.original
     assert (schedule.traces.limit["mean_power_w"] == 150.0).all()
     assert (schedule.traces.limit["peak_torque_nm"] == 0.4).all()
@@ -91,8 +89,6 @@ def test_limits_of_the_spindle_are_drawn_as_they_are_kept(pocket: FeedSchedule) 
 
 def test_walls_are_those_of_the_core(pocket: FeedSchedule) -> None:
     traces, walls = pocket.traces, pocket.walls
-    assert traces is not None
-    assert walls is not None
     before, after = walls.error_um.original, walls.error_um.emitted
     assert before.shape == after.shape == (len(walls.edges_mm) - 1, len(walls.height_mm))
     assert walls.height_mm[-1] == pytest.approx(8.0)

@@ -1,7 +1,5 @@
 """What real programs hold beside plain moves, and what a feed schedule makes of it."""
 
-from __future__ import annotations
-
 import pytest
 
 import shapegcode as sg
@@ -87,8 +85,7 @@ def test_cuts_that_share_their_block_count_though_their_feed_stays() -> None:
 
 
 @pytest.mark.parametrize(
-    ("shift", "back"),
-    [("G52 Y10.", "G52 Y0."), ("G92 Y-8.", None), ("G10 L2 P1 Y10.", None), ("G55", "G54")],
+    ("shift", "back"), [("G52 Y10.", "G52 Y0."), ("G92 Y-8.", None), ("G10 L2 P1 Y10.", None), ("G55", "G54")]
 )
 def test_cuts_in_moved_coordinates_are_left(shift: str, back: str | None) -> None:
     moved = f"G01 X110. F5000.\nG00 Z50.\n{shift}\nG00 X-10. Y2.\nZ-5.\nG01 X110. F5000.\n"
@@ -98,7 +95,6 @@ def test_cuts_in_moved_coordinates_are_left(shift: str, back: str | None) -> Non
     if back is not None:
         again = scheduled(f"{moved}G00 Z50.\n{back}\nG00 X-10. Y50.\nZ-5.\nG01 X110. F5000.\n")
         plan = again.plans[-1]
-        assert plan is not None
         assert len(plan.stretches) > 1
 
 

@@ -1,7 +1,5 @@
 """Feed scheduling through Python and the command; the independent judge of its forces is in test_feed_judge."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -81,7 +79,6 @@ def test_the_corner_is_cut_at_the_force_of_the_straight(corner: sg.FeedSchedule)
     assert resultant.original.max == pytest.approx(78.8, rel=0.01)
     assert 0.98 * STRAIGHT_N < resultant.emitted.max <= STRAIGHT_N
     load = corner.loads[0]
-    assert load is not None
     inside = load.emitted.peak_resultant_n > 1.0
     near = load.emitted.peak_resultant_n[inside] > 0.95 * STRAIGHT_N
     lengths = np.diff(np.concatenate(([0.0], load.s_mm)))[inside]
@@ -117,9 +114,7 @@ def test_the_feed_that_the_machine_runs_keeps_the_limit(time_constant_s: float) 
     window = 1  # 12000 rev/min, six teeth: 0.83 ms
     speed = (travelled[window:] - travelled[:-window]) / (window * period) * 60.0
     plan = result.plans[0]
-    assert plan is not None
     track = plan.surveyed.track
-    assert track is not None
     down = float(track.s_mm[np.flatnonzero(np.asarray(track.segment) > 0)[0] - 1])
     stations = np.asarray(track.s_mm) - down
     at = np.clip(np.searchsorted(stations, travelled[window:]), 0, len(stations) - 1)

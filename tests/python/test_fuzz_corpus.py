@@ -1,7 +1,5 @@
 """What the fuzzer of the parameter import has found is imported or refused without harm."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

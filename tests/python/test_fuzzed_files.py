@@ -3,8 +3,6 @@
 ``python tests/python/test_fuzzed_files.py KIND FOLDER SEED COUNT`` reads one kind in this process and says what broke.
 """
 
-from __future__ import annotations
-
 import gzip
 import io
 import json

@@ -1,7 +1,5 @@
 """What a notebook user guesses: each line works without a look at the book, or says what to do."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import matplotlib.pyplot as plt

@@ -9,7 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -24,48 +24,27 @@ PACKAGE = ROOT / "python" / "shapegcode"
 
 # The folders of cpp/src from the bottom up: each may include what stands before it. `program` knows nothing of motion,
 # shaping and plants, so that text is read without a machine.
-FOLDERS = [
-    "base",
-    "path",
-    "limits",
-    "filter",
-    "planner",
-    "controller",
-    "motion",
-    "program",
-    "shaper",
-    "plant",
-    "measure",
-    "compare",
-    "identify",
-    "milling",
-    "command",
-    "write",
-    "simulate",
-    "c",
-]
+ORDER = (
+    "base path limits filter planner controller motion program shaper plant measure compare identify milling command "
+    "write simulate c"
+)
+FOLDERS = ORDER.split()
 NOT_FROM = {
     "program": {"filter", "limits", "motion", "controller", "planner"},
     "measure": {"filter", "limits", "motion", "controller", "planner", "program", "shaper", "plant"},
 }
 # Public headers whose folder of sources has another name; one that is named like a folder, or lies in it, is its own.
-HEADER_FOLDERS = {
-    "columns.hpp": "path",
-    "error.hpp": "base",
-    "expanded_program.hpp": "program",
-    "fanuc_model.hpp": "motion",
-    "linear_feed.hpp": "write",
-    "linuxcnc_program.hpp": "program",
-    "planner_models.hpp": "motion",
-    "minimal_shapers.hpp": "shaper",
-    "mode.hpp": "base",
-    "samples.hpp": "base",
-    "shapegcode.h": "c",
-    "siemens_program.hpp": "program",
-    "simulation.hpp": "simulate",
-    "simulation_stream.hpp": "simulate",
-    "timing.hpp": "simulate",
+HEADERS = {
+    "base": "error.hpp mode.hpp samples.hpp",
+    "c": "shapegcode.h",
+    "motion": "fanuc_model.hpp planner_models.hpp",
+    "path": "columns.hpp",
+    "program": "expanded_program.hpp linuxcnc_program.hpp siemens_program.hpp",
+    "shaper": "minimal_shapers.hpp",
+    "simulate": "simulation.hpp simulation_stream.hpp timing.hpp",
+    "write": "linear_feed.hpp",
 }
+HEADER_FOLDERS = {header: folder for folder, headers in HEADERS.items() for header in headers.split()}
 # They are for users and include what lies below; nobody in the library includes them.
 UMBRELLAS = {"shapegcode.hpp", "prototype.hpp"}
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"]', re.MULTILINE)
@@ -80,6 +59,16 @@ def cpp_files(*folders: str) -> list[Path]:
 def includes(file: Path) -> list[tuple[str, str]]:
     """(bracket, name) of every include line."""
     return INCLUDE.findall(file.read_text(encoding="utf-8"))
+
+
+def offenders(files: Iterable[Path], offends: Callable[[Path, str, str], bool]) -> list[str]:
+    """What is wrong of the includes of files, by file, bracket and name."""
+    return [
+        f"{file.relative_to(ROOT)} includes {name}"
+        for file in files
+        for bracket, name in includes(file)
+        if offends(file, bracket, name)
+    ]
 
 
 def own_folder(file: Path) -> str:
@@ -103,13 +92,10 @@ def test_there_are_sources_to_check() -> None:
 
 
 def test_cpp_knows_nothing_of_python() -> None:
-    offenders = [
-        f"{file.relative_to(ROOT)} includes {name}"
-        for file in cpp_files("")
-        for _, name in includes(file)
-        if name.startswith("pybind11") or Path(name).name == "Python.h"
-    ]
-    assert offenders == []
+    def is_pythons(_file: Path, _bracket: str, name: str) -> bool:
+        return name.startswith("pybind11") or Path(name).name == "Python.h"
+
+    assert offenders(cpp_files(""), is_pythons) == []
 
 
 def test_only_the_ode_solver_knows_sundials() -> None:
@@ -125,7 +111,6 @@ def test_only_the_ode_solver_knows_sundials() -> None:
 
 def cmake_list(name: str) -> list[str]:
     found = re.search(rf"^set\({name}\s+([^)]*)\)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"), re.MULTILINE)
-    assert found is not None
     return found[1].split()
 
 
@@ -134,49 +119,36 @@ def test_what_a_control_embeds_knows_nothing_of_the_rest() -> None:
     folders, headers = cmake_list("rt_folders"), cmake_list("rt_headers")
     files = [file for file in cpp_files("include", "src") if own_folder(file) in folders and file.name not in UMBRELLAS]
     assert sorted(headers) == sorted(file.name for file in files if file.is_relative_to(CPP / "include"))
-    offenders = [
-        f"{file.relative_to(ROOT)} includes {name}"
-        for file in files
-        for bracket, name in includes(file)
-        if (included_folder(name) not in folders if bracket == '"' else "/" in name and not name.startswith("Eigen/"))
-    ]
-    assert offenders == []
+
+    def is_foreign(_file: Path, bracket: str, name: str) -> bool:
+        if bracket == '"':
+            return included_folder(name) not in folders
+        return "/" in name and not name.startswith("Eigen/")
+
+    assert offenders(files, is_foreign) == []
 
 
 def test_cpp_folders_use_only_whom_they_may() -> None:
-    offenders = []
-    for file in cpp_files("include", "src"):
-        if file.name in UMBRELLAS:
-            continue
+    files = [file for file in cpp_files("include", "src") if file.name not in UMBRELLAS]
+    for file in files:
+        assert own_folder(file) in FOLDERS, f"{file.relative_to(ROOT)}: say in FOLDERS where {own_folder(file)} stands"
+
+    def is_above(file: Path, bracket: str, name: str) -> bool:
         folder = own_folder(file)
-        assert folder in FOLDERS, f"{file.relative_to(ROOT)}: say in FOLDERS where {folder} stands"
         allowed = set(FOLDERS[: FOLDERS.index(folder) + 1]) - NOT_FROM.get(folder, set())
-        offenders += [
-            f"{file.relative_to(ROOT)} includes {name}"
-            for bracket, name in includes(file)
-            if bracket == '"' and (included_folder(name) not in allowed or Path(name).name in UMBRELLAS)
-        ]
-    assert offenders == []
+        return bracket == '"' and (included_folder(name) not in allowed or Path(name).name in UMBRELLAS)
+
+    assert offenders(files, is_above) == []
 
 
-def test_private_headers_are_included_by_their_whole_path() -> None:
-    offenders = [
-        f"{file.relative_to(ROOT)} includes {name}"
-        for file in cpp_files("src")
-        for bracket, name in includes(file)
-        if bracket == '"' and not name.startswith("shapegcode/") and not (CPP / "src" / name).is_file()
-    ]
-    assert offenders == []
+def test_headers_are_included_by_their_whole_path() -> None:
+    """Public ones with the name of the library, private ones as they lie in cpp/src, which no public one may do."""
 
+    def is_short(file: Path, bracket: str, name: str) -> bool:
+        is_private = file.is_relative_to(CPP / "src") and (CPP / "src" / name).is_file()
+        return bracket == '"' and not name.startswith("shapegcode/") and not is_private
 
-def test_every_public_header_includes_own_headers_by_full_name() -> None:
-    offenders = [
-        f"{file.relative_to(ROOT)} includes {name}"
-        for file in cpp_files("include")
-        for bracket, name in includes(file)
-        if bracket == '"' and not name.startswith("shapegcode/")
-    ]
-    assert offenders == []
+    assert offenders(cpp_files("include", "src"), is_short) == []
 
 
 def imported_modules(file: Path) -> set[str]:
@@ -195,31 +167,11 @@ def imported_modules(file: Path) -> set[str]:
 
 
 # The folders of the package from the bottom up: each may import what stands before it.
-PACKAGE_FOLDERS = [
-    "io",
-    "settings",
-    "results",
-    "machine",
-    "program",
-    "model",
-    "shaping",
-    "verdict",
-    "simulation",
-    "timing",
-    "checking",
-    "metrology",
-    "identification",
-    "cutting",
-    "feed",
-    "conversion",
-    "characterization",
-    "testcut",
-    "demos",
-    "setup",
-    "batching",
-    "studies",
-    "cli",
-]
+PACKAGE_ORDER = (
+    "io settings results machine program model shaping verdict simulation timing checking metrology identification "
+    "cutting feed conversion characterization testcut demos setup batching studies cli"
+)
+PACKAGE_FOLDERS = PACKAGE_ORDER.split()
 # What stands at the root of the package; `errors` and the extension module may be imported by all.
 ROOT_MODULES = {"__init__", "__main__", "errors", "_core"}
 
@@ -271,30 +223,25 @@ def test_no_module_imports_itself_through_others() -> None:
     assert sorted(uses) == [], "these import each other, or what does"
 
 
+def users_of(package: str) -> set[str]:
+    """The files of the package that load another one."""
+    files = PACKAGE.rglob("*.py")
+    return {file.relative_to(PACKAGE).as_posix() for file in files if package in imported_modules(file)}
+
+
 def test_only_plots_import_matplotlib() -> None:
-    users = {
-        file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "matplotlib" in imported_modules(file)
-    }
-    named = {name for name in users if re.search(r"(^|[/_])plots?\.py$", name)}
-    assert users - named == set()
+    assert [name for name in users_of("matplotlib") if not re.search(r"(^|[/_])plots?\.py$", name)] == []
 
 
 def test_only_files_of_settings_import_pydantic() -> None:
-    users = {
-        file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "pydantic" in imported_modules(file)
-    }
-    tables = {name for name in users if name.startswith(("machine/", "settings/"))}
-    assert users - tables == {
+    assert {name for name in users_of("pydantic") if not name.startswith(("machine/", "settings/"))} == {
         "timing/calibration/runs_file.py", "characterization/programs.py", "testcut/cut.py",
         "cutting/stock.py", "cutting/tool.py", "setup/answers.py", "studies/study_file.py",
     }  # fmt: skip
 
 
 def test_only_shapes_of_the_stock_import_shapely() -> None:
-    users = {
-        file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "shapely" in imported_modules(file)
-    }
-    assert users == {"cutting/stock_shape.py"}
+    assert users_of("shapely") == {"cutting/stock_shape.py"}
     assert "shapely" not in loaded_after("import shapegcode.cutting.stock_shape")
 
 
@@ -306,13 +253,13 @@ def loaded_after(statement: str) -> set[str]:
     return set(run.stdout.split())
 
 
-HEAVY = {"numpy", "scipy", "matplotlib", "pydantic"}
+HEAVY = {"numpy", "scipy", "matplotlib", "pydantic", "rich"}
 
 
 @pytest.mark.parametrize(
     "statement",
     [
-        "import shapegcode.cli",
+        "import shapegcode, shapegcode.cli",
         # What `shapegcode --help` does; its text goes to stderr here, so that only the modules are on stdout.
         "import contextlib, shapegcode.cli\n"
         "sys.argv = ['shapegcode', '--help']\n"
@@ -343,10 +290,6 @@ def test_ten_lines_are_converted_without_what_takes_long_to_load(tmp_path: Path)
     )
     assert loaded & {"scipy", "shapely", "matplotlib", "plotly", "pandas", "xarray", "pyuff"} == set()
     assert REGION_MARK in output.read_text(encoding="ascii")  # it was shaped
-
-
-def test_plotting_is_loaded_only_when_used() -> None:
-    assert "matplotlib" not in loaded_after("import shapegcode")
 
 
 @pytest.mark.parametrize("page", write_docs.PAGES)
@@ -394,13 +337,8 @@ def test_the_version_is_that_of_the_last_tag(tmp_path: Path) -> None:
 
 def test_the_long_checks_run_for_what_changed(tmp_path: Path) -> None:
     """A source: all, and clang-tidy of its folder alone; a Python test, or one that is gone: the Python tests."""
-    texts = (
-        "cpp/src/a/x.cpp",
-        "cpp/src/a/y.hpp",
-        "cpp/src/b/z.cpp",
-        "tests/python/test_t.py",
-        "tests/python/test_u.py",
-    )
+    texts = [f"cpp/src/{name}" for name in ("a/x.cpp", "a/y.hpp", "b/z.cpp")]
+    texts += ["tests/python/test_t.py", "tests/python/test_u.py"]
     for name in (*texts, "tests/tools/full_pass.py", "CMakeLists.txt"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(f"{name}\n")
@@ -416,7 +354,7 @@ def test_the_long_checks_run_for_what_changed(tmp_path: Path) -> None:
     assert len((tmp_path / "tests/full_pass.txt").read_text().splitlines()) == 4
     assert (said("changed"), said("files")) == ([], [])
     (tmp_path / texts[0]).write_text("other")
-    assert (said("changed"), said("files")) == (["core", "python"], list(texts[:2]))
+    assert (said("changed"), said("files")) == (["core", "python"], texts[:2])
     (tmp_path / texts[0]).write_text(f"{texts[0]}\n")
     assert said("changed") == []
     (tmp_path / texts[4]).unlink()
@@ -426,26 +364,21 @@ def test_the_long_checks_run_for_what_changed(tmp_path: Path) -> None:
     assert said("files") == ["cpp/src/b/new.cpp", texts[2]]
 
 
+def files_with(words: str, *folders: str) -> list[str]:
+    """The test files, but for this one, in which a pattern is found."""
+    files = (file for folder in folders for file in (ROOT / "tests" / folder).rglob("*.py"))
+    return [
+        file.name for file in files if file != Path(__file__) and re.search(words, file.read_text(encoding="utf-8"))
+    ]
+
+
 def test_no_test_skips_silently() -> None:
-    words = re.compile(r"importorskip|pytest\.skip|mark\.skip")
-    skipping = {
-        file.name
-        for folder in ("python", "oracles")
-        for file in (ROOT / "tests" / folder).rglob("*.py")
-        if file != Path(__file__) and words.search(file.read_text(encoding="utf-8"))
-    }
-    assert skipping == set()
+    assert files_with(r"importorskip|pytest\.skip|mark\.skip", "python", "oracles") == []
 
 
 def test_no_test_has_a_limit_in_wall_clock_time() -> None:
     """It would fail on a busy machine: effort.cpu_s compares CPU times instead."""
-    words = re.compile(r"perf_counter|monotonic|time\.time\(|\btimeout\b")
-    looking = {
-        file.name
-        for file in (ROOT / "tests" / "python").rglob("*.py")
-        if file != Path(__file__) and words.search(file.read_text(encoding="utf-8"))
-    }
-    assert looking == set()
+    assert files_with(r"perf_counter|monotonic|time\.time\(|\btimeout\b", "python") == []
 
 
 def says_something(name: str, doc: str | None) -> bool:

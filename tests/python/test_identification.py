@@ -1,7 +1,5 @@
 """Modes from taps and decays whose truth is known (SciPy's simulation), and refusals where the data hold too little."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -186,7 +184,6 @@ def test_taps_that_differ_by_more_than_noise_widen_the_interval() -> None:
     structures = [TrueMode(120.0, 0.02, mass) for mass in (11.0, 12.0, 13.0)]
     result = identify([tap([mode], rng, snr_db=40.0) for mode in structures], accepted_percent=50.0)
     mass = result.modes[0].mass_kg
-    assert mass is not None
     # Student's t of two degrees of freedom on a standard deviation of 8 % over the root of three.
     assert 15.0 < mass.uncertainty_percent < 30.0
 
@@ -225,9 +222,7 @@ def test_paper_003_from_its_record() -> None:
     (found,) = result.modes
     assert found.frequency_hz.value == pytest.approx(4.5016, abs=5e-5)
     assert found.damping_ratio.value == pytest.approx(0.0707, abs=5e-5)
-    assert found.mass_kg is not None
     assert found.mass_kg.value == pytest.approx(5.0, rel=0.002)
-    assert found.stiffness_n_per_m is not None
     assert found.stiffness_n_per_m.value == pytest.approx(4000.0, rel=0.002)
 
 

@@ -1,7 +1,5 @@
 """The numerical core of identification against SciPy, closed forms, numeric differentiation and repeated draws."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

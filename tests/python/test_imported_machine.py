@@ -1,7 +1,5 @@
 """A machine imported from a parameter dump, held against a simulation that knows the dump and not our reading of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Programs in a Haas mill's words: goldens derived from what its manuals and articles say, each with its source."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +40,6 @@ def read(body: str, **keys: Any) -> sg.Program:
 def plain(body: str) -> list[str]:
     """The lines of a body in FANUC's words."""
     foreign = read(body).foreign
-    assert foreign is not None
     return foreign.text.splitlines()[LINE - 1 : -1]
 
 

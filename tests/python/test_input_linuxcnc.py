@@ -1,7 +1,5 @@
 """Programs in LinuxCNC's words: held against its own interpreter rs274, and word by word against its documentation."""
 
-from __future__ import annotations
-
 import pickle
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """SINUMERIK programs read: beside an independent interpreter, against pages of manuals, and what is refused."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """Tests of the judge's interpreter: closed forms, samples, programs at random."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -9,12 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from judge import (
-    JudgeError,
-    Move,
-    interpret,
-    verify_conversion,
-)
+from judge import JudgeError, Move, interpret, verify_conversion
 from judge.generate import programs
 from judge.records import PLANES
 from judge.samples import SAMPLES, centre_of, read_sample

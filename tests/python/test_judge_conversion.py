@@ -1,7 +1,5 @@
 """Tests of the judge's verdict on conversions, good and bad ones."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any
@@ -10,13 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from judge import (
-    Move,
-    interpret,
-    regions,
-    split,
-    verify_conversion,
-)
+from judge import Move, interpret, regions, split, verify_conversion
 from judge.generate import programs
 from judge.samples import SAMPLES, centre_of, read_sample
 

@@ -1,7 +1,5 @@
 """The dialect's judge itself: places worked out by hand, brute force for compensation, alarms."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from pathlib import Path
@@ -122,7 +120,6 @@ def test_rotation_mirror_and_scaling() -> None:
     for k, arc in enumerate(turned[::2]):
         angle = math.radians(60.0 * k)
         centre = 10 + 35 * math.cos(angle) - 2 * math.sin(angle), 5 + 35 * math.sin(angle) + 2 * math.cos(angle)
-        assert arc.centre is not None
         assert tuple(arc.centre[:2]) == pytest.approx(centre, abs=1e-9)
         assert arc.sweep == pytest.approx(math.pi)
     arcs = [i for i in moves_of("mirrored_g51_1") if i.kind == "arc"]
@@ -200,10 +197,7 @@ def test_the_tool_touches_the_contour_and_never_cuts_it(name: str, radius: float
         touching += int(np.sum(gap < radius + 1e-3))
     assert touching > 20 * len(contour)
     # Start-up and end lie on the normals (type A).
-    pairs = [
-        (tool[0].flat(tool[0].end), contour[1].start),
-        (tool[-1].flat(tool[-1].start), contour[-2].end),
-    ]
+    pairs = [(tool[0].flat(tool[0].end), contour[1].start), (tool[-1].flat(tool[-1].start), contour[-2].end)]
     for point, begin in pairs:
         assert np.hypot(*(point - contour[1].flat(begin))) == pytest.approx(radius, abs=1e-9)
 

@@ -1,7 +1,5 @@
 """Tests of the judge's player and plant: closed forms, published figures."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Modes from a record beside a program whose command is known; axis, drive and logger are simulated by NumPy alone."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -83,10 +81,8 @@ def test_modes_start_and_clock_of_a_logger(program: Path, motion: tuple[FloatArr
     check(found, MODES)
     assert (found.axis, found.ok) == ("x", True)
     begins = re.search(r"the program begins ([0-9.]+) s after the record", found.notes[0])
-    assert begins is not None
     assert float(begins[1]) == pytest.approx(3.3 * 1.01, abs=0.03)
     clock = re.search(r"clock is \+([0-9.]+) %", found.notes[0])
-    assert clock is not None
     assert float(clock[1]) == pytest.approx(100.0 / 101.0, abs=0.003), "1.01 seconds are counted in one"
     assert not any("than simulated" in note for note in found.notes)
     upside_down = record(motion, Logger(clock=0.99, begins_s=-0.4, rate_hz=1600.0))

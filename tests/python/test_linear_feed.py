@@ -1,7 +1,5 @@
 """FLIN: blocks whose feed is linear along their path, against an ODE solver, and read back by the Siemens reader."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from itertools import pairwise

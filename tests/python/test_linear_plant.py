@@ -1,7 +1,5 @@
 """Exact propagation of linear plants: held against SciPy's exponential and simulation, and against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

@@ -1,7 +1,5 @@
 """Linear programs that go on from one another, against SciPy's from the beginning."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

@@ -1,7 +1,5 @@
 """LinuxCNC as a target: a machine from its INI file, and the lines of it that a shaped program needs."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path
@@ -59,7 +57,6 @@ def test_an_ini_file_is_a_machine(tmp_path: Path) -> None:
     controller = machine.controller
     assert controller.kind == "linuxcnc" and controller.interpolation_period_s == 0.0005
     planner = controller.linuxcnc
-    assert planner is not None
     # The first of a name counts; what is not there has LinuxCNC's own default.
     assert (planner.kink_ratio, planner.ramp_frequency_hz, planner.max_feed_override) == (0.2, 100.0, 1.2)
     origins = {value.key: value.remark for value in machine.values()}

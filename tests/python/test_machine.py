@@ -1,18 +1,16 @@
 """The machine file: what it accepts, how it refuses, and the commands that write and show it."""
 
-from __future__ import annotations
-
+import copy
 import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import pytest
 
-from shapegcode.cli import COMMANDS, main
+from command import run
+from shapegcode.cli import main
 from shapegcode.cli.runner import write_json
 from shapegcode.errors import MachineError
 from shapegcode.io.data_file import write_text
@@ -231,193 +229,116 @@ def test_remarks_stand_at_their_lines() -> None:
         machine.to_toml({"axes.x.modes.2.frequency_hz": "there is no second mode"})
 
 
-@pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
+DATA = Machine.load("vx500").model_dump(mode="python")
+
+
 @pytest.mark.parametrize(
-    "key",
-    [v.key for v in Machine.load("vx500").values() if v.value.replace(".", "").isdigit() and "." in v.value],
+    "key", [v.key for v in Machine.load("vx500").values() if v.value.replace(".", "").isdigit() and "." in v.value]
 )
-def test_no_number_may_be_nan_or_infinite(key: str, number: str) -> None:
-    data = Machine.load("vx500").model_dump(mode="python")
+def test_no_number_may_be_nan_or_infinite(key: str) -> None:
+    data = copy.deepcopy(DATA)
     *parents, last = key.split(".")
     table: Any = data
     for part in parents:
         table = table[int(part) - 1] if part.isdigit() else table[part]
-    table[last] = float(number)
-    with pytest.raises(ValueError, match="finite number") as caught:
-        Machine.model_validate(data)
-    assert last in str(caught.value)
+    for number in (math.nan, math.inf, -math.inf):
+        table[last] = number
+        with pytest.raises(ValueError, match=rf"{last}(\.\w)?\n.*finite number"):
+            Machine.model_validate(data)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("key", "value", "message"),
     [
-        (
-            "max_feed_mm_per_min = 5000",
-            "max_feed_mm_per_min = -5",
-            "4: axes.x.max_feed_mm_per_min = -5: must be 1 or more (unit: mm/min)",
-        ),
-        (
-            "max_feed_mm_per_min = 5000",
-            "max_feed_mm_per_min = 0",
-            "4: axes.x.max_feed_mm_per_min = 0: must be 1 or more (unit: mm/min)",
-        ),
-        (
-            "max_acceleration_mm_s2 = 1000",
-            "max_acceleration_mm_s2 = 1e300",  # a conversion with it did not end
-            "6: axes.x.max_acceleration_mm_s2 = 1e+300: must be 1000000.0 or less (unit: mm/s²)",
-        ),
-        (
-            "max_feed_mm_per_min = 5000",
-            "max_feed_mm_per_min = nan",
-            "4: axes.x.max_feed_mm_per_min = nan: must be a finite number (unit: mm/min)",
-        ),
-        (
-            "max_feed_mm_per_min = 5000",
-            'max_feed_mm_per_min = "5000"',
-            '4: axes.x.max_feed_mm_per_min = "5000": must be a number (unit: mm/min)',
-        ),
-        (
-            "max_feed_mm_per_min = 5000",
-            "max_feed = 5000",
-            " axes.x.max_feed_mm_per_min: required, but missing (unit: mm/min)",
-        ),
-        (
-            "max_feed_mm_per_min = 5000",
-            "max_feed = 5000",
-            "4: axes.x.max_feed = 5000: unknown key; did you mean max_feed_mm_per_min?",
-        ),
-        ('name = "M"', "", " name: required, but missing"),
-        (
-            'name = "M"',
-            'name = "Fräse"',
-            '2: name = "Fräse": malformed; short name, in plain ASCII for the header of programs',
-        ),
+        ("max_feed_mm_per_min", "-5", "-5: must be 1 or more (unit: mm/min)"),
+        ("max_feed_mm_per_min", "0", "0: must be 1 or more (unit: mm/min)"),
+        # A conversion with it did not end.
+        ("max_acceleration_mm_s2", "1e300", "1e+300: must be 1000000.0 or less (unit: mm/s²)"),
+        ("max_feed_mm_per_min", "nan", "nan: must be a finite number (unit: mm/min)"),
+        ("max_feed_mm_per_min", '"5000"', '"5000": must be a number (unit: mm/min)'),
+        ("name", '"Fräse"', '"Fräse": malformed; short name, in plain ASCII for the header of programs'),
     ],
 )
-def test_message_has_file_line_key_value_and_limit(old: str, new: str, message: str) -> None:
-    assert message in problems(MINIMAL.replace(old, new, 1))
+def test_message_has_file_line_key_value_and_limit(key: str, value: str, message: str) -> None:
+    lines = MINIMAL.splitlines()
+    line = next(rank for rank, text in enumerate(lines) if text.startswith(f"{key} = "))
+    lines[line] = f"{key} = {value}"
+    place = key if key == "name" else f"axes.x.{key}"
+    assert f"{line + 1}: {place} = {message}" in problems("\n".join(lines))
+
+
+def test_a_key_that_is_missing_and_one_that_is_unknown() -> None:
+    assert " name: required, but missing" in problems(MINIMAL.replace('name = "M"', ""))
+    found = problems(MINIMAL.replace("max_feed_mm_per_min", "max_feed", 1))
+    assert " axes.x.max_feed_mm_per_min: required, but missing (unit: mm/min)" in found
+    assert "4: axes.x.max_feed = 5000: unknown key; did you mean max_feed_mm_per_min?" in found
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("controller.law", "'fast'", ' = "fast": must be "constant_time" or "jerk_limited"'),
+        ("controller.in_position_s", "-1", " = -1: must be 0 or more (unit: s)"),
+        ("controller.in_position_s", "{x = 1, y = -1, z = 1}", ".y = -1: must be 0 or more (unit: s)"),
+        ("controller.in_position_s", "{x = 1, y = 1}", ".z: required, but missing (unit: s)"),
+        ("controller.rapid_time_constant_s", "11", " = 11: must be 10 or less (unit: s)"),
+        ("controller.feed_forward_ratio", "{x = 0, y = 1.1, z = 0}", ".y = 1.1: must be 1 or less"),
+        ("controller.position_gain_per_s", "0", " = 0: must be greater than 0 (unit: 1/s)"),
+        (
+            "controller.contour_acceleration_mm_s2",
+            "{x = 1, y = 1, z = 0}",
+            ".z = 0: must be greater than 0 (unit: mm/s²)",
+        ),
+        ("controller.no_buffer_m_codes", "[46, -1]", ".2 = -1: must be 0 or more"),
+        ("controller.nesting_limit_subprogram", "0", " = 0: must be 1 or more (unit: levels)"),
+        ("times.tool_change_s", "-1", " = -1: must be 0 or more (unit: s)"),
+        ("controller.interpolation_period_s", "1", " = 1: must be 0.1 or less (unit: s)"),
+        ("controller.program_memory_bytes", "1.5", " = 1.5: must be a whole number (unit: bytes)"),
+        ("controller.calculator_decimal_point", "1", " = 1: must be true or false"),
+        ("input.work_offsets", "{G60 = [1, 2, 3]}", ": G60 is not a work offset; names are G54 ... G59 and"),
+        (
+            "emission.block_period_s",
+            "0.0125",
+            " = 0.0125: must be a whole multiple of controller.interpolation_period_s",
+        ),
+        ("emission.block_period_s", "0.004", " = 0.004: must not be below controller.block_time_s = 0.005"),
+        ("emission.prologue", '["%"]', ' = ["%"]: the line "%" has a character other than capital letters, digits'),
+    ],
+)
+def test_bad_values(key: str, value: str, said: str) -> None:
+    table, _, name = key.partition(".")
+    found = problems(f"{MINIMAL}[{table}]\n{name} = {value}\n")
+    assert any(problem.startswith(f"16: {key}{said}") for problem in found)
+
+
+MODE = "[[axes.x.modes]]\nfrequency_hz = 46\ndamping_ratio = 0.1\n"
 
 
 @pytest.mark.parametrize(
     ("tables", "message"),
     [
-        (
-            "[[axes.x.modes]]\nfrequency_hz = 46\ndamping_ratio = 1.0\n",
-            "17: axes.x.modes.1.damping_ratio = 1.0: must be less than 1",
-        ),
-        (
-            "[[axes.x.modes]]\nfrequency_hz = 46\ndamping_ratio = 0.1\n[[axes.x.modes]]\nfrequency_hz = true\n",
-            "19: axes.x.modes.2.frequency_hz = true: must be a number (unit: Hz)",
-        ),
-        (
-            "[controller]\nlaw = 'fast'\n",
-            '16: controller.law = "fast": must be "constant_time" or "jerk_limited"',
-        ),
-        (
-            "[controller]\nin_position_s = -1\n",
-            "16: controller.in_position_s = -1: must be 0 or more (unit: s)",
-        ),
-        (
-            "[controller]\nin_position_s = {x = 1, y = -1, z = 1}\n",
-            "16: controller.in_position_s.y = -1: must be 0 or more (unit: s)",
-        ),
-        (
-            "[controller]\nin_position_s = {x = 1, y = 1}\n",
-            "16: controller.in_position_s.z: required, but missing (unit: s)",
-        ),
-        (
-            "[controller]\nrapid_time_constant_s = 11\n",
-            "16: controller.rapid_time_constant_s = 11: must be 10 or less (unit: s)",
-        ),
-        (
-            "[controller]\nfeed_forward_ratio = {x = 0, y = 1.1, z = 0}\n",
-            "16: controller.feed_forward_ratio.y = 1.1: must be 1 or less",
-        ),
-        (
-            "[controller]\nposition_gain_per_s = 0\n",
-            "16: controller.position_gain_per_s = 0: must be greater than 0 (unit: 1/s)",
-        ),
-        (
-            "[controller]\ncontour_acceleration_mm_s2 = {x = 1, y = 1, z = 0}\n",
-            "16: controller.contour_acceleration_mm_s2.z = 0: must be greater than 0 (unit: mm/s²)",
-        ),
-        (
-            "[controller]\nno_buffer_m_codes = [46, -1]\n",
-            "16: controller.no_buffer_m_codes.2 = -1: must be 0 or more",
-        ),
-        (
-            "[controller]\nnesting_limit_subprogram = 0\n",
-            "16: controller.nesting_limit_subprogram = 0: must be 1 or more (unit: levels)",
-        ),
-        ("[times]\ntool_change_s = -1\n", "16: times.tool_change_s = -1: must be 0 or more (unit: s)"),
-        (
-            "[controller]\ninterpolation_period_s = 1\n",
-            "16: controller.interpolation_period_s = 1: must be 0.1 or less (unit: s)",
-        ),
-        (
-            "[controller]\nprogram_memory_bytes = 1.5\n",
-            "16: controller.program_memory_bytes = 1.5: must be a whole number (unit: bytes)",
-        ),
-        (
-            "[controller]\ncalculator_decimal_point = 1\n",
-            "16: controller.calculator_decimal_point = 1: must be true or false",
-        ),
-        (
-            "[input]\nwork_offsets = {G60 = [1, 2, 3]}\n",
-            '16: input.work_offsets: G60 is not a work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"',
-        ),
-        (
-            "[emission]\nblock_period_s = 0.0125\n",
-            "16: emission.block_period_s = 0.0125: must be a whole multiple of "
-            "controller.interpolation_period_s = 0.001",
-        ),
-        (
-            "[emission]\nblock_period_s = 0.004\n",
-            "16: emission.block_period_s = 0.004: must not be below controller.block_time_s = 0.005",
-        ),
-        (
-            '[emission]\nprologue = ["%"]\n',
-            '16: emission.prologue = ["%"]: the line "%" has a character other than capital letters, '
-            "digits and signs allowed in a program (no %, no end of line)",
-        ),
-        (
-            "[emission]\nprologue = ['" + "X" * 61 + "']\n",
-            f'15: emission: the line "{"X" * 61}" has 61 characters, emission.max_line_length is 60',
-        ),
-        ('[emission]\nfailed_suffix = "/../x"\n', None),
+        ("[[axes.x.modes]]\nfrequency_hz = 46\ndamping_ratio = 1.0\n", "17: axes.x.modes.1.damping_ratio = 1.0: must"),
+        (MODE + "[[axes.x.modes]]\nfrequency_hz = true\n", "19: axes.x.modes.2.frequency_hz = true: must be a number"),
+        (f"[emission]\nprologue = ['{'X' * 61}']\n", "has 61 characters, emission.max_line_length is 60"),
+        ('[emission]\nfailed_suffix = "/../x"\n', "failed_suffix"),
         ("[tolerances]\n", "15: tolerances = {}: unknown key; did you mean tolerance?"),
-        ("[controller]\nbogus = 1\n", None),
-        ("axes = 3\n", None),
+        ("[controller]\nbogus = 1\n", "bogus"),
+        ("axes = 3\n", ""),
     ],
 )
-def test_bad_values(tables: str, message: str | None) -> None:
-    found = problems(MINIMAL + tables)
-    if message is not None:
-        assert message in found
+def test_bad_tables(tables: str, message: str) -> None:
+    assert any(message in problem for problem in problems(MINIMAL + tables))
 
 
 def test_every_problem_is_listed_once() -> None:
     found = problems("[axes.x]\nmax_feed_mm_per_min = -1\nrapid_mm_per_min = inf\n[nonsense]\n")
     assert len(found) == len(set(found))
-    for part in (
-        "name: required",
-        "max_feed_mm_per_min = -1",
-        "rapid_mm_per_min = inf",
-        "axes.y: required",
-        "axes.z: required",
-        "nonsense",
-    ):
+    for part in ("name: req", "max_feed_mm_per_min = -1", "rapid_mm_per_min = inf", "axes.y: ", "axes.z: ", "nonsense"):
         assert sum(part in line for line in found) == 1, part
 
 
 @pytest.mark.parametrize(
-    ("text", "start"),
-    [
-        ("a = 1\n\n[b\n", "3: "),
-        ('name = """', "1: "),
-        ("x = 1\nx = 2\n", "2: "),
-        ("\ufeff", " "),
-    ],
+    ("text", "start"), [("a = 1\n\n[b\n", "3: "), ('name = """', "1: "), ("x = 1\nx = 2\n", "2: "), ("\ufeff", " ")]
 )
 def test_bad_toml_gives_the_line(text: str, start: str, tmp_path: Path) -> None:
     file = tmp_path / "bad.toml"
@@ -441,36 +362,20 @@ def test_unknown_name_lists_the_builtin_machines() -> None:
         Machine.load("vx600.toml")
 
 
+UNITS = (
+    "mm_per_min:mm/min mm_s2:mm/s² mm_s3:mm/s³ kg_m2:kg·m² kg:kg n_per_um:N/µm n_s_per_m:N·s/m n_m_s_per_rad:N·m·s/rad "
+    "n_m:N·m nm:N·m w:W mm_per_s:mm/s hz:Hz um:µm percent:% deg:degrees bytes:bytes per_s:1/s s:s mm:mm inch:inch"
+)
+
+
 def test_every_key_has_a_meaning_and_every_dimensioned_key_a_unit_that_agrees_with_its_name() -> None:
-    units = {
-        "_mm_per_min": "mm/min",
-        "_mm_s2": "mm/s²",
-        "_mm_s3": "mm/s³",
-        "_kg_m2": "kg m²",
-        "_kg": "kg",
-        "_n_per_um": "N/µm",
-        "_n_s_per_m": "N s/m",
-        "_n_m_s_per_rad": "N m s/rad",
-        "_n_m": "N m",
-        "_nm": "N m",
-        "_w": "W",
-        "_mm_per_s": "mm/s",
-        "_hz": "Hz",
-        "_um": "µm",
-        "_percent": "%",
-        "_deg": "degrees",
-        "_bytes": "bytes",
-        "_per_s": "1/s",
-        "_s": "s",
-        "_mm": "mm",
-        "_inch": "inch",
-    }
+    units = dict(pair.split(":") for pair in UNITS.split())
     for value in Machine.load("vx500").values():
         name = value.key.rpartition(".")[2]
         assert value.meaning, value.key
-        suffix = next((end for end in units if name.endswith(end)), None)
+        suffix = next((end for end in units if name.endswith(f"_{end}")), None)
         if suffix is not None and not name.startswith("feed_decimals"):
-            assert value.unit == units[suffix], value.key
+            assert value.unit == units[suffix].replace("·", " "), value.key
 
 
 def test_origin_tells_file_from_default() -> None:
@@ -522,62 +427,20 @@ def test_show_json_is_alone_on_standard_output(capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.parametrize(
-    ("argv", "parts"),
+    ("words", "said"),
     [
-        (["machine", "show", "nothing.toml"], ["nothing.toml: no such file"]),
-        (
-            ["machine", "show", "no/such/machine.toml"],
-            ["no/such/machine.toml: the folder no/such does not exist"],
-        ),
-        (["machine", "show", "vx600"], ["vx600", "built in: kimm004, vx500"]),
-        (["machine", "show", "vx500", "--json", "no/x.json"], ["no/x.json: the folder no does not exist"]),
-        (["machine", "init", "-o", "no/x.toml"], ["no/x.toml: the folder no does not exist"]),
-        (["machine", "init", "-o", "/dev/full", "--force"], ["/dev/full: No space left on device"]),
+        ("show nothing.toml", "nothing.toml: no such file"),
+        ("show no/such/machine.toml", "no/such/machine.toml: the folder no/such does not exist"),
+        ("show vx600", "built in: kimm004, vx500"),
+        ("show vx500 --json no/x.json", "no/x.json: the folder no does not exist"),
+        ("init -o no/x.toml", "no/x.toml: the folder no does not exist"),
+        ("init -o /dev/full --force", "/dev/full: No space left on device"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_2(
-    argv: list[str],
-    parts: list[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(argv) == 2
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1
-    assert err.startswith("shapegcode: ")
-    for part in parts:
-        assert part in err
-
-
-def test_debug_shows_the_traceback(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError):
-        main(["machine", "show", str(tmp_path / "no.toml"), "--debug"])
-
-
-@pytest.mark.parametrize("argv", [[], ["bogus"], ["machine"], ["machine", "show"], ["machine", "show", "a", "b"]])
-def test_wrong_arguments_exit_2(argv: list[str]) -> None:
-    assert main(argv) == 2
-
-
-def test_help_names_every_command_and_imports_nothing_heavy() -> None:
-    code = (
-        "import sys; from shapegcode.cli import main; main(['--help']); "
-        "print([m for m in ('matplotlib', 'rich', 'pydantic', 'scipy') if m in sys.modules])"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    for command in COMMANDS:
-        assert command.name in run.stdout
-    assert run.stdout.endswith("[]\n")
-
-
-def test_full_disk_behind_standard_output_is_bad_input() -> None:
-    code = "import sys; from shapegcode.cli import main; sys.exit(main(['machine', 'show', 'vx500']))"
-    with open("/dev/full", "w") as full:
-        run = subprocess.run([sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
-    assert run.returncode == 2
-    assert run.stderr == "shapegcode: standard output: No space left on device\n"
+def test_bad_input_is_one_line_and_exit_2(words: str, said: str, tmp_path: Path) -> None:
+    done = run(tmp_path, "machine", *words.split())
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("shapegcode: ") and said in done.stderr
 
 
 def test_write_text_keeps_the_old_file_when_it_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -599,15 +462,6 @@ def test_write_text_keeps_the_old_file_when_it_fails(tmp_path: Path, monkeypatch
     assert file.stat().st_mode & 0o777 == 0o640
 
 
-def test_write_text_follows_a_link(tmp_path: Path) -> None:
-    file, link = tmp_path / "real", tmp_path / "link"
-    file.write_text("old")
-    link.symlink_to(file)
-    write_text(link, "new")
-    assert link.is_symlink()
-    assert file.read_text() == "new"
-
-
 def test_json_refuses_nan(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="JSON compliant"):
         write_json({"a": math.nan}, tmp_path / "x.json")
@@ -615,9 +469,6 @@ def test_json_refuses_nan(tmp_path: Path) -> None:
 
 
 def test_known_keys_are_listed_with_the_first_unknown_one_of_a_table() -> None:
-    text = Machine.load("vx500").to_toml().replace("[verdict]", "[verdict]\nqqqq = 1\nzzzzz = 2 ", 1)
-    with pytest.raises(MachineError) as refused:
-        Machine.from_toml(text, "m.toml")
-    first, second = str(refused.value).splitlines()
+    first, second = problems(Machine.load("vx500").to_toml().replace("[verdict]", "[verdict]\nqqqq = 1\nzzzzz = 2 ", 1))
     assert "verdict.qqqq = 1: unknown key; known here: " in first
     assert second.endswith("verdict.zzzzz = 2: unknown key")

@@ -1,7 +1,5 @@
 """Axes beside the path: jog, soft limits, offset, backlash, emergency braking; against closed forms and differences."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -99,7 +97,6 @@ def test_increments_add_up_and_flushed_goes_on_from_there() -> None:
         assert made.push_line([0, 0, 0], 10.0) == sg.PushResult.flushing
     rows.append(made.step(800))
     position = made.flushed()
-    assert position is not None
     np.testing.assert_allclose(position, rest - [12.0, 0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(rows[-1][-1], position, atol=1e-9)
     assert made.push_line([0, 0, 0], 80.0, stop_at_end=True) == sg.PushResult.accepted
@@ -118,7 +115,6 @@ def test_a_probe_while_an_axis_is_jogged_stops_it() -> None:
     np.testing.assert_array_equal(latched, rows[-1][-1])
     rows.append(made.step(300))
     position = made.flushed()
-    assert position is not None
     late = made.delay_periods + 1.0
     assert 0.0 < latched[2] - position[2] <= 20.0 * (ramp_s(20.0) / 2.0 + (late + 4.0) * PERIOD_S)
     assert largest_share(np.concatenate(rows)) <= 1.001
@@ -315,7 +311,6 @@ def test_what_a_retrace_answers() -> None:
     made.flush()
     rows.append(made.step(100))
     position = made.flushed()
-    assert position is not None
     np.testing.assert_allclose(position, rows[-1][-1], atol=1e-9)
     made.resume()
     made.push_line([50, 10, 0], 50.0, stop_at_end=True)
@@ -334,7 +329,6 @@ def test_an_emergency_stop_a_jog_and_flushed_go_on_where_the_axes_are() -> None:
     assert made.jog_by(1, 5.0, 50.0) == ACCEPTED
     rows = [made.step(500)]
     position = made.flushed()
-    assert position is not None
     np.testing.assert_allclose(position, rows[-1][-1], atol=1e-9)
     rows.append(made.step(5))
     np.testing.assert_allclose(rows[-1], np.tile(position, (5, 1)), atol=1e-9)

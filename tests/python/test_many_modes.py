@@ -1,7 +1,5 @@
 """Structures with many modes: found over frequency, none asserted that is not there, each within its interval."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -30,7 +28,6 @@ def hold(seed: int) -> tuple[int, int, int, list[bool]]:
     """Modes to find, found ones, false ones, and whether the intervals hold the truth, of a hard record."""
     hard = hard_record(seed)
     result = identify(list(hard.records))
-    assert result.prepared is not None
     assert all(mode.left_out for mode in result.refused if "harder tip" in mode.refusal)
     excited = max(each.excited_hz or 0.0 for each in result.prepared.usable)
     wanted = to_find(hard, excited)
@@ -41,10 +38,7 @@ def hold(seed: int) -> tuple[int, int, int, list[bool]]:
         for mode in wanted
         for each in [min(result.modes, key=lambda one: abs(one.frequency_hz.value - mode.frequency_hz))]
         if near(mode, each)
-        for estimate, truth in (
-            (each.frequency_hz, mode.frequency_hz),
-            (each.damping_ratio, mode.damping_ratio),
-        )
+        for estimate, truth in ((each.frequency_hz, mode.frequency_hz), (each.damping_ratio, mode.damping_ratio))
     ]
     return len(wanted), found, false, inside
 

@@ -1,7 +1,5 @@
 """`shapegcode measure` as a shell sees it: tables, JSON, pictures, exit codes."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Peak memory of a conversion: what a block more costs."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Virtual metrology against closed forms, SciPy and brute force."""
 
-from __future__ import annotations
-
 import functools
 import math
 import random
@@ -338,7 +336,6 @@ def specimen(feed: int, name: str) -> MeasuredRegion:
 
 def arc_of(region: MeasuredRegion) -> FittedCircle:
     arc = region.sections[1].arc
-    assert arc is not None
     assert arc.response is not None
     return arc.response
 

@@ -1,7 +1,5 @@
 """Minimal multi-mode shapers: the figures of paper 002, SciPy's own searches, and vibration simulated step by step."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 
@@ -111,8 +109,7 @@ def brute_force_two_modes(modes: tuple[Mode, Mode], longest_s: float) -> list[Fl
 
 
 @pytest.mark.parametrize(
-    ("modes", "longest_s"),
-    [((Mode(1.0, 0.0), Mode(2.7, 0.0)), 1.6), ((Mode(1.0, 0.06), Mode(3.4, 0.01)), 1.6)],
+    ("modes", "longest_s"), [((Mode(1.0, 0.0), Mode(2.7, 0.0)), 1.6), ((Mode(1.0, 0.06), Mode(3.4, 0.01)), 1.6)]
 )
 def test_two_modes_are_complete_by_brute_force(modes: tuple[Mode, Mode], longest_s: float) -> None:
     listed = [shaper.times_s[1:] for shaper in minimal_shapers(modes, longest_s).shapers]

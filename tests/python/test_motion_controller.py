@@ -1,8 +1,6 @@
 """The motion controller against closed forms and NumPy: times of single moves, shapers as convolutions, limits by
 differences; and what it answers."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import threading

@@ -1,7 +1,5 @@
 """Programs of a machine whose mode moves: shaped by shapers that follow, judged with the mode where it is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -43,7 +41,6 @@ def command(path: _core.Path, grid: Grid, machine: sg.Machine, offset: Offset) -
     writer = RegionWriter(model, grid)
     options = writer.options(model.limits(), writer.tolerance(1e6), offset)
     piece = _core.RegionShaper(path, grid.fir, [], options).next(1 << 30)
-    assert piece is not None
     rows = np.empty((len(piece.grid_mm) + len(piece.middle_mm), 3))
     rows[::2], rows[1::2] = piece.grid_mm, piece.middle_mm
     return rows
@@ -61,7 +58,6 @@ def test_the_shaped_command_is_the_followed_one() -> None:
     tolerance = RegionWriter(model, grid).tolerance(1e6)
     options = RegionWriter(model, alone).options(model.limits(), tolerance, offset)
     bare = _core.RegionShaper(region.path, alone.fir, [], options).next(1 << 30)
-    assert bare is not None
     before = np.empty((len(bare.grid_mm) + len(bare.middle_mm), 3))
     before[::2], before[1::2] = bare.grid_mm, bare.middle_mm
     expected = grid.track.following().on_finer_grid(2).apply(before)

@@ -1,7 +1,5 @@
 """Modes that move: the machine's tables, the plant that varies, the shapers that follow, and what they leave."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -286,7 +284,6 @@ def test_the_shaper_of_a_mean_has_the_least_spread() -> None:
     """Against a search over the free taps of a short grid: one mode on four taps leaves one freedom."""
     mode, period = Mode(46.0, 0.02), 0.005
     shaper = shaper_of_mean([mode], period, 4, 0.0065)
-    assert shaper is not None
     assert shaper.mean_s == pytest.approx(0.0065, rel=1e-12)
     steps = np.arange(5.0)
     terms = np.exp(-mode.pole * steps * period)

@@ -1,7 +1,5 @@
 """A machine learned from logs of NIST's test bed, against published times of runs it never saw (evidence.md)."""
 
-from __future__ import annotations
-
 import dataclasses
 import statistics
 from pathlib import Path

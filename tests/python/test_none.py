@@ -1,7 +1,5 @@
 """None in place of an object of the core is refused: it has no value to read."""
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

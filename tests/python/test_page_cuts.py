@@ -1,7 +1,5 @@
 """Cuts to choose from on a page: sums and command against NumPy, sorting, ten thousand rows, paper, no script."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

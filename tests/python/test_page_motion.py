@@ -1,7 +1,5 @@
 """Motion on a page, in a browser: path, texts, sliders and curves show the same place, and what one clicks finds it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -99,7 +97,6 @@ def test_it_opens_at_the_largest_deviation_of_what_was_emitted(chrome: Browser, 
     assert f"at line {line}," in chrome.one("#worst-said").text
     assert float(chrome.one("#clock").get_attribute("value")) == pytest.approx(float(place["time s"]), abs=2e-3)
     high = re.search(r"([\d.]+)\s*\(middle", chrome.one("#colours").text)
-    assert high is not None
     of_both = max(largest, largest_deviation_um(original, original, machine)[0])
     assert float(high[1]) == pytest.approx(of_both, rel=0.01), "colours are for the cuts of both"
     chrome.keep("worst-spot")

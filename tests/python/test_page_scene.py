@@ -1,7 +1,5 @@
 """Motion on a page: the spectrum against SciPy's, thinning by its own promise, deviations against closed forms."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Ko, Lim and Hong, 2023 (paper 000): orbit error, program listing, emitted blocks, times."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 
@@ -21,12 +19,7 @@ from shapegcode.results.json import schema
 Vector = npt.NDArray[np.float64]
 
 # Feed mm/s, arc feed ratio, orbit error in % of the zeta = .02 model, time added by the ideal command in %.
-CONDITIONS = [
-    (100, 0.60, 0.0270, 31.5),
-    (200, 0.60, 0.1074, 33.4),
-    (100, 0.99, 0.0732, 2.0),
-    (200, 0.99, 0.2908, 3.3),
-]
+CONDITIONS = [(100, 0.60, 0.0270, 31.5), (200, 0.60, 0.1074, 33.4), (100, 0.99, 0.0732, 2.0), (200, 0.99, 0.2908, 3.3)]
 #: The grid on which the paper integrates speed into positions.
 LISTING_PERIOD_S = 5.015e-3
 #: Stretches of the abridged listing at 100 mm/s and 40 %: printed points and F words of the blocks that end there.

@@ -1,7 +1,5 @@
 """Kim and Ko, 2001 (docs/evidence/paper001.md): its page against brute force and reference values."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Park, Hong and Danielson, 2009 (docs/evidence/paper002.md): its page against closed forms and reference values."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any

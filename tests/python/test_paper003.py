@@ -1,7 +1,5 @@
 """Back, Ko and Kim, 2003 (docs/evidence/paper003.md): its page against closed forms, SciPy and printed figures."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """A shaper for each axis: its filters against a linear program written out, and programs judged independently."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

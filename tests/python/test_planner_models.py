@@ -1,7 +1,5 @@
 """The planners of open controls as they are modelled, beside their own and beside independent calculations."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math
@@ -14,15 +12,7 @@ import pytest
 import shapegcode as sg
 from acceptance import machine_with
 from judge import Mode, residual_um
-from planner_references import (
-    PERIOD_S,
-    Grbl,
-    distance_in_time,
-    grbl_lines,
-    klipper_points,
-    path_of_text,
-    smoothed,
-)
+from planner_references import PERIOD_S, Grbl, distance_in_time, grbl_lines, klipper_points, path_of_text, smoothed
 from shapegcode import _core
 from shapegcode.machine.controller import PLANNER_NAMES
 from shapegcode.model.machine_model import fanuc_model

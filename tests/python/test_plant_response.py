@@ -1,7 +1,5 @@
 """Whole records through base-excited modes, against SciPy's filter and simulation of the same plant."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

@@ -1,7 +1,5 @@
 """Pictures: complete files, honest curves, the right figures."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 from itertools import pairwise
@@ -44,10 +42,7 @@ def traces(samples: int = 900) -> list[Trace]:
     t = np.arange(samples) * 1e-3
     swing = np.zeros_like(command)
     swing[:, 0] = 0.02 * np.sin(2 * np.pi * 46 * t)
-    return [
-        Trace("original", 1e-3, command, command + swing),
-        Trace("emitted", 1e-3, command, command + swing / 10),
-    ]
+    return [Trace("original", 1e-3, command, command + swing), Trace("emitted", 1e-3, command, command + swing / 10)]
 
 
 @pytest.mark.parametrize("ending", ["png", "svg"])

@@ -1,7 +1,5 @@
 """A probe and a flush, by closed forms; random sessions of an operator: tests/cpp/operator_session.cpp."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -37,7 +35,6 @@ def test_a_probe_stops_the_motion_on_its_path(filters: dict[str, Any], lead: int
     seen.append(step(400))
     assert made.state.activity == sg.Activity.idle
     position = made.flushed()
-    assert position is not None
     assert made.flushed() is None
     rest = seen[-1][-1]
     np.testing.assert_allclose(position, rest, atol=1e-9)
@@ -60,7 +57,6 @@ def test_a_flush_at_rest_in_a_dwell_and_twice() -> None:
     made.flush()
     made.step(2)
     position = made.flushed()
-    assert position is not None
     np.testing.assert_array_equal(position, np.zeros(3))
     made.push_line([5, 0, 0], 50.0, stop_at_end=True)
     made.push_dwell(math.pi)
@@ -75,7 +71,6 @@ def test_a_flush_at_rest_in_a_dwell_and_twice() -> None:
     assert made.push_line([6, 0, 0], 50.0) == sg.PushResult.flushing
     made.step(3)
     position = made.flushed()
-    assert position is not None
     np.testing.assert_array_equal(position, [5.0, 0.0, 0.0])
     made.push_line([5, 3, 0], 50.0, stop_at_end=True)
     np.testing.assert_array_equal(made.run()[-1], [5.0, 3.0, 0.0])

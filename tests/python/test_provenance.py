@@ -1,7 +1,5 @@
 """Where values come from: measured, dump, inherited, assumed; it stays so through every command that writes a file."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

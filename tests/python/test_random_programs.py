@@ -4,8 +4,6 @@ with it: the same motion, the same figures, the same time, and no more speed tha
 A seed gives one program: `PYTHONPATH=tests/oracles python -c "from judge.draws import draw; print(draw(7).text)"`.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

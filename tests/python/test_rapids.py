@@ -1,7 +1,5 @@
 """Shaped rapids: what is written is held against the judge's interpreter, player and plant, and rapids by hand."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -3,8 +3,6 @@
 Recordings: tests/benchmarks/data/recorded_planners.npz (its README says of what) and tests/golden/linuxcnc.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 from pathlib import Path

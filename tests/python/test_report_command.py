@@ -1,7 +1,5 @@
 """``shapegcode report`` and ``--html``: pages made at once and later, and what is said when something has changed."""
 
-from __future__ import annotations
-
 import html
 import json
 import re
@@ -160,7 +158,6 @@ def test_the_page_of_feeds_has_the_cutting_force(tmp_path: Path) -> None:
     tool, stock = sg.Tool.load(golden / "pocket_tool.toml"), sg.Stock.load(golden / "pocket_stock.toml")
     schedule = sg.schedule_feed(sg.Program.read(golden / "POCKET.NC", machine), machine, tool, stock)
     scene = schedule.page().scene
-    assert scene is not None
     for variant, peak in zip(scene.variants, ("original", "emitted"), strict=True):
         expected = getattr(schedule.resultant_force_n, peak).max
         assert variant.channels["force"].max() == pytest.approx(expected, rel=0.05)

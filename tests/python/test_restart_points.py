@@ -1,7 +1,5 @@
 """Restart points inside of shaped cuts, and what single block does there, by the judge's interpreter and player."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path
@@ -192,7 +190,6 @@ def test_without_a_place_of_rest_there_are_points_only_where_stops_are_asked_for
     note = next(each.text for each in stopped.at_the_control if each.topic == "restart")
     assert len(stopped.restart_points) >= 2
     told = re.search(r"(\d+) of them are stops that were added .*: ([\d.]+) s more, and a dwell mark", note)
-    assert told is not None
     cost_s = stopped.cutting_time_s.emitted - none.cutting_time_s.emitted
     assert float(told[2]) == pytest.approx(cost_s, abs=0.1) and cost_s > 0.05
     moves = cuts(stopped.text.decode())
@@ -207,7 +204,6 @@ def test_what_single_block_does_is_as_the_independent_player_has_it() -> None:
     conversion = converted(zigzag(1))
     note = next(each.text for each in conversion.at_the_control if each.topic == "single block")
     told = re.search(r"in lines (\d+) to (\d+): .* \((\d+) stops, .*marks of up to (\d+) µm", note)
-    assert told is not None
     assert "graphic display, machine lock, or dry run above the part" in note
     first, last, stops, mark_um = map(int, told.groups())
     moves = [move for move in cuts(conversion.text.decode()) if first <= move.line <= last and move.length > 0.0]

@@ -1,7 +1,5 @@
 """Results read back from their JSON: nothing lost, nothing invented; what is wrong with a file is said."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import json

@@ -1,7 +1,5 @@
 """Robust and least-worst grid shapers, held against the residual formula, other linear programs and EI shapers."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Sequence
@@ -223,7 +221,6 @@ def test_refusal_shows_the_nearest() -> None:
     match = re.search(
         r"the longest allowed reaches ([\d.]+) %; (\d+) ms suffices; a period of ([\d.]+) ms reaches", text
     )
-    assert match is not None
     assert float(match[1]) == pytest.approx(100.0 * least_possible(PAPER_BANDS, 0.005, 4), rel=0.005)
     assert least_possible(PAPER_BANDS, 0.005, round(int(match[2]) / 5)) <= 0.01
     assert least_possible(PAPER_BANDS, 0.005, round(int(match[2]) / 5) - 2) > 0.01
@@ -294,17 +291,14 @@ def test_robust_grid_compares_the_periods() -> None:
     durations_s = [each.shaper.duration_s for each in choice.candidates if each.shaper is not None]
     assert durations_s[:5] == pytest.approx([0.022, 0.024, 0.024, 0.030, 0.042])  # as docs/concepts/shapers.md says
     for each in choice.candidates[:4]:
-        assert each.shaper is not None
         assert each.shaper.duration_s == pytest.approx(minimax_robust(PAPER_BANDS, each.period_s).shaper.duration_s)
     assert choice.candidates[-1].shaper is None
     assert "z close to +1" in choice.candidates[-1].refusal
     assert choice.shaper.duration_s == pytest.approx(min(durations_s))
-    assert choice.worst_residual is not None
     assert worst(choice.shaper, PAPER_BANDS) <= choice.worst_residual <= 0.05
     assert choice.note == ""
     alone = robust_candidate(PAPER_BANDS, choice.period_s)
     assert (alone.shaper, alone.worst_residual) == (choice.shaper, choice.worst_residual)
-    assert alone.shaper is not None
     assert alone.shaper.variance_s2 == choice.shaper.variance_s2
 
 

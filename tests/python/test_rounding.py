@@ -1,7 +1,5 @@
 """Vibration-aware rounding, judged on the emitted text by an interpreter, player and plant of their own."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rounding_figures import PATHS, PERIODS_S, UNITS, Outcome, machine, outcomes, path

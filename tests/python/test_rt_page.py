@@ -1,8 +1,6 @@
 """What docs/reference/shapegcode_rt.md says of the library that a control embeds: its tests are there, its calls stand
 in the table, it is small, it asks for no other symbol, and no call of it lets an exception out."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from pathlib import Path

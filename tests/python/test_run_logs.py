@@ -1,7 +1,5 @@
 """Logs of runs: what is read of them, what is bridged and said, what is refused."""
 
-from __future__ import annotations
-
 import csv
 import gzip
 import re
@@ -61,7 +59,6 @@ def refused(folder: Path, text: str | bytes, message: str, name: str = "run.txt"
 
 
 def values(signal: sg.Signal | None) -> list[tuple[float, float]]:
-    assert signal is not None
     return [(round(float(time), 6), float(value)) for time, value in zip(signal.time_s, signal.value, strict=True)]
 
 
@@ -101,7 +98,6 @@ def test_values_of_nist_are_those_of_the_lines() -> None:
             for time, row in zip(when, rows, strict=True)
             if row[1] == item and start - 1.0 <= time <= end
         ]
-        assert signal is not None
         np.testing.assert_allclose(signal.time_s, [time for time, _ in expected], atol=2e-6)
         np.testing.assert_array_equal(signal.value, [value for _, value in expected])
     assert run.program == "NIST_MTC_CRADA_PLATE-13.NC"

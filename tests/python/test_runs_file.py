@@ -1,7 +1,5 @@
 """RUNS.toml: which program made which log, and what is wrong in it."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

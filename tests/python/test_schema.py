@@ -1,7 +1,5 @@
 """The JSON Schemas of every result: valid themselves, their keys stable."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

@@ -1,7 +1,5 @@
 """LinuxCNC's interpreter, which shares nothing with the package, reads the same programs: same places, paths, feeds."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

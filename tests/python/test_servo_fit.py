@@ -1,7 +1,5 @@
 """Logs of commands and actual positions: what the position loop is, what it explains, and what cannot be told."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -95,13 +93,9 @@ def test_a_simulated_capture_gives_its_loop_back(dead_s: float, gain: float, for
         ("feed-forward", forward, 0.01),
     ):
         found = axis.parameter(name)
-        assert found is not None
         assert found.value == pytest.approx(truth, abs=slack), name
-        assert found.low is not None
-        assert found.high is not None
         assert found.low - slack / 5.0 <= truth <= found.high + slack / 5.0, name
     model = axis.model("dead time and servo lag")
-    assert model is not None
     # What is left is the noise of the encoder.
     assert model.rest == pytest.approx(2e-4, rel=0.2)
     assert axis.lag_rms > 100.0 * model.rest
@@ -126,11 +120,8 @@ def test_a_drive_with_friction_is_told_from_a_lag(tmp_path: Path) -> None:
     file = capture(tmp_path / "a.json", {2: (way, actual)}, noise=1e-4)
     (axis,) = sg.fit_servo(file, drive=True).axes
     lag, drive = axis.model("dead time and servo lag"), axis.model("drive")
-    assert lag is not None
-    assert drive is not None
     assert drive.rest < 0.5 * lag.rest
     found = axis.parameter("drive: position gain")
-    assert found is not None
     assert found.value == pytest.approx(gain, rel=0.15)
 
 
@@ -141,12 +132,10 @@ def test_the_measured_capture() -> None:
     for number, least in (("1", 80.0), ("2", 95.0), ("6", 90.0)):
         axis = axes[number]
         best = axis.best
-        assert best is not None
         assert best.explained_percent is not None
         assert best.explained_percent > least
         assert best.rest < 0.01 * axis.lag_rms * (1.0 if number != "6" else 1.2)
         lag = axis.parameter("lag at constant speed")
-        assert lag is not None
         assert lag.value == pytest.approx(8.245e-3, abs=0.01e-3)
     # 8.25 ms: command as late as that less encoder is the contour deviation that the control gives, to 0.4 µm.
     capture = sg.read_edge_json(MEASURED)
@@ -167,7 +156,6 @@ def test_axes_that_tell_nothing(tmp_path: Path) -> None:
     )
     lagging, running, resting = sg.fit_servo(file).axes
     gain = lagging.parameter("position gain")
-    assert gain is not None
     assert gain.value is None
     assert "no lag remains to determine it" in gain.note
     assert running.note == "never changes its speed"
@@ -222,7 +210,6 @@ def test_a_csv_log(tmp_path: Path) -> None:
     file.write_text("\n".join(["time_ms,X,X_act", *rows]))
     (axis,) = sg.fit_servo(file).axes
     gain = axis.parameter("position gain")
-    assert gain is not None
     assert gain.value == pytest.approx(30.0, rel=0.02)
     file.write_text("\n".join(["time_ms,X", *(row.rpartition(",")[0] for row in rows)]))
     with pytest.raises(sg.RecordError, match="no actual positions"):
@@ -239,7 +226,6 @@ def test_a_command_that_jumps_is_divided_there(tmp_path: Path) -> None:
     assert axis.unit == "mm"
     assert axis.top_speed == pytest.approx(200.0, rel=0.01)
     gain = axis.parameter("position gain")
-    assert gain is not None
     assert gain.value == pytest.approx(40.0, rel=0.02)
     assert any("its command has a step, first at" in warning for warning in found.warnings)
 
@@ -250,7 +236,6 @@ def test_of_a_long_log_the_liveliest_windows_are_taken(tmp_path: Path) -> None:
     found = sg.fit_servo(capture(tmp_path / "a.json", {1: (way, simulated(way, 0.006, 40.0, 0.5))}, noise=2e-4))
     assert found.warnings == ("of 47751 samples the 40000 with most changes of an axis' speed were used",)
     gain = found.axes[0].parameter("position gain")
-    assert gain is not None
     assert gain.value == pytest.approx(40.0, rel=0.02)
 
 

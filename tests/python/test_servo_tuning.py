@@ -1,7 +1,5 @@
 """Auto-servo-tuning files: modes with the motor held, from a chain of inertias solved as a matrix; what is refused."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A file of several O programs: `--program all`, and one number in two folders of a memory punch."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from pathlib import Path
@@ -71,9 +69,7 @@ def test_two_programs_without_any_difference_in_name_have_places(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    "words",
-    [["time"], ["check"], ["simulate"], ["measure", "--tool-diameter", "6mm"]],
-    ids=lambda words: words[0],
+    "words", [["time"], ["check"], ["simulate"], ["measure", "--tool-diameter", "6mm"]], ids=lambda words: words[0]
 )
 def test_every_program_has_its_table_and_its_place_in_the_json(words: list[str], tmp_path: Path) -> None:
     punch(tmp_path)

@@ -1,7 +1,5 @@
 """The choice among shapers: the Pareto front by brute force, the rule of the recommendation, what is refused."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

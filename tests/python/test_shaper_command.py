@@ -1,7 +1,5 @@
 """``shapegcode shaper``: exit codes, JSON, messages."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

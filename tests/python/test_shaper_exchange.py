@@ -1,7 +1,5 @@
 """Shapers that are exchanged in motion: limits, tolerance, derivatives, and what is left of a vibration behind them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The families of shapers: residuals by simulation and by a formula of its own, on continuous times and on grids."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

@@ -1,7 +1,5 @@
 """Shaper designs: the reference figures of 46 and 131 Hz, and residuals judged by NumPy and by simulation alone."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import pickle
@@ -108,13 +106,7 @@ def test_shaper_refuses_what_is_none(times_s: list[float], amplitudes: list[floa
 # --- designs of the core ------------------------------------------------------------------------------------
 
 
-@given(
-    st.floats(1.0, 200.0),
-    st.floats(0.0, 0.5),
-    st.floats(1.0, 200.0),
-    st.floats(0.0, 0.5),
-    st.floats(0.0, 0.5),
-)
+@given(st.floats(1.0, 200.0), st.floats(0.0, 0.5), st.floats(1.0, 200.0), st.floats(0.0, 0.5), st.floats(0.0, 0.5))
 def test_residual_ratio_is_the_formula(f: float, zeta: float, g: float, eta: float, off: float) -> None:
     shaper = convolve(zv(Mode(f, zeta)), zv(Mode(g, eta)))
     for frequency, damping in [(f, zeta), (g, eta)]:
@@ -216,8 +208,7 @@ def test_grid_polynomial_reference_and_refusal() -> None:
 
 
 @pytest.mark.parametrize(
-    ("period_s", "duration_s"),
-    [(0.001, 0.012), (0.002, 0.012), (0.004, 0.016), (0.005, 0.02), (0.008, 0.096)],
+    ("period_s", "duration_s"), [(0.001, 0.012), (0.002, 0.012), (0.004, 0.016), (0.005, 0.02), (0.008, 0.096)]
 )
 def test_shortest_non_negative_durations_of_the_machine(period_s: float, duration_s: float) -> None:
     shaper = shortest_non_negative(PAPER_MODES, period_s)
@@ -315,8 +306,7 @@ def test_acceptance_of_random_pairs(pairs: int) -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(
-    st.lists(st.tuples(st.floats(10.0, 200.0), st.floats(0.0, 0.1)), min_size=1, max_size=4),
-    st.sampled_from(PERIODS_S),
+    st.lists(st.tuples(st.floats(10.0, 200.0), st.floats(0.0, 0.1)), min_size=1, max_size=4), st.sampled_from(PERIODS_S)
 )
 def test_any_number_of_modes(values: list[tuple[float, float]], period_s: float) -> None:
     modes = [Mode(f, zeta) for f, zeta in values]
@@ -337,7 +327,6 @@ def test_block_period_of_the_machine_is_5_ms() -> None:
     assert choice.shaper.duration_s == pytest.approx(0.02, rel=1e-12)
     assert [round(each.period_s * 1e3) for each in choice.candidates] == list(range(5, 21))
     at_8_ms = choice.candidates[3].shaper
-    assert at_8_ms is not None
     assert at_8_ms.duration_s == pytest.approx(0.096)
 
 

@@ -1,7 +1,5 @@
 """Completion in real shells, and manual pages as a real formatter reads them."""
 
-from __future__ import annotations
-
 import os
 import pty
 import re

@@ -1,7 +1,5 @@
 """``shapegcode simulate``: the motion of a whole program in time, its files and figures, with either plant."""
 
-from __future__ import annotations
-
 import dataclasses
 import errno
 import json

@@ -1,7 +1,5 @@
 """Smooth shapers: held against Kalico's published polynomials, SciPy's simulation and a quadrature of their own."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

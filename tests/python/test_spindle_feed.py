@@ -1,7 +1,5 @@
 """What a feed is of and what it counts in: closed forms; a thread against the angle of its spindle."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

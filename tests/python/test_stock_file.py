@@ -3,8 +3,6 @@
 The shape of an allowance is held against plane geometry: distances from walls and from the centres of arcs, and areas.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence
@@ -39,13 +37,7 @@ def arc(start: Sequence[float], end: Sequence[float], centre: Sequence[float], d
 
 def corner(straight: float = 30.0) -> _core.Path:
     """Inside corner of paper 001, case 1: finished radius 8, walls at y = -4 and x = 8, corner's centre at (0, 4)."""
-    return _core.Path(
-        [
-            line((-straight, 0), (0, 0)),
-            arc((0, 0), (4, 4), (0, 4), 90),
-            line((4, 4), (4, 4 + straight)),
-        ]
-    )
+    return _core.Path([line((-straight, 0), (0, 0)), arc((0, 0), (4, 4), (0, 4), 90), line((4, 4), (4, 4 + straight))])
 
 
 def rectangle(width: float, depth: float, z: float = Z) -> list[_core.Segment]:
@@ -116,7 +108,6 @@ z_mm = [-4, 1]
 def test_of_a_roughing_program_the_stock_before_it() -> None:
     stock = Stock.from_toml(STOCK_EXAMPLES["What a roughing program left of a block"], folder="/jobs")
     assert stock.kind == "program"
-    assert stock.program is not None
     assert stock.beside(stock.program.file) == Path("/jobs/rough.nc")
     assert area(stock_polygons(stock, [], RADIUS)).equals(shapely.box(0, 0, 120, 80))
 

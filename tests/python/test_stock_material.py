@@ -1,7 +1,5 @@
 """The material that a stock file makes: volumes in closed form, the analytic corner, what a roughing program leaves."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Modes from the stops of ordinary runs; the run is simulated by NumPy and SciPy alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

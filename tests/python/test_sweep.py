@@ -1,7 +1,5 @@
 """Klipper's resonance sweep: its pulses and a plant simulated by SciPy, and what cannot be had from such a file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Programs that shake an axis: read and simulated here by NumPy, apart from the package."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

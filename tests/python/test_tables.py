@@ -1,7 +1,5 @@
 """Tables of results: they fit a terminal of 80 columns, and no word or figure in them is cut."""
 
-from __future__ import annotations
-
 from hypothesis import given, settings, strategies as st
 
 from shapegcode.results.table import Column, Table

@@ -1,7 +1,5 @@
 """Checks of taps and decays on records whose truth is known, their spectra, and the plan of a test."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any
@@ -85,7 +83,6 @@ def test_a_good_tap_passes_without_a_word() -> None:
     assert prepared.warnings == ()
     assert prepared.refused == ()
     hit = prepared.usable[0].hit
-    assert hit is not None
     assert 199 <= hit.first <= 201
     assert 212 <= hit.end <= 214
     assert prepared.usable[0].force_noise_n == pytest.approx(0.5, rel=0.05)
@@ -97,11 +94,9 @@ def test_a_good_tap_passes_without_a_word() -> None:
 def test_the_force_window_keeps_the_momentum_and_nothing_else() -> None:
     force = half_sine(5000, 200, 12, 500.0)
     record = tap(force, snr_db=300.0, force_noise=0.0)
-    assert record.force_n is not None
     shifted = replace(record, force_n=record.force_n + 40.0, response=record.response + 3.0)
     prepared = one(shifted)
     windowed = prepared.records[0].force_n
-    assert windowed is not None
     assert np.all(windowed[:200] == 0.0)
     assert np.all(windowed[213:] == 0.0)
     np.testing.assert_allclose(windowed, force, atol=1e-9)
@@ -116,7 +111,6 @@ def test_noise_alone_refuses_nothing(snr_db: float) -> None:
 
 
 def test_a_negative_pulse_and_a_sensor_the_other_way_are_turned() -> None:
-    assert GOOD.force_n is not None
     good = one(GOOD)
     negative = one(replace(GOOD, force_n=-GOOD.force_n))
     assert any("the sign of the force is reversed" in text for text in negative.warnings)
@@ -156,7 +150,6 @@ def test_a_recording_is_divided_into_its_hits() -> None:
     assert len(parts) == 5
     assert sum(len(part.response) for part in parts) == 40_000
     for start, peak, part in zip(starts, (300.0, 400.0, 500.0, 600.0, 700.0), parts, strict=True):
-        assert part.force_n is not None
         assert np.max(part.force_n) == pytest.approx(peak, abs=5.0)
         at = (start + 6) / RATE + 2.0
         assert part.time_s[int(np.argmax(part.force_n))] == pytest.approx(at, abs=1.5 / RATE)
@@ -365,7 +358,6 @@ def test_the_frf_is_that_of_the_plant() -> None:
     truth = receptance(found.frequency_hz[band])
     error = np.abs(found.response[band] - truth) / np.abs(truth)
     assert np.median(error) < 0.02
-    assert found.coherence is not None
     assert np.median(found.coherence[band]) > 0.99
     near = [int(np.argmin(np.abs(found.frequency_hz - each))) for each in (46.0, 131.0)]
     assert found.coherence[near] == pytest.approx(1.0, abs=1e-3)

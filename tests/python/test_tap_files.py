@@ -1,7 +1,5 @@
 """Records from files: dialects of CSV, universal files, WAV, and every way in which they may be wrong."""
 
-from __future__ import annotations
-
 import csv
 import io
 import struct
@@ -104,7 +102,6 @@ DIALECTS = {
 @pytest.mark.parametrize("name", DIALECTS)
 def test_every_dialect_reads_the_same(name: str, tmp_path: Path) -> None:
     record = only(read(tmp_path, DIALECTS[name]))
-    assert record.force_n is not None
     assert record.period_s == pytest.approx(PERIOD_S, rel=1e-9)
     np.testing.assert_allclose(record.force_n, FORCE, rtol=1e-12)
     np.testing.assert_allclose(record.response, RESPONSE, rtol=1e-12)
@@ -172,7 +169,6 @@ def test_a_unit_is_the_same_in_every_kind_of_file(tmp_path: Path, unit: str, new
     cut = read_forces(tmp_path / "cut.csv", on="tool")
     np.testing.assert_allclose(cut.force_n[:, 0], FORCE * newton, rtol=1e-12)
     record = only(read(tmp_path, f"time_s,{form.format('force', unit)},acc_x_m/s^2\n" + rows()))
-    assert record.force_n is not None
     np.testing.assert_allclose(record.force_n, FORCE * newton, rtol=1e-12)
     with pytest.raises(RecordError, match="the unit 'V' is not known; needed is one of N, kN, kgf, lbf"):
         (tmp_path / "cut.csv").write_text(f"{head}\n".replace(unit, "V") + rows(), encoding="utf-8")
@@ -235,7 +231,6 @@ def test_options_over_the_header(tmp_path: Path) -> None:
     options = {"time_unit": "ms", "force_scale": 22.4, "response_scale": -98.0, "quantity": "velocity"}
     record = only(read(tmp_path, content, **options))
     assert record.period_s == pytest.approx(PERIOD_S, rel=1e-9)
-    assert record.force_n is not None
     np.testing.assert_allclose(record.force_n, FORCE * 22.4, rtol=1e-12)
     np.testing.assert_allclose(record.response, RESPONSE * -98.0, rtol=1e-12)
     assert record.quantity == "velocity"
@@ -445,7 +440,6 @@ def test_a_written_csv_reads_back_to_the_digits(
     path = tmp_path_factory.getbasetemp() / "written.csv"
     path.write_text(text.getvalue(), encoding="utf-8")
     record = only(read_records(path))
-    assert record.force_n is not None
     assert record.period_s == pytest.approx(0.25 * unit[1], rel=1e-12)
     assert list(zip(record.force_n.tolist(), record.response.tolist(), strict=True)) == table
 
@@ -501,13 +495,7 @@ def dataset(values: FloatArray, kind: int, **more: Any) -> dict[str, Any]:
 
 def units(code: int, length: float, force: float) -> dict[str, Any]:
     found: dict[str, Any] = pyuff.prepare_164(
-        units_code=code,
-        units_description="units",
-        temp_mode=1,
-        length=length,
-        force=force,
-        temp=1.0,
-        temp_offset=0.0,
+        units_code=code, units_description="units", temp_mode=1, length=length, force=force, temp=1.0, temp_offset=0.0
     )
     return found
 
@@ -531,7 +519,6 @@ def test_universal_files_read_like_csv(binary: int, even: int, tmp_path: Path) -
         f"{k / 6000.0:.12g},{PULSE[k]:.12g},{RINGING[k]:.12g}\n" for k in range(len(PULSE))
     )
     same = only(read(tmp_path, content))
-    assert record.force_n is not None
     assert same.force_n is not None
     assert record.axis == same.axis == "y"
     assert record.period_s == pytest.approx(same.period_s, rel=3e-6)
@@ -543,16 +530,11 @@ def test_universal_files_read_like_csv(binary: int, even: int, tmp_path: Path) -
 def test_units_of_a_universal_file(tmp_path: Path) -> None:
     sets = [dataset(PULSE, 13), dataset(RINGING, 8)]
     record = only(universal(tmp_path, [units(5, 1000.0, 1000.0), *sets]))
-    assert record.force_n is not None
     assert record.quantity == "displacement"
     np.testing.assert_allclose(record.force_n, PULSE / 1000.0, atol=1e-12)
     np.testing.assert_allclose(record.response, RINGING / 1000.0, atol=1e-12)
-    labels = [
-        dataset(PULSE, 0, ordinate_axis_units_lab="kN"),
-        dataset(RINGING, 0, ordinate_axis_units_lab="g"),
-    ]
+    labels = [dataset(PULSE, 0, ordinate_axis_units_lab="kN"), dataset(RINGING, 0, ordinate_axis_units_lab="g")]
     record = only(universal(tmp_path, labels))
-    assert record.force_n is not None
     np.testing.assert_allclose(record.force_n, PULSE * 1000.0, atol=1e-7)
     np.testing.assert_allclose(record.response, RINGING * 9.80665, atol=1e-9)
     assert any("SI is assumed" in text for text in only(universal(tmp_path, sets)).warnings)
@@ -562,7 +544,6 @@ def test_units_of_a_universal_file(tmp_path: Path) -> None:
 
 def test_a_sensor_against_the_axis_is_turned(tmp_path: Path) -> None:
     record = only(universal(tmp_path, [dataset(PULSE, 13, rsp_dir=-1), dataset(RINGING, 12, rsp_dir=-1)]))
-    assert record.force_n is not None
     np.testing.assert_allclose(record.force_n, -PULSE, atol=1e-7)
     np.testing.assert_allclose(record.response, -RINGING, atol=1e-10)
 
@@ -578,7 +559,6 @@ def test_several_taps_in_one_file(order: str, tmp_path: Path) -> None:
     records = universal(tmp_path, sets)
     assert len(records) == 3
     for n, record in enumerate(records, start=1):
-        assert record.force_n is not None
         assert np.max(record.force_n) == pytest.approx(300.0 * n)
         np.testing.assert_allclose(record.response, RINGING * n, atol=1e-9)
 
@@ -589,7 +569,6 @@ def test_forces_are_matched_by_number_and_place(tmp_path: Path) -> None:
         *(dataset(RINGING * n, 12, ver_num=n, rsp_node=2) for n in (1, 2, 3)),
     ]
     for record in universal(tmp_path, by_version):
-        assert record.force_n is not None
         assert np.max(record.force_n) / 300.0 == pytest.approx(np.max(record.response) / np.max(RINGING))
     by_place = [
         dataset(PULSE, 13, rsp_node=1, rsp_dir=1),
@@ -600,7 +579,6 @@ def test_forces_are_matched_by_number_and_place(tmp_path: Path) -> None:
     records = universal(tmp_path, by_place)
     assert [record.axis for record in records] == ["y", "x"]
     for record in records:
-        assert record.force_n is not None
         assert np.max(record.force_n) / 300.0 == pytest.approx(np.max(record.response) / np.max(RINGING))
     assert only(universal(tmp_path, by_place, axis="x")).axis == "x"
 
@@ -696,12 +674,10 @@ def test_wav_files_read_to_their_resolution(kind: type, tmp_path: Path) -> None:
     scales = {"force_scale": 400.0, "response_scale": 20.0} if integer else {}
     record = only(read_records(path, ReadOptions(**scales, axis="x")))
     step = 1.0 / top if integer else float(np.finfo(kind).eps)
-    assert record.force_n is not None
     assert (record.period_s, record.axis) == (1 / 6000.0, "x")
     np.testing.assert_allclose(record.force_n, TAP[:, 0], atol=400.0 * step)
     np.testing.assert_allclose(record.response, TAP[:, 1], atol=20.0 * step)
     swapped = only(read_records(path, ReadOptions(response_first=True, **scales)))
-    assert swapped.force_n is not None
     assert np.max(np.abs(swapped.force_n)) == pytest.approx(np.max(TAP[:, 1]) * (20.0 if integer else 1.0), rel=1e-3)
 
 
@@ -714,7 +690,6 @@ def test_wav_of_24_bits(tmp_path: Path) -> None:
         file.setframerate(6000)
         file.writeframes(b"".join(struct.pack("<i", int(value))[:3] for value in values.ravel()))
     record = only(read_records(path, ReadOptions(force_scale=400.0, response_scale=20.0)))
-    assert record.force_n is not None
     np.testing.assert_allclose(record.force_n, TAP[:, 0], atol=400.0 * 2.0**-23)
     np.testing.assert_allclose(record.response, TAP[:, 1], atol=20.0 * 2.0**-23)
 
@@ -777,7 +752,6 @@ def test_uneven_clock_is_resampled_within_its_band(tmp_path: Path) -> None:
         (found.frequency_hz, mode.frequency_hz), (found.damping_ratio, mode.damping_ratio),
         (found.stiffness_n_per_m, mode.stiffness_n_per_m),
     ):  # fmt: skip
-        assert estimate is not None
         assert estimate.low <= truth <= estimate.high
     times[2000] = times[1999]
     save(path, times, columns)

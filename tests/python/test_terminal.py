@@ -1,7 +1,5 @@
 """What a person sees of every command: help in groups, examples that parse, how much is said, tables that fit."""
 
-from __future__ import annotations
-
 import argparse
 import shlex
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """Test cuts as programs: what they cut, and what is told from records of them; through the command."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """The test piece of paper 004's comparison: read by LinuxCNC's interpreter and milled out of a block here."""
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys

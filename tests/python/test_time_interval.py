@@ -1,7 +1,5 @@
 """The 95 % interval of a predicted time, against hand sums and least squares in NumPy; what it was calibrated from."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

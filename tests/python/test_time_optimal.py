@@ -1,7 +1,5 @@
 """Time-optimal trajectories against an oracle of the shortest time, and by NumPy: limits, tolerance, ends."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The oracle of the shortest time against closed forms and symmetries."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

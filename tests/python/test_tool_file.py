@@ -1,7 +1,5 @@
 """Tool files: what they hold, what is said about a bad one, and the library of work materials."""
 
-from __future__ import annotations
-
 import math
 import re
 from importlib import resources
@@ -219,7 +217,6 @@ def test_power_laws_are_the_fit_to_the_catalogue_and_within_what_the_source_says
     assert entry.chip_mm == (FEEDS[0], FEEDS[-1])
     assert ", ".join(map(str, CATALOGUE[name])) in entry.source
     stated = re.search(r"within ([0-9.]+) %", entry.source)
-    assert stated is not None
     law = entry.specific_n_per_mm2 * np.array(FEEDS) ** entry.specific_exponent
     # The figure is printed with one decimal.
     assert 100 * np.abs(law / values - 1).max() == pytest.approx(float(stated[1]), abs=0.06)
@@ -239,7 +236,6 @@ def test_the_material_of_paper_001() -> None:
     entry = materials()["al6061-t6-carbide-6"]
     assert entry.specific_n_per_mm2 == pytest.approx(22.57 * 9.80665, rel=2e-4)  # kgf/mm²
     assert (entry.specific_exponent, entry.ratio, entry.ratio_exponent) == (-0.153, 0.41, -0.0775)
-    assert entry.chip_mm is not None
     # Mean chip thickness at 0.1 and 0.3 of the diameter, 0.12 mm per revolution, 6 flutes.
     for bound, depth in zip(entry.chip_mm, (0.8, 2.4), strict=True):
         angle = math.acos(1 - depth / 4)

@@ -1,7 +1,5 @@
 """Programs and results as values: one program belongs to one machine; copies, equality, arrays in place of lists."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import pickle

@@ -1,7 +1,5 @@
 """The verdict behind feed drives: contour with the servo's lag, residual as the swing of the table behind its motor."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +55,6 @@ def test_the_verdict_holds_the_lag(machine: sg.Machine, tmp_path: Path) -> None:
     shaped = tmp_path / "shaped.nc"
     shaped.write_bytes(drive.text)
     beside = sg.simulate(shaped, machine, plant="feed-drive", record_samples=0, against=path)
-    assert beside.of_shaped is not None
     assert beside.of_shaped.contour_error_um.response == drive.contour_error_um.response.emitted
 
 

@@ -1,7 +1,5 @@
 """The verdict is of the whole program that was written: cuts left unchanged, its price, and one of five grades."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -69,7 +67,6 @@ def test_simulate_against_the_original_gives_the_figures_of_convert(
     original = sg.Program.from_text(MIXED, machine, source="part.nc")
     simulation = sg.simulate(emitted, machine, against=original, record_samples=0)
     verdict = simulation.verdict
-    assert verdict is not None
     assert verdict.within_tolerance == conversion.within_tolerance == simulation.ok
     for name in ("residual_vibration_um", "peak_vibration_um", "contour_error_um", "rapid_vibration_um"):
         assert getattr(verdict, name) == getattr(conversion, name), name
@@ -84,7 +81,6 @@ def test_a_program_against_itself_has_one_contour_error() -> None:
     machine = machine_with({})
     program = sg.Program.read(PROGRAMS / "PARALLEL.NC", machine)
     simulation = sg.simulate(program, machine, against=program, record_samples=0)
-    assert simulation.verdict is not None
     assert simulation.contour_error_um.command.max == simulation.verdict.contour_error_um.command.emitted.max == 0.0
 
 
@@ -195,7 +191,6 @@ def test_the_curve_says_what_conversions_at_other_tolerances_take() -> None:
     prices = {"max_time_increase_percent": 1e5, "max_cut_time_increase_percent": 1e5}
     asked = converted(MIXED, machine_with({"tolerance.contour_um": 6.0}), **prices)
     curve = asked.tolerance_curve
-    assert curve is not None
     names = [point.name for point in curve.points]
     assert {"as asked", "1.25 times", "1.5 times", "2 times", "the original's contour error", "no slowing"} <= {*names}
     assert sum(point.is_knee for point in curve.points) == 1
@@ -366,7 +361,6 @@ def test_restart_points_are_no_change_of_the_program() -> None:
         shape_all=True, max_time_increase_percent=1e4, max_cut_time_increase_percent=1e4,
     )  # fmt: skip
     assert len(conversion.restart_points) > 3
-    assert conversion.proof is not None
     assert conversion.proof.refused == ()
     assert "1 of 1 tool calls" in conversion.proof.answer
 
@@ -409,7 +403,6 @@ def test_rounding_by_the_control_is_told_apart_from_vibration() -> None:
     machine = machine_with(keys)
     conversion = converted(part(slow_square), machine)
     advice = conversion.advice
-    assert advice is not None
     assert advice.key == "controller.time_constant_s"
     assert str(advice) in conversion.answer
     # Closed form: a corner of 90 degrees behind a moving average of T is missed by T / 8 * hypot(v, w); the

@@ -4,8 +4,6 @@ The counting itself is held against hand figures in tests/cpp/test_work_limits.c
 and the message, and that nothing is written. Nothing is timed: a bound that does not hold would never come back.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -33,11 +31,7 @@ CASES = {
     "sum of dwells": (subprogram("M98 P0002 L9999\n", "G04 X99.\n"), "max_program_s", 8),
     "full turns of R -99999": (f"{HEAD}G01 X0 Y0 F200\nG03 X.01 R-99999.\n{END}", "max_program_s", 6),
     "inverse time slip": (f"{HEAD}G93 G01 X5. F.00001\n{END}", "max_program_s", 5),
-    "rapids to and fro": (
-        f"{HEAD}#1=0\nWHILE[#1EQ0]DO1\nG00 X9999.\nX0\nEND1\n{END}",
-        "max_program_s",
-        0,
-    ),
+    "rapids to and fro": (f"{HEAD}#1=0\nWHILE[#1EQ0]DO1\nG00 X9999.\nX0\nEND1\n{END}", "max_program_s", 0),
     "helix of a hundred thousand turns": (
         subprogram("G01 X20. F500\nG91\nM98 P0002 L99999\n", TURN),
         "max_program_s",

@@ -1,7 +1,5 @@
 """The cases of the verdict against the judge's player and plant, which share no code with the package."""
 
-from __future__ import annotations
-
 import cmath
 import json
 import math

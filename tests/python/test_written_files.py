@@ -1,7 +1,5 @@
 """Files that are written: many writers, full disks, links in a circle, Ctrl-C and kills at random instants."""
 
-from __future__ import annotations
-
 import errno
 import os
 import random
@@ -163,7 +161,6 @@ def _interrupted(folder: Path, number: int, after_s: float) -> subprocess.Comple
         [sys.executable, "-c", code, *words], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=hear_ctrl_c,  # noqa: PLW1509 - no thread of this test runs yet
     )  # fmt: skip
-    assert process.stdout is not None
     process.stdout.readline()
     time.sleep(after_s)
     process.send_signal(number)
