@@ -9,7 +9,7 @@ from typing import Any, get_origin
 from pydantic.fields import FieldInfo
 
 from shapegcode.settings.edit import origin_lines
-from shapegcode.settings.keys import (  # fmt: skip
+from shapegcode.settings.keys import (
     ORIGIN,
     ORIGIN_TEXT,
     InlineTable,
