@@ -52,11 +52,6 @@ class MachineDescription(Result):
     source: str = "MACHINE"
 
     @property
-    def ok(self) -> bool:
-        """Always true: a machine that cannot be used is refused."""
-        return True
-
-    @property
     def answer(self) -> str:
         """Number of unverified values, and the most important one."""
         name, count = self.machine["name"], len(self._open())
