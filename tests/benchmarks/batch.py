@@ -206,8 +206,9 @@ def growth(folder: Path) -> None:
         os.chdir(folder)
         run = launched(
             [COMMAND, "batch", "parts", "-m", "vx500", "-o", "out", "-q", "--command", "check", "--json", "all.json"],
-            os.environ, accepted=(0, 1),
-        )  # fmt: skip
+            os.environ,
+            accepted=(0, 1),
+        )
         rows = json.loads((folder / "all.json").read_text())["rows"]
         assert len(rows) == count
         print(f"| {count} | {1e3 * run.wall_s / count:.1f} ms | {run.peak_mb:.0f} MB |", flush=True)

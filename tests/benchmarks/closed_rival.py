@@ -72,9 +72,7 @@ def guard_table() -> str:
         taps = mode.taps()
         own = len(taps[0]) - 1
         on_grid = _on_grid(mode)
-        rows.append(
-            [f"**mode {mode.number}**, published", _band(mode.band), "not published", *["–"] * 3, "1"]
-        )  # fmt: skip
+        rows.append([f"**mode {mode.number}**, published", _band(mode.band), "not published", *["–"] * 3, "1"])
         rows.append([f"– {mode.kernel}, derived", *_figures(*taps), _ms(on_grid), "1"])
         kinds = ((False, "robust"), (True, "mirrored")) if mode.symmetric else ((False, "robust"),)
         for mirrored, name in kinds:

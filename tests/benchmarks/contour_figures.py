@@ -99,12 +99,8 @@ def paper_text() -> str:
 @functools.cache
 def paper(target: str, block_period_s: float = 0.005, rule: str = "ceil", tolerance_um: float = 50.0) -> Figures:
     """Paper 000's path at 200 mm/s with 99 % on the arc, emitted with a target."""
-    keys = {
-        "shaping.contour": target, "controller.block_time_s": block_period_s, "tolerance.contour_um": tolerance_um
-    }  # fmt: skip
-    judged = convert(
-        paper_text(), machine_with(keys), arc_feed_ratio=ARC_FEED_RATIO, block_period_s=block_period_s
-    )  # fmt: skip
+    keys = {"shaping.contour": target, "controller.block_time_s": block_period_s, "tolerance.contour_um": tolerance_um}
+    judged = convert(paper_text(), machine_with(keys), arc_feed_ratio=ARC_FEED_RATIO, block_period_s=block_period_s)
     *_, (programmed, blocks, _) = judged.regions()
     return judge(judged, blocks, programmed, block_period_s, rule)
 
@@ -180,9 +176,7 @@ def corner(feed_mm_per_min: float = 6000.0) -> str:
 @functools.cache
 def within(text: str, target: str, tolerance_um: float, block_period_s: float = 0.005) -> tuple[Figures, Any]:
     """A program of one region, emitted with a target and its tolerance; and the conversion's report."""
-    keys = {
-        "shaping.contour": target, "tolerance.contour_um": tolerance_um, "controller.block_time_s": block_period_s
-    }  # fmt: skip
+    keys = {"shaping.contour": target, "tolerance.contour_um": tolerance_um, "controller.block_time_s": block_period_s}
     judged = convert(text, machine_with(keys), block_period_s=block_period_s)
     ((programmed, blocks, entry),) = judged.regions()
     report = {**judged.conversion.to_dict(), "within": judged.conversion.ok, "entry": entry}

@@ -94,9 +94,10 @@ def first_paint_s(browser: Browser, trace: Trace, page: Path) -> float:
     for event in events:
         named.setdefault(event["name"], []).append(event)
     begun = max(
-        event["ts"] for event in named["navigationStart"]
+        event["ts"]
+        for event in named["navigationStart"]
         if page.name in event["args"].get("data", {}).get("documentLoaderURL", "")
-    )  # fmt: skip
+    )
     return min(event["ts"] - begun for event in named["firstContentfulPaint"] if event["ts"] > begun) / 1e6
 
 

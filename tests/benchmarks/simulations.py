@@ -94,10 +94,11 @@ def _override_rows(folder: Path, long_file: Path, repetitions: int) -> None:
             without, now = (
                 processes.launched(
                     [sys.executable, __file__, way, "convert", file, "-m", "vx500", "-o", folder / "out.nc", *settings],
-                    os.environ, accepted=(0, 1),
+                    os.environ,
+                    accepted=(0, 1),
                 )
                 for way in (_WITHOUT, _WITH)
-            )  # fmt: skip
+            )
             ratios.append((now.wall_s / without.wall_s, now.cpu_s / without.cpu_s))
         wall, cpu = (median(column) for column in zip(*ratios, strict=True))
         print(f"override contours, {what:<20} wall x {wall:.2f}, CPU x {cpu:.2f}", flush=True)

@@ -138,11 +138,6 @@ class CharacterisationTests(Result):
     warnings: tuple[str, ...] = ()
 
     @property
-    def ok(self) -> bool:
-        """Always true: the tests are written."""
-        return True
-
-    @property
     def answer(self) -> str:
         """Number of tests, folder, duration."""
         watch, log = (sum(test.expected_s for test in self.tests if test.kind == kind) for kind in ("stopwatch", "log"))
@@ -210,15 +205,7 @@ class Characterisation(Result):
             return "repeat the tests that contradict the others"
         return "shapegcode machine show explains the machine file with these values, which -o FILE writes"
 
-    def next_step_after(self, file: str) -> str:
-        """Next step after the machine file was written.
-
-        Args:
-            file: name of the machine file.
-
-        Returns:
-            One sentence.
-        """
+    def _next_with(self, file: str) -> str:
         return f"shapegcode machine show {file} explains it" if self.ok else self.next_step
 
     def to_toml(self) -> str:

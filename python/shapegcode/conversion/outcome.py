@@ -8,18 +8,11 @@ from dataclasses import dataclass
 from functools import partial
 
 from shapegcode import _core
+from shapegcode.conversion import tables
 from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.plan import ConversionPlan, Shaped
 from shapegcode.conversion.restart import restart_points
 from shapegcode.conversion.result import ChangeProof, Conversion, FilterAdvice, Grade
-from shapegcode.conversion.tables import (
-    CutOutcome,
-    Sensitivity,
-    parameter_sensitivity,
-    remedy_for,
-    tools_of_cuts,
-    unknown_axes,
-)
 from shapegcode.conversion.whole_text import Written
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, ini_lines
@@ -30,15 +23,8 @@ from shapegcode.program.comparison import Allowed, ProgramDifference, compare
 from shapegcode.program.stamp import no_room
 from shapegcode.results.outcome import Pair
 from shapegcode.shaping.grid import Grid
-from shapegcode.verdict import figures as parts
+from shapegcode.verdict import figures as parts, judge as judging
 from shapegcode.verdict.figures import Placed, ProgramFigures, RegionVerdict
-from shapegcode.verdict.judge import (
-    RegionFigures,
-    most_to_gain_um,
-    rapid_vibration_um,
-    simulate_unchanged,
-    unshaped_regions,
-)
 
 _MOSTLY = 0.7  # ratio of the command's contour error to that of the machine table
 _TRIALS = (0.9, 0.7, 0.5)  # tried ratios to the time constant that suffices if rounding is proportional to it
@@ -53,7 +39,7 @@ class ProgramVerdict:
     """Verdict of the whole emitted program against its limits, its price and its original."""
 
     figures: ProgramFigures
-    cuts: tuple[CutOutcome, ...]
+    cuts: tuple[tables.CutOutcome, ...]
     cycle_time_s: Pair[float]
     proof: ChangeProof | None
     grade: Grade
@@ -67,7 +53,7 @@ def judge(plan: ConversionPlan, shaped: Shaped) -> ProgramVerdict:
     between = plan.rapid_vibration
     rapids_shaped = rapids is not None and rapids.outcome.shaped > 0
     if rapids_shaped:
-        between = plan.pool.submit(rapid_vibration_um, shaped.emitted, plan.model)
+        between = plan.pool.submit(judging.rapid_vibration_um, shaped.emitted, plan.model)
     proving = None
     # Without a header, shaped rapids cannot be distinguished from cuts.
     if shaped.written.placed and (machine.emission.header or not rapids_shaped):
@@ -94,7 +80,7 @@ def judge(plan: ConversionPlan, shaped: Shaped) -> ProgramVerdict:
 def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> Conversion:
     """Assemble the result: figures, warnings, parameter sensitivity, notes for the control."""
     program, machine, written = plan.program, plan.machine, shaped.written
-    core, tolerance, tools_by_index = program.core, machine.tolerance, tools_of_cuts(program)
+    core, tolerance, tools_by_index = program.core, machine.tolerance, tables.tools_of_cuts(program)
     tools = [tools_by_index.get(plan.aims.index(place.region)) for place in written.placed]
     # Uses a core that is idle during the last simulations.
     mark = plan.pool.submit(lambda: shaped.emitted.mark)
@@ -151,17 +137,17 @@ def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> 
     )
 
 
-def _unchanged(plan: ConversionPlan, shaped: Shaped) -> list[tuple[Placed, RegionFigures]]:
+def _unchanged(plan: ConversionPlan, shaped: Shaped) -> list[tuple[Placed, judging.RegionFigures]]:
     left = [index for index, reason in enumerate(plan.reasons) if reason]
     if not left:
         return []
     spans = [(place.first_line, place.last_line) for place in shaped.written.placed]
     spans += [move.emitted_lines for move in shaped.rapids.outcome.moves] if shaped.rapids is not None else []
-    regions = unshaped_regions(shaped.emitted, spans, [plan.program.regions[index] for index in left])
+    regions = judging.unshaped_regions(shaped.emitted, spans, [plan.program.regions[index] for index in left])
     running = [
         None if region.path.moves_as(plan.program.regions[index].path) and index in plan.originals_judged
         else plan.pool.submit(
-            simulate_unchanged, plan.judge, plan.model, region, plan.program.regions[index],
+            judging.simulate_unchanged, plan.judge, plan.model, region, plan.program.regions[index],
             plan.originals[index].result(),
         )
         for index, region in zip(left, regions, strict=True)
@@ -175,8 +161,8 @@ def _unchanged(plan: ConversionPlan, shaped: Shaped) -> list[tuple[Placed, Regio
     ]
 
 
-def _cuts(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> tuple[CutOutcome, ...]:
-    tools = tools_of_cuts(plan.program)
+def _cuts(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> tuple[tables.CutOutcome, ...]:
+    tools = tables.tools_of_cuts(plan.program)
     sizes = {
         plan.aims.index(place.region): text.size
         for place, (text, _) in zip(shaped.written.placed, shaped.written.texts, strict=True)
@@ -186,10 +172,10 @@ def _cuts(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> tupl
         read = region.text_end - region.text_begin
         gained = plan.gains_um.get(index)
         if gained is None:
-            gained = most_to_gain_um(plan.originals[index].result())
+            gained = judging.most_to_gain_um(plan.originals[index].result())
         residual, reason, is_shaped = cut.residual_vibration_um, plan.reasons[index], index in sizes
         rows.append(
-            CutOutcome(
+            tables.CutOutcome(
                 lines=cut.lines,
                 emitted_lines=cut.emitted_lines,
                 tool=tools.get(index),
@@ -202,18 +188,18 @@ def _cuts(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> tupl
                 time_s=cut.time_s,
                 bytes=Pair(read, sizes.get(index, read)),
                 misses=cut.misses,
-                remedy="" if is_shaped or not cut.misses else remedy_for(reason),
+                remedy="" if is_shaped or not cut.misses else tables.remedy_for(reason),
             )
         )
     return tuple(rows)
 
 
-def _sensitivity(plan: ConversionPlan, shaped: Shaped) -> tuple[tuple[Sensitivity, ...], int]:
+def _sensitivity(plan: ConversionPlan, shaped: Shaped) -> tuple[tuple[tables.Sensitivity, ...], int]:
     deciding = plan.judge.deciding(shaped.figures, shaped.written.placed)
     if deciding is None:
         return (), 0
     simulated = zip(shaped.written.placed, shaped.figures, shaped.trackers, strict=True)
-    return parameter_sensitivity(
+    return tables.parameter_sensitivity(
         plan.judge, plan.machine, list(simulated), shaped.emitted, deciding, plan.pool,
         shaped.started, partial(plan.on_progress, "sensitivity to unverified parameters"),
     )  # fmt: skip
@@ -373,7 +359,7 @@ def _open_axes(program: Program, machine: Machine) -> list[str]:
     return [
         f"{letter.upper()} moves, but it is not known whether it has a vibration mode: assumed rigid; "
         f"tap it (shapegcode identify), or set axes.{letter}.rigid = true"
-        for letter in unknown_axes(machine)
+        for letter in tables.unknown_axes(machine)
         if any(region.path.extent_mm["xyz".index(letter)] > 0.0 for region in program.regions)
     ]
 

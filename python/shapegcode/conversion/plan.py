@@ -162,9 +162,10 @@ class Aims:
 
         if cuts and total_s(math.inf) <= wanted_s:
             level_um = _bisect(
-                min(self.room_um), max(self._curve_of(index).loosest_um for index in cuts),
+                min(self.room_um),
+                max(self._curve_of(index).loosest_um for index in cuts),
                 lambda room_um: total_s(room_um) <= wanted_s,
-            )  # fmt: skip
+            )
             for index in cuts:
                 saved_s = self._planned_s(index, self.room_um[index]) - self._planned_s(index, level_um)
                 if level_um > self.room_um[index] and saved_s > 1e-3 * excess_s:
@@ -243,9 +244,10 @@ class Aims:
             return None
         now_um = self.room_um[index]
         return _bisect(
-            now_um, max(self._curve_of(index).loosest_um, now_um),
+            now_um,
+            max(self._curve_of(index).loosest_um, now_um),
             lambda room_um: self._planned_s(index, room_um) <= allowed_s * _PRICE_MARGIN,
-        )  # fmt: skip
+        )
 
 
 def _bisect(low: float, high: float, is_enough: Callable[[float], bool]) -> float:
@@ -455,13 +457,14 @@ class ConversionPlan:
         self.judge = Judge(self.model)
         self.curves = CutCurves(self.writer, program, machine, self.originals)
         self.aims = Aims(
-            program, machine,
+            program,
+            machine,
             [
                 choice.not_shaped.get(index) or why_kept(program, region, machine, self.grid)
                 for index, region in enumerate(program.regions)
             ],
             self.curves.of,
-        )  # fmt: skip
+        )
         self.reasons = self.aims.reasons
         self.gains_um: dict[int, float] = {}
         self.left: set[int] = set(choice.not_shaped)  # with a reason in the table of cuts

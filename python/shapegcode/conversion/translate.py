@@ -106,9 +106,10 @@ def require_dialect(program: Program, machine: Machine, budget: Budget | None) -
         reach_mm = float(np.abs(region.path.polyline(1.0)).max())
         if reach_mm >= limit_mm and not region.incremental:
             raise program.region_error(
-                region, f"it reaches {reach_mm:.3f} mm; {decimals + inch} decimals in a word of eight digits allow no "
-                f"position beyond {limit_mm:g} mm: set emission.decimals to {decimals - 1} or less"
-            )  # fmt: skip
+                region,
+                f"it reaches {reach_mm:.3f} mm; {decimals + inch} decimals in a word of eight digits allow no "
+                f"position beyond {limit_mm:g} mm: set emission.decimals to {decimals - 1} or less",
+            )
     translate(program, machine)
 
 
@@ -442,9 +443,10 @@ class _Translator:
             if code not in dialect.same and code not in dialect.becomes:
                 here, there = fanuc_meaning(code), dialect.means.get(code, "not known")
                 raise self._error(
-                    number, f"{code} is {here} on FANUC, and {there} on {dialect.control}: delete it, or set a "
-                    f'replacement: emission.words = {{ "{code}" = "..." }}'
-                )  # fmt: skip
+                    number,
+                    f"{code} is {here} on FANUC, and {there} on {dialect.control}: delete it, or set a "
+                    f'replacement: emission.words = {{ "{code}" = "..." }}',
+                )
             if code in dialect.cautions and number > 0:
                 self.cautions[code] = f"{self._where(number)}: {code}: {dialect.cautions[code]}"
             short = letter + (value.lstrip("0") or "0") if dialect.short_codes else letter + value
@@ -501,9 +503,10 @@ class _Translator:
         if value.lstrip("0") != self.state.tool:
             tool = self.state.tool or "not known"
             raise self._error(
-                number, f"G43 H{value} is offset {value} on FANUC and D1 of the tool in the spindle on "
-                f"{self._dialect.control}: the tool is {tool}{_CURE}"
-            )  # fmt: skip
+                number,
+                f"G43 H{value} is offset {value} on FANUC and D1 of the tool in the spindle on "
+                f"{self._dialect.control}: the tool is {tool}{_CURE}",
+            )
         return ""
 
     def _filled(self, text: str) -> str:

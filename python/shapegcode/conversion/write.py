@@ -12,15 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.conversion.restart import (
-    PLACEHOLDER,
-    CutRestarts,
-    RegionRestarts,
-    RestartMark,
-    RestartPlaces,
-    block_lines,
-    decimal,
-)
+from shapegcode.conversion import restart
 from shapegcode.machine import Machine
 from shapegcode.machine.dialects import dialect_of
 from shapegcode.machine.programs import Emission
@@ -48,7 +40,7 @@ class RegionText:
         assert self._parts is not None  # handed over, and not read back
         return self._parts
 
-    def number(self, restarts: Sequence[RestartMark], numbers: Sequence[int]) -> None:
+    def number(self, restarts: Sequence[restart.RestartMark], numbers: Sequence[int]) -> None:
         """Give restart points their N words."""
         if not numbers or numbers == self._numbers:
             return
@@ -59,7 +51,7 @@ class RegionText:
             if isinstance(parts[index], bytes):
                 parts[index] = bytearray(parts[index])
             at = mark.byte - int(begins[index])
-            parts[index][at : at + len(PLACEHOLDER)] = f"N{number}".encode()  # type: ignore[index]
+            parts[index][at : at + len(restart.PLACEHOLDER)] = f"N{number}".encode()  # type: ignore[index]
         self._parts, self._inside, self._numbers = [bytes(part) for part in parts], None, numbers
 
     def hand_over(self) -> None:
@@ -81,7 +73,7 @@ class EmittedRegion:
     block_periods: list[npt.NDArray[np.uint32]]
     block_bytes: list[npt.NDArray[np.uint32]]  # likewise the characters of each block
     planned_um: float  # deviation for which the feed was planned, µm; 0 without a target
-    restarts: CutRestarts  # blocks at which the control can restart
+    restarts: restart.CutRestarts  # blocks at which the control can restart
     is_slowed: bool = True  # it is slower than without a contour tolerance
     duration_s: float = 0.0  # time of its blocks
 
@@ -197,7 +189,7 @@ def _block_bytes(texts: Sequence[bytes], blocks: Iterable[int]) -> list[npt.NDAr
     """Characters of each block with line end and preceding comment lines; the last one also with following ones."""
     sizes, behind = [], 0
     for text, count in zip(texts, blocks, strict=True):
-        ends = block_lines(text, count)[1]
+        ends = restart.block_lines(text, count)[1]
         sizes.append(np.diff(ends, prepend=-behind).astype(np.uint32))
         behind = len(text) - int(ends[-1]) if len(ends) else behind + len(text)
     for part in [each for each in sizes if len(each)][-1:]:
@@ -269,8 +261,8 @@ class RegionWriter:
             shaper.begin_anew()
         return self._write(program, region, shaper, room, on_progress, stopped)
 
-    def _places(self, region: _core.Region) -> RestartPlaces:
-        places = RestartPlaces(region, self._machine, self._grid.block_period_s)
+    def _places(self, region: _core.Region) -> restart.RestartPlaces:
+        places = restart.RestartPlaces(region, self._machine, self._grid.block_period_s)
         if self._mark != REGION_MARK:
             places.reason = "it replaces a rapid"
         return places
@@ -305,7 +297,7 @@ class RegionWriter:
         fit = self._fit(region)
         state = self._writer(program, region, fit)
         marks = _Marks(program, region.notes)
-        restarts = RegionRestarts(self._places(region), region, self._machine, fit, state.position_decimals)
+        restarts = restart.RegionRestarts(self._places(region), region, self._machine, fit, state.position_decimals)
         texts: list[bytes] = []
         periods: list[npt.NDArray[np.uint32]] = []
         starts: list[list[int]] = []  # of the pieces, in increments
@@ -439,7 +431,7 @@ def _lines(lines: Sequence[str], writer: _core.WriterOptions) -> bytes:
 def feed_word(feed: float) -> str:
     """F with a point, below 10 with a decimal, so that it is never a one-digit feed code."""
     whole = len(str(int(feed))) if feed >= 1.0 else 0
-    text = decimal(feed, max(0, 8 - whole))  # a word has eight digits
+    text = restart.decimal(feed, max(0, 8 - whole))  # a word has eight digits
     return f"F{text}0" if feed < 10.0 and text.endswith(".") else f"F{text}"
 
 
@@ -455,7 +447,7 @@ def _safe_line(
     words = [f"G{entry.plane}", "G91" if region.incremental else "G90", "G94", "G40", "G64", "G01"]
     if not region.incremental:
         words += [
-            f"{letter}{decimal(value * 10.0**-decimals, decimals)}"
+            f"{letter}{restart.decimal(value * 10.0**-decimals, decimals)}"
             for letter, value, is_known, rests in zip("XYZ", start, entry.known, resting, strict=True)
             if is_known and not rests
         ]

@@ -508,8 +508,9 @@ def band_poles(parts: Sequence[Lines], low: float, high: float) -> list[Pole]:
         response = lines.response[inside]
         numerator = np.asarray(weight[:, None] * z[:, None] ** np.arange(most + 1), dtype=np.complex128)
         denominator = -response[:, None] * numerator
-        sides.append((numerator.conj().T @ numerator, numerator.conj().T @ denominator,
-                      denominator.conj().T @ denominator))  # fmt: skip
+        sides.append(
+            (numerator.conj().T @ numerator, numerator.conj().T @ denominator, denominator.conj().T @ denominator)
+        )
     found = []
     for order in range(_MIN_ORDER, most + 1):
         size = order + 1

@@ -57,11 +57,6 @@ class TapPlan(Result):
     warnings: tuple[str, ...] = ()
 
     @property
-    def ok(self) -> bool:
-        """Always true: every machine has a plan."""
-        return True
-
-    @property
     def answer(self) -> str:
         """Names the machine."""
         return f"tap test of {self.machine or 'a machining centre'}: how to do it"

@@ -177,8 +177,9 @@ def _judge_mode(best: _Model, other: _Model, index: int, bins: int) -> Identifie
     elif zeta > _NO_VIBRATION:
         refusal = f"damping ratio {zeta:.2g}: no distinct vibration (limit {_NO_VIBRATION:g})"
     for name, estimate, limit in (
-        ("frequency", mode.frequency_hz, _FREQUENCY_LIMIT), ("damping ratio", mode.damping_ratio, _DAMPING_LIMIT),
-    ):  # fmt: skip
+        ("frequency", mode.frequency_hz, _FREQUENCY_LIMIT),
+        ("damping ratio", mode.damping_ratio, _DAMPING_LIMIT),
+    ):
         if not refusal and not estimate.uncertainty_percent <= limit:
             refusal = (
                 f"{name} is known only to {estimate.uncertainty_percent:.2g} % (limit {limit:g} % of a sweep): a "

@@ -92,11 +92,6 @@ class SweepProgram(Result):
     warnings: tuple[str, ...] = ()
 
     @property
-    def ok(self) -> bool:
-        """Always true: the program can be run."""
-        return True
-
-    @property
     def answer(self) -> str:
         """Axis, band, duration, travel, size, and the limit of the band."""
         travel = max(band.travel_mm for band in self.bands)

@@ -65,7 +65,7 @@ def read_run_logs(
         iter_run_logs(
             path, items=items, format=format, program_name=program_name, feed_unit=feed_unit, max_values=max_values
         )
-    )  # fmt: skip
+    )
 
 
 def iter_run_logs(

@@ -320,9 +320,10 @@ def _override(signal: Signal | None, notes: FileNotes) -> Signal | None:
         return None
     if signal.time_s[0] > 0.0:
         notes.add(
-            f"late {signal.name}", 0,
+            f"late {signal.name}",
+            0,
             f"{signal.name} is first logged at {signal.time_s[0]:.2f} s: the value before is unknown",
-        )  # fmt: skip
+        )
     return Signal(signal.time_s, signal.value / 100.0, signal.name)
 
 

@@ -114,17 +114,9 @@ class ParameterImport(Result):
     @property
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
-        return self.next_step_after("MACHINE")
+        return self._next_with("MACHINE")
 
-    def next_step_after(self, file: str) -> str:
-        """Next step with the name of the machine file that was written.
-
-        Args:
-            file: name of the machine file.
-
-        Returns:
-            One sentence.
-        """
+    def _next_with(self, file: str) -> str:
         if not self.ok:
             return "punch the parameters out again (CNC-PARA.TXT, all of them), and import that."
         find = f"shapegcode identify TAP.csv --update {file}"
@@ -263,11 +255,6 @@ class MachineDescription(Result):
     program: str | None = None
     matters: tuple[OpenValue, ...] = ()
     source: str = "MACHINE"
-
-    @property
-    def ok(self) -> bool:
-        """Always true: a machine that cannot be used is refused."""
-        return True
 
     @property
     def answer(self) -> str:

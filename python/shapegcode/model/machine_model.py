@@ -81,9 +81,10 @@ def planner_rules(machine: Machine) -> _core.PlannerRules:
     rules.kind = getattr(_core.ControllerKind, controller.kind)
     rules.period_s = controller.interpolation_period_s
     settings = {
-        "linuxcnc": controller.linuxcnc or LinuxcncPlanner(), "klipper": controller.klipper or KlipperPlanner(),
+        "linuxcnc": controller.linuxcnc or LinuxcncPlanner(),
+        "klipper": controller.klipper or KlipperPlanner(),
         "grbl": controller.grbl or GrblPlanner(),
-    }  # fmt: skip
+    }
     if table := settings.get(controller.kind):
         for name, value in table:
             setattr(rules, name, value)

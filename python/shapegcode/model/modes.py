@@ -290,12 +290,13 @@ def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: fl
     table_friction = _core.FrictionParameters(
         getattr(_core.FrictionModel, drive.friction_model),
         viscous_n_s_per_m=drive.friction_viscous_n_s_per_m,
-        coulomb_n=drive.friction_coulomb_n or 0.0, static_n=drive.friction_static_n or 0.0,
+        coulomb_n=drive.friction_coulomb_n or 0.0,
+        static_n=drive.friction_static_n or 0.0,
         stribeck_velocity_m_per_s=drive.friction_stribeck_velocity_mm_per_s * _MM,
         smoothing_velocity_m_per_s=drive.friction_smoothing_velocity_mm_per_s * _MM,
         bristle_stiffness_n_per_m=drive.friction_bristle_stiffness_n_per_um * _N_PER_UM,
         bristle_damping_n_s_per_m=drive.friction_bristle_damping_n_s_per_m,
-    )  # fmt: skip
+    )
     motor_viscous = drive.motor_friction_viscous_n_m_s_per_rad * rad_per_m**2
     return _core.FeedDriveParameters(
         motor_mass_kg=motor_mass, table_mass_kg=drive.table_mass_kg, stiffness_n_per_m=stiffness,

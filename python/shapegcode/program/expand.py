@@ -43,11 +43,6 @@ class Expansion(Result):
     warnings: tuple[str, ...]
 
     @property
-    def ok(self) -> bool:
-        """Always true: unreadable programs are refused."""
-        return True
-
-    @property
     def answer(self) -> str:
         """The expanded program, and whether it differs from the original."""
         what = "expanded" if self.expanded else "nothing to expand: the program is unchanged"
@@ -56,17 +51,9 @@ class Expansion(Result):
     @property
     def next_step(self) -> str:
         """What to do next, in one sentence."""
-        return self.next_step_after("OUT")
+        return self._next_with("OUT")
 
-    def next_step_after(self, file: str) -> str:
-        """Next step with the name of the written program.
-
-        Args:
-            file: name of the file.
-
-        Returns:
-            One sentence.
-        """
+    def _next_with(self, file: str) -> str:
         if self.expanded_radii_mm:
             return "use it only with these radii: the offsets in the control have no effect."
         return f"compute its cycle time: shapegcode time {file} -m MACHINE."

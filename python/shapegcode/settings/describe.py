@@ -8,19 +8,8 @@ from typing import Any, get_origin
 
 from pydantic.fields import FieldInfo
 
+from shapegcode.settings import keys
 from shapegcode.settings.edit import origin_lines
-from shapegcode.settings.keys import (  # fmt: skip
-    ORIGIN,
-    ORIGIN_TEXT,
-    InlineTable,
-    TomlTable,
-    facts,
-    item_type,
-    key_info,
-    origin_of,
-    table_type,
-    toml,
-)
 
 _LINE_WIDTH = 110
 
@@ -36,7 +25,7 @@ _SHORT_HEAD = (
 _FOUND = ("measured", "dump")
 
 
-def write_toml(machine: TomlTable, remarks: Mapping[str, str], *, short: bool = False) -> str:
+def write_toml(machine: keys.TomlTable, remarks: Mapping[str, str], *, short: bool = False) -> str:
     """Write a machine as a commented file; *short*: only values that differ from a default or have a known origin."""
     writer = _TomlWriter(dict(remarks), short)
     writer.comment(_SHORT_HEAD if short else _HEAD)
@@ -69,27 +58,27 @@ class _TomlWriter:
             break_on_hyphens=False,
         )  # fmt: skip
 
-    def table(self, table: TomlTable, prefix: str) -> None:
+    def table(self, table: keys.TomlTable, prefix: str) -> None:
         """Write plain keys first, then nested tables, as TOML requires."""
         below: list[tuple[str, FieldInfo, Any]] = []
         for name, field in type(table).model_fields.items():
             value, key = getattr(table, name), f"{prefix}{name}"
-            if (isinstance(value, TomlTable) and not isinstance(value, InlineTable)) or item_type(field):
+            if (isinstance(value, keys.TomlTable) and not isinstance(value, keys.InlineTable)) or keys.item_type(field):
                 below.append((key, field, value))
             elif not self._short or self._is_kept(key, table, name, field):
                 if self._explains:
-                    info = key_info(field, key)
+                    info = keys.key_info(field, key)
                     unit = f" [{info.unit}]" if info.unit and info.unit != "1" else ""
                     fanuc = f" (FANUC parameter {info.fanuc})" if info.fanuc else ""
                     self.comment(f"{info.meaning[:1].upper()}{info.meaning[1:]}{unit}{fanuc}.")
-                self._add(f"# {name} = ..." if value is None else f"{name} = {toml(value)}", key)
+                self._add(f"# {name} = ..." if value is None else f"{name} = {keys.toml(value)}", key)
         for key, field, value in below:
-            if item := item_type(field):
+            if item := keys.item_type(field):
                 self._list(key, field, item, value)
             else:
                 self._below(f"[{key}]", field.description or "", value, f"{key}.")
 
-    def _below(self, head: str, meaning: str, table: TomlTable, prefix: str) -> None:
+    def _below(self, head: str, meaning: str, table: keys.TomlTable, prefix: str) -> None:
         """Write a nested table with its header, if keys remain in it."""
         before = list(self.lines)
         if self.lines and self.lines[-1]:
@@ -102,7 +91,7 @@ class _TomlWriter:
         elif self.lines[headed] == "":
             self.lines = [*before, *self.lines[headed:]]
 
-    def _list(self, key: str, field: FieldInfo, item: type[TomlTable], tables: tuple[TomlTable, ...]) -> None:
+    def _list(self, key: str, field: FieldInfo, item: type[keys.TomlTable], tables: tuple[keys.TomlTable, ...]) -> None:
         if not tables and not self._short:
             self.lines.append("")
             self.comment(f"{key}: {field.description}.")
@@ -117,13 +106,13 @@ class _TomlWriter:
             self._below(f"[[{key}]]", meaning, table, f"{key}.{number}.")
         self._explains = not self._short
 
-    def _is_kept(self, key: str, table: TomlTable, name: str, field: FieldInfo) -> bool:
+    def _is_kept(self, key: str, table: keys.TomlTable, name: str, field: FieldInfo) -> bool:
         """True if the file must contain the key, or has it with an origin."""
         value = getattr(table, name)
         if field.is_required():
             return True
-        remark, assumed = self.remarks.get(key, ""), bool(facts(field).get("assumed"))
-        origin = origin_of(remark)
+        remark, assumed = self.remarks.get(key, ""), bool(keys.facts(field).get("assumed"))
+        origin = keys.origin_of(remark)
         # A value equal to the default is left out if no information is lost: an assumption whose default is assumed, a
         # value without an origin whose default is not.
         kept = {"assumed": not assumed, "inherited": not assumed, "file": bool(remark) or assumed}.get(
@@ -134,7 +123,7 @@ class _TomlWriter:
         return name in table.model_fields_set and (kept or value != field.get_default(call_default_factory=True))
 
 
-def toml_schema(model: type[TomlTable], title: str, *, origins: bool = False) -> dict[str, Any]:
+def toml_schema(model: type[keys.TomlTable], title: str, *, origins: bool = False) -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a file."""
     found = model.model_json_schema(mode="validation")
     for table in (found, *found.get("$defs", {}).values()):
@@ -145,30 +134,30 @@ def toml_schema(model: type[TomlTable], title: str, *, origins: bool = False) ->
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | found | {"title": title}
 
 
-def _allow_origins(model: type[TomlTable], found: dict[str, Any], defs: dict[str, Any]) -> None:
+def _allow_origins(model: type[keys.TomlTable], found: dict[str, Any], defs: dict[str, Any]) -> None:
     """Allow a table of origins, or an origin at each value (such values are checked only on load)."""
-    defs["Origin"] = {"type": "string", "pattern": ORIGIN_TEXT, "description": "origin of the value"}
+    defs["Origin"] = {"type": "string", "pattern": keys.ORIGIN_TEXT, "description": "origin of the value"}
     stated = {"$ref": "#/$defs/Origin"}
     defs["Origins"] = {"type": "object", "additionalProperties": {"anyOf": [stated, {"$ref": "#/$defs/Origins"}]}}
-    both = {"value": {}, ORIGIN: stated}
+    both = {"value": {}, keys.ORIGIN: stated}
     defs["WithOrigin"] = {"type": "object", "properties": both, "required": [*both], "additionalProperties": False}
     beside = {"$ref": "#/$defs/WithOrigin"}
     tables = {model: found}
     while tables:
         table, entry = tables.popitem()
         for name, field in table.model_fields.items():
-            below = table_type(field)
-            if below is not None and not issubclass(below, InlineTable):
+            below = keys.table_type(field)
+            if below is not None and not issubclass(below, keys.InlineTable):
                 tables[below] = defs[below.__name__]
                 continue
             value = entry["properties"][name]
             if beside not in value.get("anyOf", ()):
                 text = {key: value.pop(key) for key in ("description", "default") if key in value}
                 entry["properties"][name] = {"anyOf": [*value.get("anyOf", [value]), beside]} | text
-    found["properties"][ORIGIN] = {"$ref": "#/$defs/Origins", "description": "origins of values, by key"}
+    found["properties"][keys.ORIGIN] = {"$ref": "#/$defs/Origins", "description": "origins of values, by key"}
 
 
-def keys_schema(model: type[TomlTable], value: dict[str, Any], kind: str, defs: dict[str, Any]) -> dict[str, Any]:
+def keys_schema(model: type[keys.TomlTable], value: dict[str, Any], kind: str, defs: dict[str, Any]) -> dict[str, Any]:
     """JSON Schema of a table that describes some keys of a file, by their dotted names or as tables."""
     name = f"{kind}.{model.__name__}"
     if name not in defs:
@@ -176,12 +165,12 @@ def keys_schema(model: type[TomlTable], value: dict[str, Any], kind: str, defs: 
         properties: dict[str, Any] = {}
         for key, field in model.model_fields.items():
             found = value
-            if (below := table_type(field)) is not None:
+            if (below := keys.table_type(field)) is not None:
                 table = keys_schema(below, value, kind, defs)
-                found = {"anyOf": [value, _table({"^[1-9][0-9]*$": table}) if item_type(field) else table]}
+                found = {"anyOf": [value, _table({"^[1-9][0-9]*$": table}) if keys.item_type(field) else table]}
             elif get_origin(field.annotation) in (dict, Mapping):
                 found = {"anyOf": [value, _table({".": value})]}
-            properties[key] = found | facts(field) | {"description": field.description or ""}
+            properties[key] = found | keys.facts(field) | {"description": field.description or ""}
             _describe(properties[key])
         defs[name] = _table({r"\.": value}) | {"properties": properties}
     return {"$ref": f"#/$defs/{name}"}

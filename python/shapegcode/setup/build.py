@@ -53,8 +53,9 @@ def set_up(answers: Answers) -> MachineSetup:
         if not found.modes:
             raise ArgumentError(f"modes.{axis} = {answer!r}: no mode that the data support: {found.answer}")
         others = "".join(other for other in known if other != axis)  # their modes are this machine's
-        text = update_modes(text, axis, found.modes, source=found.source, refused=found.refused, file=answers.name,
-                            keep_modes=others).text  # fmt: skip
+        text = update_modes(
+            text, axis, found.modes, source=found.source, refused=found.refused, file=answers.name, keep_modes=others
+        ).text
         frequencies = ", ".join(f"{mode.frequency_hz.value:g} Hz" for mode in found.modes)
         notes.append(f"{axis.upper()}: {frequencies} from {answer}")
     machine = Machine.from_toml(text, answers.name)

@@ -45,11 +45,6 @@ class MachineSetup(Result):
     file: str = ""
 
     @property
-    def ok(self) -> bool:
-        """Always true: a machine that cannot be used is refused."""
-        return True
-
-    @property
     def answer(self) -> str:
         """Number of known values, and axes with unknown vibration."""
         count = len(self.answered)

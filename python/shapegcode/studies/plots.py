@@ -41,9 +41,10 @@ def plot_tornado(study: MachineStudy, ax: Axes | None = None) -> Axes:
     """
     rows = study.parameter_sensitivity[:_BARS]
     panel = plot.axes(
-        ax, size_inch=(9.0, 1.6 + 0.4 * len(rows)),
+        ax,
+        size_inch=(9.0, 1.6 + 0.4 * len(rows)),
         title=f"Influence on the verdict: {Path(study.program).name} on {study.machine}",
-    )  # fmt: skip
+    )
     whole = study.quantity(SHARE)
     for place, row in enumerate(rows):
         panel.barh(place, row.high - row.low, left=row.low, height=0.6, color=plot.COLOURS[1])

@@ -394,9 +394,10 @@ class Optimum(Result):
         was = None if self.as_it_is is None else self.as_it_is.time_s
         return (
             Figure("cycle time", "s", was, self.best.time_s, 3, None, "as_it_is.time_s", "best.time_s"),
-            Figure("stay within tolerance", "%", None, (self.best.checked or 0.0) * 100, 1, None, "", "best.checked",
-                   100.0),
-        )  # fmt: skip
+            Figure(
+                "stay within tolerance", "%", None, (self.best.checked or 0.0) * 100, 1, None, "", "best.checked", 100.0
+            ),
+        )
 
     def plots(self) -> Mapping[str, Plot]:
         """Time and probability of the shortest combinations; empty without any emitted program."""

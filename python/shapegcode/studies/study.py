@@ -19,25 +19,7 @@ from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.program.computer import cores
 from shapegcode.settings.keys import toml
-from shapegcode.studies.replay import (
-    CONTOURS,
-    DEFAULT_MEASURES,
-    SHARE,
-    Replay,
-    SamplesJob,
-    checked_measures,
-    simulate_all,
-)
-from shapegcode.studies.result import (
-    PERCENT,
-    BinQuantiles,
-    Bins,
-    MachineStudy,
-    ParameterInfluence,
-    Quantity,
-    RefusedDraws,
-    VariedKey,
-)
+from shapegcode.studies import replay as replays, result as results
 from shapegcode.studies.varied import (
     Columns,
     Listed,
@@ -60,14 +42,14 @@ def study(
     *,
     n: int = 1000,
     sampling: str = "sobol",
-    measure: Sequence[str] = DEFAULT_MEASURES,
+    measure: Sequence[str] = replays.DEFAULT_MEASURES,
     seed: int = 0,
     indices: bool = False,
     at_least: float = 0.95,
     shape_all: bool = False,
     scheduler: Cluster | str | None = None,
     on_progress: Progress = lambda _stage, _share: None,
-) -> MachineStudy:
+) -> results.MachineStudy:
     """Simulate a program on machines with sampled values, and compute the probability of staying within tolerance.
 
     The program is converted once, for the machine file. A mode, drive, filter or time in `vary` is changed only in the
@@ -101,7 +83,7 @@ def study(
     """
     machine = Machine.of(machine)
     check_probability("at_least", at_least)
-    wanted = checked_measures(measure)
+    wanted = replays.checked_measures(measure)
     varied = varied_values(machine, vary)
     columns = sampled_columns(varied, n, sampling, seed, indices=indices)
     check_ends(machine, varied, columns)
@@ -135,7 +117,7 @@ class _Text:
 
     draws: tuple[int, ...]
     values: Mapping[str, object]
-    replay: Replay | None
+    replay: replays.Replay | None
     why: str = ""
 
 
@@ -173,7 +155,7 @@ class _StudyRun:
     def _text(self, draws: tuple[int, ...], values: Mapping[str, object]) -> _Text:
         machine = sampled_machine(self.machine, values, f"{self.machine.name}, sample {draws[0] + 1}")
         try:
-            return _Text(draws, values, Replay.of(self.program, machine, shape_all=self.shape_all))
+            return _Text(draws, values, replays.Replay.of(self.program, machine, shape_all=self.shape_all))
         except (ArgumentError, DesignError) as error:
             if not values:
                 raise  # there is no other program
@@ -181,7 +163,7 @@ class _StudyRun:
 
     def _simulate(self, text: _Text, before: int) -> None:
         assert text.replay is not None
-        job = SamplesJob(
+        job = replays.SamplesJob(
             self.machine.name,
             tuple(self._row(index, known=False) for index in text.draws),
             tuple(index + 1 for index in text.draws),
@@ -195,13 +177,13 @@ class _StudyRun:
             done += more
             self.on_progress("simulating", done / self.count)
 
-        self.measured[list(text.draws)] = simulate_all(text.replay, job, self.pool, tell)
+        self.measured[list(text.draws)] = replays.simulate_all(text.replay, job, self.pool, tell)
 
     def _simulate_nominal(self, texts: Sequence[_Text]) -> None:
         """Simulate the program converted for the machine file on that machine."""
         try:
             held = next((text.replay for text in texts if not text.values), None)
-            replay = held or Replay.of(self.program, self.machine, shape_all=self.shape_all)
+            replay = held or replays.Replay.of(self.program, self.machine, shape_all=self.shape_all)
         except (ArgumentError, DesignError, MachineError):
             self.nominal = dict.fromkeys(self.wanted, float("nan"))
             return
@@ -210,23 +192,23 @@ class _StudyRun:
 
 def _result(
     run: _StudyRun, texts: Sequence[_Text], sampling: str, seed: int, at_least: float, *, indices: bool
-) -> MachineStudy:
-    kept = np.flatnonzero(~np.isnan(run.measured[:, run.wanted.index(SHARE)]))
+) -> results.MachineStudy:
+    kept = np.flatnonzero(~np.isnan(run.measured[:, run.wanted.index(replays.SHARE)]))
     refused = [text for text in texts if text.replay is None]
     if len(kept) == 0:
         raise ArgumentError(f"no sample could be simulated: {refused[0].why}")
     columns = [[column[index] for index in kept] for column in run.columns]
     measured = {name: run.measured[kept, rank] for rank, name in enumerate(run.wanted)}
-    shares = measured[SHARE]
+    shares = measured[replays.SHARE]
     # A sample without an emitted program counts as out of tolerance.
     good = int(within(shares).sum())
     whole = indices and not refused
     warnings = [f"{run.count - len(kept)} of {run.count} samples have no program: they count as out of tolerance"]
     warnings += ["no Sobol indices: they need every sample"] if indices else []
-    alone = CONTOURS.isdisjoint(run.wanted)
+    alone = replays.CONTOURS.isdisjoint(run.wanted)
     alone_warnings = ["no contour is measured: within tolerance means its residual vibration alone"] if alone else []
-    replays = [text.replay for text in texts if text.replay is not None]
-    return MachineStudy(
+    shaped = [text.replay for text in texts if text.replay is not None]
+    return results.MachineStudy(
         program=run.program.source if isinstance(run.program, Program) else run.program,
         machine=run.machine.name,
         sampling=sampling,
@@ -234,7 +216,8 @@ def _result(
         n=len(kept),
         conversions=len(texts),
         varied=tuple(
-            VariedKey(each.key, each.value, each.unit, each.distribution.words, each.known) for each in run.varied
+            results.VariedKey(each.key, each.value, each.unit, each.distribution.words, each.known)
+            for each in run.varied
         ),
         within=good / run.count,
         within_interval=interval_of(good, run.count),
@@ -242,15 +225,15 @@ def _result(
         quantities=tuple(quantity(name, values, run.nominal[name]) for name, values in measured.items()),
         parameter_sensitivity=parameter_sensitivity(run.varied, columns, shares, indices=whole, seed=seed),
         curves=tuple(
-            Bins(each.key, name, bins_of(each, column, values), not isinstance(each.distribution, Listed))
+            results.Bins(each.key, name, bins_of(each, column, values), not isinstance(each.distribution, Listed))
             for each, column in zip(run.varied, columns, strict=True)
             for name, values in measured.items()
         ),
-        refused=tuple(RefusedDraws(toml(dict(text.values)), len(text.draws), text.why) for text in refused),
+        refused=tuple(results.RefusedDraws(toml(dict(text.values)), len(text.draws), text.why) for text in refused),
         warnings=(*alone_warnings, *(warnings if refused else ())),
         limits_um={
-            "residual_um": min(replay.residual_limit_um for replay in replays),
-            "contour_um": min(replay.contour_limit_um for replay in replays),
+            "residual_um": min(replay.residual_limit_um for replay in shaped),
+            "contour_um": min(replay.contour_limit_um for replay in shaped),
         },
         draws={each.key: np.array(column) for each, column in zip(run.varied, columns, strict=True)} | measured,
     )
@@ -268,10 +251,10 @@ def check_probability(name: str, value: object) -> None:
         raise ArgumentError(f"{name} = {value!r}: must be a probability, above 0 and at most 1")
 
 
-def quantity(name: str, values: FloatArray, nominal: float) -> Quantity:
+def quantity(name: str, values: FloatArray, nominal: float) -> results.Quantity:
     """Quantiles of one measure."""
-    p5, p25, p50, p75, p95, p99 = np.percentile(values, PERCENT).tolist()
-    return Quantity(name, nominal, float(values.mean()), p5, p25, p50, p75, p95, p99, float(values.max()))
+    p5, p25, p50, p75, p95, p99 = np.percentile(values, results.PERCENT).tolist()
+    return results.Quantity(name, nominal, float(values.mean()), p5, p25, p50, p75, p95, p99, float(values.max()))
 
 
 def within(shares: FloatArray) -> npt.NDArray[np.bool_]:
@@ -289,7 +272,7 @@ def interval_of(good: int, count: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple[BinQuantiles, ...]:
+def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple[results.BinQuantiles, ...]:
     """Quantiles of a measure over a varied value: in ten bins with equal numbers of samples, or by choice."""
     if isinstance(each.distribution, Listed):
         groups = [
@@ -304,13 +287,13 @@ def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple
     return tuple(_bin(middle, f"{middle:.4g}", values[part]) for middle, part in parts)
 
 
-def _bin(at: float, name: str, values: FloatArray) -> BinQuantiles:
-    return BinQuantiles(at, name, *np.percentile(values, (5.0, 50.0, 95.0)).tolist())
+def _bin(at: float, name: str, values: FloatArray) -> results.BinQuantiles:
+    return results.BinQuantiles(at, name, *np.percentile(values, (5.0, 50.0, 95.0)).tolist())
 
 
 def parameter_sensitivity(
     varied: Sequence[Varied], columns: Sequence[Sequence[object]], shares: FloatArray, *, indices: bool, seed: int
-) -> tuple[ParameterInfluence, ...]:
+) -> tuple[results.ParameterInfluence, ...]:
     """Influence of each value on the ratio to the limit, largest first."""
     found = _indices(varied, shares, seed) if indices else {}
     rows = []
@@ -318,7 +301,7 @@ def parameter_sensitivity(
         bins = bins_of(each, column, shares)
         low, high = min(bins, key=lambda one: one.median), max(bins, key=lambda one: one.median)
         index = found.get(each.key, ())
-        rows.append(ParameterInfluence(each.key, low.median, high.median, low.name, high.name, *index))
+        rows.append(results.ParameterInfluence(each.key, low.median, high.median, low.name, high.name, *index))
     rank = (lambda row: row.total or 0.0) if found else (lambda row: row.high - row.low)
     return tuple(sorted(rows, key=rank, reverse=True))
 

@@ -39,11 +39,6 @@ class CutDesign(Result):
     machine: Machine = field(metadata=hidden())
 
     @property
-    def ok(self) -> bool:
-        """Always true: the design can be cut."""
-        return True
-
-    @property
     def answer(self) -> str:
         """Kind, passes and duration."""
         cut = self.cut
@@ -179,15 +174,7 @@ class TaperResult(Result):
             return "more passes, with other feeds or a longer stock"
         return "put [cutting] into the tool file (-o FILE writes it)"
 
-    def next_step_after(self, file: str) -> str:
-        """Next step after [cutting] was written.
-
-        Args:
-            file: name of the file.
-
-        Returns:
-            One sentence.
-        """
+    def _next_with(self, file: str) -> str:
         return self.next_step if self.poor else f"put [cutting] of {file} into the tool file"
 
     def tables(self) -> list[Table]:

@@ -13,16 +13,7 @@ from shapegcode import _core
 from shapegcode.io.data_file import read_file
 from shapegcode.io.ini import UNITS_MM, ini_entries
 from shapegcode.machine import Machine
-from shapegcode.program.foreign.read import (
-    ForeignProgram,
-    ForeignSettings,
-    called_program,
-    located_errors,
-    program_folders,
-    program_of_core,
-    refusal,
-    shown_name,
-)
+from shapegcode.program.foreign import read
 
 _MAX_BYTES = 10_000_000  # of a tool table
 _LAST_TOOL = 2**31 - 1
@@ -31,22 +22,22 @@ _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
 _BEGINS_IN = {"plane": "G17", "distance": "G90", "feed_mode": "G94", "path_mode": "G64"}
 
 
-def read_linuxcnc(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
+def read_linuxcnc(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> read.ForeignProgram:
     """Read a LinuxCNC program as an expanded program."""
     table = find_tool_table(machine.input.tool_table, machine.input.machine_unit, folder)
     options = _options(machine, table)
-    options.file, folders = shown_name(file), program_folders(machine, folder)
+    options.file, folders = read.shown_name(file), read.program_folders(machine, folder)
     options.find_subroutine = lambda name: _subroutine(name, folders, machine)
-    with located_errors(file):
+    with read.located_errors(file):
         program = _core.read_linuxcnc(source.encode("latin-1", "replace"), options)
     tools = {} if table is None else table.tools
-    settings = ForeignSettings(
+    settings = read.ForeignSettings(
         tool_length_mm={number: tool.offset_mm[2] for number, tool in tools.items()},
         tool_radius_mm={number: tool.diameter_mm / 2.0 for number, tool in tools.items()},
         peck_clearance_mm=_core.linuxcnc_peck_clearance_mm,
         path_tolerance_mm=program.path_tolerance_mm,
     )
-    return program_of_core("linuxcnc", program.expanded, settings)
+    return read.program_of_core("linuxcnc", program.expanded, settings)
 
 
 def _options(machine: Machine, table: ToolTable | None) -> _core.LinuxcncOptions:
@@ -63,7 +54,7 @@ def _options(machine: Machine, table: ToolTable | None) -> _core.LinuxcncOptions
     options.machine_unit_mm = UNITS_MM[given.machine_unit]
     if table is not None:
         options.tool_table = _core.LinuxcncToolTable(
-            shown_name(table.file),
+            read.shown_name(table.file),
             table.units,
             UNITS_MM[table.units],
             {number: (tool.offset_mm, tool.diameter_mm) for number, tool in table.tools.items()},
@@ -83,7 +74,7 @@ def _subroutine(name: str, folders: list[Path], machine: Machine) -> tuple[str, 
         return None
     for path in (folder / (name + suffix) for folder in folders for suffix in (".ngc", ".NGC", ".nc")):
         if path.is_file():
-            return called_program(path, machine)
+            return read.called_program(path, machine)
     return None
 
 
@@ -115,11 +106,11 @@ def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | 
     entries = ini_entries(read_file(path, _MAX_BYTES).decode("utf-8", "replace"))
     table, _ = entries.get(("EMCIO", "TOOL_TABLE"), ("", 0))
     if not table:
-        raise refusal(str(path), 1, "it has no [EMCIO] TOOL_TABLE")
+        raise read.refusal(str(path), 1, "it has no [EMCIO] TOOL_TABLE")
     linear, line = entries.get(("TRAJ", "LINEAR_UNITS"), ("mm", 1))
     unit_mm = UNITS_MM.get(linear.lower())
     if unit_mm is None:
-        raise refusal(str(path), line, f"[TRAJ] LINEAR_UNITS = {linear.lower()} is neither mm nor inch")
+        raise read.refusal(str(path), line, f"[TRAJ] LINEAR_UNITS = {linear.lower()} is neither mm nor inch")
     return read_tool_table(path.parent / Path(table).expanduser(), "inch" if unit_mm > 1.0 else "mm")
 
 
@@ -134,7 +125,7 @@ def read_tool_table(path: Path, unit: str) -> ToolTable:
             continue
         words = {letter.upper(): float(value) for letter, value in _WORD.findall(code)}
         if words.get("T", _LAST_TOOL + 1.0) > _LAST_TOOL or _WORD.sub("", code).strip():
-            raise refusal(str(path), number, f"{code[:40]!r} is not a row of a tool table (T1 P1 Z12.5 D6)")
+            raise read.refusal(str(path), number, f"{code[:40]!r} is not a row of a tool table (T1 P1 Z12.5 D6)")
         x, y, z = (words.get(axis, 0.0) * factor for axis in "XYZ")
         tools[int(words["T"])] = ToolRow((x, y, z), words.get("D", 0.0) * factor)
     return ToolTable(tools, str(path), unit)

@@ -14,24 +14,16 @@ from pathlib import Path
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.program.foreign.read import (
-    ForeignProgram,
-    ForeignSettings,
-    called_program,
-    located_errors,
-    program_folders,
-    program_of_core,
-    shown_name,
-)
+from shapegcode.program.foreign import read
 
 
-def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
+def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> read.ForeignProgram:
     """Read a SINUMERIK program in DIN words.
 
     Subprograms are searched in the text, in `folder` and in `input.program_folders`: NAME.SPF, then NAME.MPF.
     """
     controller, settings, options = machine.controller, machine.input, _core.SiemensOptions()
-    options.file = shown_name(file)
+    options.file = read.shown_name(file)
     options.name = re.sub(r"(?i)^_N_|_(MPF|SPF)$|\.[A-Z0-9]+$", "", re.split(r"[/\\]", options.file)[-1]).upper()
     options.least_increment_mm = controller.least_increment_mm
     options.arc_radius_tolerance_mm = controller.arc_radius_tolerance_mm
@@ -43,9 +35,9 @@ def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | Non
     options.left_out, options.left_out_addresses, refused = _tables()
     options.refused = lambda word: next((why for pattern, why in refused.items() if pattern.fullmatch(word)), "")
     options.called = _finder(machine, folder)
-    with located_errors(file):
+    with read.located_errors(file):
         program = _core.read_siemens(source, options)
-    return program_of_core("siemens", program.expanded, ForeignSettings(names=dict(program.names)))
+    return read.program_of_core("siemens", program.expanded, read.ForeignSettings(names=dict(program.names)))
 
 
 @cache
@@ -63,7 +55,7 @@ def _tables() -> tuple[dict[str, str], dict[str, str], dict[re.Pattern[str], str
 def _finder(machine: Machine, folder: Path | None) -> Callable[[str], tuple[str, bytes] | None]:
     """Make a finder of called programs' files: it returns name and text."""
     files: dict[str, Path] = {}  # by name in capitals; filled at the first search
-    folders = program_folders(machine, folder)
+    folders = read.program_folders(machine, folder)
 
     def find(name: str) -> tuple[str, bytes] | None:
         while folders:
@@ -74,7 +66,7 @@ def _finder(machine: Machine, folder: Path | None) -> Callable[[str], tuple[str,
         path = next((files[file] for file in known if file in files), None)
         if path is None:
             return None
-        shown, text = called_program(path, machine)
+        shown, text = read.called_program(path, machine)
         return shown, text.decode("utf-8", "replace").encode()
 
     return find

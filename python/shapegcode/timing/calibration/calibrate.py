@@ -16,39 +16,7 @@ from shapegcode.errors import ArgumentError
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.timing.calibration import open_times
-from shapegcode.timing.calibration.motion import (
-    FAMILIES,
-    FunctionFit,
-    LookAhead,
-    MotionFit,
-    fit_functions,
-    fit_motion,
-    m_codes,
-    misfit,
-    parameter_covariance,
-    sections_of,
-    spindle_rows,
-    starts_of,
-    whole_model,
-)
-from shapegcode.timing.calibration.observed import (
-    ObservedRun,
-    TimedProgram,
-    longest,
-    observe,
-    rapid_rate,
-    timed_program,
-    with_override,
-)
-from shapegcode.timing.calibration.result import (
-    TOLERANCE_PERCENT,
-    CalibratedParameter,
-    CalibrationRun,
-    CycleTimeCalibration,
-    CycleTimePart,
-    FamilyScore,
-)
+from shapegcode.timing.calibration import motion as fitting, observed as logs, open_times, result
 from shapegcode.timing.calibration.runs_file import RunsFile, load_runs
 from shapegcode.timing.interval import time_interval
 
@@ -64,17 +32,17 @@ _CALLS = 2500  # approximate misfit evaluations per fit, for the progress bar
 class _Calibration:
     """Motion and function times calibrated from a subset of the runs."""
 
-    motion: MotionFit
-    functions: FunctionFit
+    motion: fitting.MotionFit
+    functions: fitting.FunctionFit
     machine: Machine
 
     @classmethod
-    def of(cls, runs: Sequence[ObservedRun], motion: MotionFit, machine: Machine) -> _Calibration:
-        return cls(motion, fit_functions(runs, motion, machine), machine)
+    def of(cls, runs: Sequence[logs.ObservedRun], motion: fitting.MotionFit, machine: Machine) -> _Calibration:
+        return cls(motion, fitting.fit_functions(runs, motion, machine), machine)
 
-    def starts(self, run: ObservedRun) -> FloatArray:
+    def starts(self, run: logs.ObservedRun) -> FloatArray:
         functions = self.functions
-        model = whole_model(self.machine, self.motion, functions.values, functions.last_tool_in_spindle)
+        model = fitting.whole_model(self.machine, self.motion, functions.values, functions.last_tool_in_spindle)
         return _predicted_starts(run, model)
 
 
@@ -84,7 +52,7 @@ def calibrate_cycle_time(
     *,
     families: Sequence[str] | None = None,
     on_progress: Callable[[float], None] | None = None,
-) -> CycleTimeCalibration:
+) -> result.CycleTimeCalibration:
     """Calibrate the cycle-time model of a machine from run logs.
 
     Logs are aligned with their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted
@@ -112,8 +80,8 @@ def calibrate_cycle_time(
     observed = _observed(file, machine)
     # The rapid rate is from the fitted runs; for the others it gives the override.
     fitted, others_seen = ([run for run in observed if run.entry.use == use] for use in ("fit", "test"))
-    rate, fitted = rapid_rate(fitted)
-    observed = [*fitted, *(with_override(run, rate) for run in others_seen)]
+    rate, fitted = logs.rapid_rate(fitted)
+    observed = [*fitted, *(logs.with_override(run, rate) for run in others_seen)]
     if not fitted:
         raise ArgumentError(f'{file.path}: no run has use = "fit": there is nothing to calibrate with')
     folds = _folds(fitted)
@@ -134,7 +102,7 @@ def calibrate_cycle_time(
     scatters = _scatters(rows, observed, learned)
     with_it, remarks, numbers, undetermined = learned_machine(learned, fitted, rivals, scatters)
     rows = [_with_interval(row, run, with_it) for row, run in zip(rows, observed, strict=True)]
-    return CycleTimeCalibration(
+    return result.CycleTimeCalibration(
         machine=machine.name,
         family=motion.family.name,
         families=tuple(scores),
@@ -163,33 +131,33 @@ class _Meter:
         self._done, self._steps = min(self._done + 1, self._fits - 1), 0
 
 
-def _families(names: Sequence[str] | None) -> list[LookAhead]:
+def _families(names: Sequence[str] | None) -> list[fitting.LookAhead]:
     if names is None:
-        return list(FAMILIES)
-    known = {family.name: family for family in FAMILIES}
+        return list(fitting.FAMILIES)
+    known = {family.name: family for family in fitting.FAMILIES}
     for name in names or [""]:
         if name not in known:
             raise ArgumentError(f"kind of look-ahead {name!r}: must be one of {', '.join(known)}")
     return [known[name] for name in names]
 
 
-def _observed(file: RunsFile, machine: Machine) -> list[ObservedRun]:
-    timed: dict[Path, TimedProgram] = {}
+def _observed(file: RunsFile, machine: Machine) -> list[logs.ObservedRun]:
+    timed: dict[Path, logs.TimedProgram] = {}
     found = []
     for entry in file.used:
         path = entry.program.resolve()
         if path not in timed:
-            timed[path] = timed_program(Program.read(entry.program, machine))
-        found += [observe(entry, log, timed[path], machine) for log in entry.read()]
+            timed[path] = logs.timed_program(Program.read(entry.program, machine))
+        found += [logs.observe(entry, log, timed[path], machine) for log in entry.read()]
     return found
 
 
-def _folds(runs: Sequence[ObservedRun]) -> list[list[ObservedRun]]:
+def _folds(runs: Sequence[logs.ObservedRun]) -> list[list[logs.ObservedRun]]:
     """Cross-validation groups: the runs of a program; with a single program (weaker) every other run.
 
     None if there is only one group.
     """
-    by_program: dict[int, list[ObservedRun]] = defaultdict(list)
+    by_program: dict[int, list[logs.ObservedRun]] = defaultdict(list)
     for run in runs:
         by_program[id(run.timed)].append(run)
     groups = list(by_program.values()) if len(by_program) > 1 else [[run] for run in runs]
@@ -199,34 +167,40 @@ def _folds(runs: Sequence[ObservedRun]) -> list[list[ObservedRun]]:
 
 
 def _tried(
-    tried: Sequence[LookAhead], runs: Sequence[ObservedRun], folds: Sequence[Sequence[ObservedRun]], machine: Machine,
-    rate: float, meter: _Meter,
-) -> tuple[list[MotionFit], list[FamilyScore]]:  # fmt: skip
-    sections = sections_of(runs)
+    tried: Sequence[fitting.LookAhead],
+    runs: Sequence[logs.ObservedRun],
+    folds: Sequence[Sequence[logs.ObservedRun]],
+    machine: Machine,
+    rate: float,
+    meter: _Meter,
+) -> tuple[list[fitting.MotionFit], list[result.FamilyScore]]:
+    sections = fitting.sections_of(runs)
     if not sections:
         raise ArgumentError(
             "no log reports lines of a section of cuts often enough (10 readings): there is nothing to calibrate with"
         )
     fits, scores = [], []
     for family in tried:
-        fit = fit_motion(runs, family, machine, rate, on_step=meter.step)
+        fit = fitting.fit_motion(runs, family, machine, rate, on_step=meter.step)
         meter.next()
         left_out = []
         for fold in folds:
             rest = [run for run in runs if run not in fold]
-            part = fit_motion(rest, family, machine, rate, on_step=meter.step, thorough=False)
-            left_out.append(misfit(sections_of(fold), part.model(machine)))
+            part = fitting.fit_motion(rest, family, machine, rate, on_step=meter.step, thorough=False)
+            left_out.append(fitting.misfit(fitting.sections_of(fold), part.model(machine)))
             meter.next()
         fits.append(fit)
-        score = misfit(sections, fit.model(machine))
-        scores.append(FamilyScore(family.name, family.meaning, score, float(np.mean(left_out)) if left_out else None))
+        score = fitting.misfit(sections, fit.model(machine))
+        scores.append(
+            result.FamilyScore(family.name, family.meaning, score, float(np.mean(left_out)) if left_out else None)
+        )
     return fits, scores
 
 
 def _left_out(
-    runs: Sequence[ObservedRun],
-    folds: Sequence[Sequence[ObservedRun]],
-    motion: MotionFit,
+    runs: Sequence[logs.ObservedRun],
+    folds: Sequence[Sequence[logs.ObservedRun]],
+    motion: fitting.MotionFit,
     machine: Machine,
     rate: float,
 ) -> dict[int, _Calibration]:
@@ -234,15 +208,15 @@ def _left_out(
     found: dict[int, _Calibration] = {}
     for fold in folds:
         rest = [run for run in runs if run not in fold]
-        other = _Calibration.of(rest, fit_motion(rest, motion.family, machine, rate), machine)
+        other = _Calibration.of(rest, fitting.fit_motion(rest, motion.family, machine, rate), machine)
         found |= {id(run): other for run in fold}
     return found
 
 
-def _warnings(row: CalibrationRun) -> Iterator[str]:
+def _warnings(row: result.CalibrationRun) -> Iterator[str]:
     judged = row.judged_percent
-    if judged is not None and abs(judged) > TOLERANCE_PERCENT:
-        yield f"{row.name}: {judged:+.1f} % from the measured time, more than {TOLERANCE_PERCENT:g} %"
+    if judged is not None and abs(judged) > result.TOLERANCE_PERCENT:
+        yield f"{row.name}: {judged:+.1f} % from the measured time, more than {result.TOLERANCE_PERCENT:g} %"
     if len(row.holds) > _MAX_HOLDS:
         yield (
             f"{row.name}: stopped {len(row.holds)} times without a programmed stop, first at "
@@ -252,11 +226,11 @@ def _warnings(row: CalibrationRun) -> Iterator[str]:
         yield from (f"{row.name}: hold at {hold}" for hold in row.holds)
 
 
-def _row(run: ObservedRun, learned: _Calibration, other: _Calibration | None) -> CalibrationRun:
+def _row(run: logs.ObservedRun, learned: _Calibration, other: _Calibration | None) -> result.CalibrationRun:
     starts = learned.starts(run)
     holds = _holds_of(run, starts)
     tools, kinds = _shares(run, starts, holds)
-    return CalibrationRun(
+    return result.CalibrationRun(
         program=str(run.entry.program),
         log=run.log.source,
         use=run.entry.use,
@@ -276,7 +250,7 @@ def _row(run: ObservedRun, learned: _Calibration, other: _Calibration | None) ->
 
 
 def _scatters(
-    rows: Sequence[CalibrationRun], observed: Sequence[ObservedRun], learned: _Calibration
+    rows: Sequence[result.CalibrationRun], observed: Sequence[logs.ObservedRun], learned: _Calibration
 ) -> tuple[float, float]:
     """Scatter of the time between two cuts, s, and relative scatter of repeated runs of a program."""
     ratios: dict[str, list[float]] = defaultdict(list)
@@ -291,7 +265,7 @@ def _scatters(
     return max(learned.functions.scatter_s, together), open_times.run_scatter(ratios)
 
 
-def _with_interval(row: CalibrationRun, run: ObservedRun, machine: Machine) -> CalibrationRun:
+def _with_interval(row: result.CalibrationRun, run: logs.ObservedRun, machine: Machine) -> result.CalibrationRun:
     """Add the interval that `time` gives for the program on the calibrated machine at the run's overrides."""
     interval = time_interval(run.timed.program, machine, row.feed_override, row.rapid_override)
     half = interval.half_width_s * row.predicted_s / interval.total_s if interval and interval.total_s > 0.0 else 0.0
@@ -304,9 +278,9 @@ _MIN_HOLD_S = 2.0
 _READING_S = 0.35  # time that two readings may hide
 
 
-def _predicted_starts(run: ObservedRun, model: _core.FanucModel) -> FloatArray:
+def _predicted_starts(run: logs.ObservedRun, model: _core.FanucModel) -> FloatArray:
     """(line_count + 2,) Start time of each line at the overrides of the run, s; the last entry is the end."""
-    starts_at = starts_of(model)
+    starts_at = fitting.starts_of(model)
     starts = starts_at(run, 1.0).copy()
     for cut_section in sorted(run.cut_sections, key=lambda each: each.feed_override):
         if cut_section.feed_override != 1.0:
@@ -318,7 +292,7 @@ def _predicted_starts(run: ObservedRun, model: _core.FanucModel) -> FloatArray:
     return starts
 
 
-def _holds_of(run: ObservedRun, starts: FloatArray) -> list[_Hold]:
+def _holds_of(run: logs.ObservedRun, starts: FloatArray) -> list[_Hold]:
     """Find stops in a run that are not programmed."""
     found = [(begin, length, "hold") for begin, length in run.log.holds]
     found = [_not_covered(run, starts, hold) for hold in (*found, *_held_rapids(run))]
@@ -335,7 +309,7 @@ def _holds_of(run: ObservedRun, starts: FloatArray) -> list[_Hold]:
     return sorted(found)
 
 
-def _held_rapids(run: ObservedRun) -> list[_Hold]:
+def _held_rapids(run: logs.ObservedRun) -> list[_Hold]:
     signal = run.log.rapid_override
     if signal is None or run.duration_s is None:
         return []
@@ -357,7 +331,7 @@ def _held_rapids(run: ObservedRun) -> list[_Hold]:
     return [hold for hold in found if hold[1] > 1.0]
 
 
-def _not_covered(run: ObservedRun, starts: FloatArray, hold: _Hold) -> _Hold:
+def _not_covered(run: logs.ObservedRun, starts: FloatArray, hold: _Hold) -> _Hold:
     """Part of a hold that lengthened the run: a spindle start or coolant may elapse within it."""
     begin, length, why = hold
     plain = np.flatnonzero(~run.timed.function[run.line] & np.isfinite(run.timed.feed_mm_per_s[run.line]))
@@ -371,8 +345,8 @@ def _not_covered(run: ObservedRun, starts: FloatArray, hold: _Hold) -> _Hold:
 
 
 def _shares(
-    run: ObservedRun, starts: FloatArray, holds: list[_Hold]
-) -> tuple[tuple[CycleTimePart, ...], tuple[CycleTimePart, ...]]:
+    run: logs.ObservedRun, starts: FloatArray, holds: list[_Hold]
+) -> tuple[tuple[result.CycleTimePart, ...], tuple[result.CycleTimePart, ...]]:
     """Split a run by tool, and by kind of motion."""
     end_s = run.duration_s
     if end_s is None:
@@ -398,8 +372,8 @@ def _shares(
             cut_measured += until_s - begin_s - _held(holds, begin_s, until_s)
             cut_predicted += float(np.diff(starts[run.line[ends]])[0])
     between = end_s - _held(holds, 0.0, end_s) - cut_measured, float(starts[-1]) - cut_predicted
-    kinds = CycleTimePart("cuts", cut_measured, cut_predicted), CycleTimePart("between cuts", *between)
-    return tuple(CycleTimePart(name, *both) for name, both in shares.items()), kinds
+    kinds = result.CycleTimePart("cuts", cut_measured, cut_predicted), result.CycleTimePart("between cuts", *between)
+    return tuple(result.CycleTimePart(name, *both) for name, both in shares.items()), kinds
 
 
 def _held(holds: list[_Hold], begin_s: float, end_s: float) -> float:
@@ -413,22 +387,22 @@ _MAX_WAY_S = 10.0  # limit of times.unknown_move_s
 _KNOWN = 4.0  # an interval this wide on both sides determines nothing
 
 
-def _feed_override(run: ObservedRun) -> float:
+def _feed_override(run: logs.ObservedRun) -> float:
     """Feed override of most of a run's cutting."""
-    return longest((each.feed_override, each.lines[1] - each.lines[0]) for each in run.cut_sections)[0]
+    return logs.longest((each.feed_override, each.lines[1] - each.lines[0]) for each in run.cut_sections)[0]
 
 
 def learned_machine(
     learned: _Calibration,
-    runs: Sequence[ObservedRun],
+    runs: Sequence[logs.ObservedRun],
     rivals: Sequence[tuple[_Calibration, float]],
     scatters: tuple[float, float],
-) -> tuple[Machine, dict[str, str], list[CalibratedParameter], list[str]]:
+) -> tuple[Machine, dict[str, str], list[result.CalibratedParameter], list[str]]:
     """The machine with the calibrated parameters, and the parameters that the logs do not determine."""
     motion, functions, machine = learned.motion, learned.functions, learned.machine
     source = f"logs of {len(runs)} runs"
     values = motion.file_values() | _function_values(functions, runs)
-    covariance, variances = parameter_covariance(motion, runs, machine)
+    covariance, variances = fitting.parameter_covariance(motion, runs, machine)
     numbers, remarks = _motion_numbers(machine, motion, variances, source)
     rate = motion.rapid_mm_per_s * 60.0
     if math.isfinite(rate):
@@ -465,8 +439,8 @@ def learned_machine(
 
 
 def _motion_numbers(
-    machine: Machine, motion: MotionFit, variances: FloatArray, source: str
-) -> tuple[list[CalibratedParameter], dict[str, str]]:
+    machine: Machine, motion: fitting.MotionFit, variances: FloatArray, source: str
+) -> tuple[list[result.CalibratedParameter], dict[str, str]]:
     numbers, remarks = [], {}
     for parameter, variance in zip(motion.family.parameters, variances, strict=True):
         fitted, ratio = motion.values[parameter.name], math.exp(min(1.96 * math.sqrt(variance), 5.0))
@@ -486,10 +460,10 @@ def _motion_numbers(
 
 def _number(
     key: str, meaning: str, values: tuple[float, float, float], unit: str, told: bool, had: float | None = None
-) -> CalibratedParameter:
+) -> result.CalibratedParameter:
     """A parameter and its interval, rounded for display."""
     value, low, high = (float(f"{each:.4g}") for each in values)
-    return CalibratedParameter(key, meaning, value, low, high, unit, told, had)
+    return result.CalibratedParameter(key, meaning, value, low, high, unit, told, had)
 
 
 # Key, meaning and unit of times in addition to motion, by name in the fit; other names are M codes.
@@ -510,9 +484,9 @@ def _meaning(name: str) -> tuple[str, str, str]:
     return _FUNCTIONS.get(name) or ("times.m_codes", f"M{int(name[1:]):02d}", "s")
 
 
-def _usual(overrides: Iterable[float], runs: Sequence[ObservedRun]) -> float:
+def _usual(overrides: Iterable[float], runs: Sequence[logs.ObservedRun]) -> float:
     """Override of most of the run time; 1 if the operator changed it often."""
-    value, ratio = longest(zip(overrides, (run.duration_s or 0.0 for run in runs), strict=True))
+    value, ratio = logs.longest(zip(overrides, (run.duration_s or 0.0 for run in runs), strict=True))
     return value if ratio >= _USUAL else 1.0
 
 
@@ -524,9 +498,9 @@ def _had(machine: Machine, key: str) -> float | None:
     return float(target) if isinstance(target, int | float) else None
 
 
-def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dict[str, object]:
+def _function_values(functions: fitting.FunctionFit, runs: Sequence[logs.ObservedRun]) -> dict[str, object]:
     values = functions.values
-    codes = {code: round(value, 3) for code, value in m_codes(values).items() if round(value, 3) >= 0.005}
+    codes = {code: round(value, 3) for code, value in fitting.m_codes(values).items() if round(value, 3) >= 0.005}
     way_xy, way_z = (min(round(values.get(name, 0.0), 3), _MAX_WAY_S) for name in ("move xy", "move z"))
     feed = _usual(map(_feed_override, runs), runs)
     rapid = _usual((run.rapid_override for run in runs), runs)
@@ -541,7 +515,7 @@ def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dic
         "times.m_codes": {"code": list(codes), "s": list(codes.values())} if codes else None,
     }
     for name in ("spindle start", "spindle stop"):
-        rows = spindle_rows(values, name)
+        rows = fitting.spindle_rows(values, name)
         table = {"rpm": [round(row[0], 1) for row in rows], "s": [round(row[1], 3) for row in rows]} if rows else None
         found[f"times.{name.replace(' ', '_')}"] = table
     return found
