@@ -14,10 +14,10 @@ from scipy import stats
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.checks import Prepared, Usable, is_clipped, prepare
-from shapegcode.identification.decay import part_of
 from shapegcode.identification.frf_model import measured_lines, mode_columns
 from shapegcode.identification.frf_search import cut
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode
+from shapegcode.identification.spectra import part_of
 from shapegcode.io.read import read_measurement
 from shapegcode.io.record import UNITS, ComplexArray, FrequencyResponse, ReadOptions, Record
 from shapegcode.io.units import FloatArray
