@@ -3,8 +3,6 @@
 Those within the range of the machine file (table `[verdict]`) decide; the others are only shown.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence
