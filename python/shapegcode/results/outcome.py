@@ -184,7 +184,9 @@ class Outcome(OldNames):
 
     def next_step_after(self, file: str) -> str:
         """The next step after a file was written."""
-        del file
+        return self._next_after(file)
+
+    def _next_after(self, _file: str) -> str:
         return self.next_step
 
     @property

@@ -112,7 +112,13 @@ class Result(Outcome):
         """
         simulated = self.simulated if motion else None
         scene = None if simulated is None else simulated.scene(on_progress)
+        if scene is not None and not self.from_json:
+            scene = self._completed(scene)
         return page_of(self, self.light, self.page_sections(provenance), scene, provenance, problems)
+
+    def _completed(self, scene: Scene) -> Scene:
+        """The motion with what only the result knows."""
+        return scene
 
     def report(self, path: str | Path, script: Script = "inline") -> list[str]:
         """Write the page of the result: one HTML file, readable offline.
@@ -207,6 +213,15 @@ class Result(Outcome):
     def _repr_html_(self) -> str:
         """Answer and tables, for notebooks."""
         return short_html(self)
+
+
+class Unjudged:
+    """Mixin of results without a verdict: what cannot be done is refused with an error."""
+
+    @property
+    def ok(self) -> bool:
+        """Always true: what cannot be done is refused."""
+        return True
 
 
 def _fields(value: object) -> Sequence[dataclasses.Field[Any]]:

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Result
+from shapegcode.results.result import Result, Unjudged
 from shapegcode.results.table import Column, Table
 
 
@@ -21,7 +21,7 @@ class OpenQuestion:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class MachineSetup(Result):
+class MachineSetup(Unjudged, Result):
     """A machine file made from answers.
 
     Attributes:
@@ -43,11 +43,6 @@ class MachineSetup(Result):
     warnings: tuple[str, ...]
     text: str = field(metadata=hidden())
     file: str = ""
-
-    @property
-    def ok(self) -> bool:
-        """Always true: a machine that cannot be used is refused."""
-        return True
 
     @property
     def answer(self) -> str:
