@@ -2,12 +2,11 @@
 free decay in a record without force, where the axis' command is unknown.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -145,11 +144,11 @@ class Spectra:
         """Power of the command, (n,)."""
         return np.asarray(np.sum(np.abs(self.command) ** 2, axis=0), dtype=np.float64)
 
-    def late(self, lags_s: FloatArray) -> Spectra:
+    def late(self, lags_s: FloatArray) -> Self:
         """Copy with the response of each part advanced by its lag."""
         return replace(self, response=self.response * np.exp(self.turn * lags_s[:, None]))
 
-    def of(self, rows: npt.NDArray[np.intp]) -> Spectra:
+    def of(self, rows: npt.NDArray[np.intp]) -> Self:
         """Select parts."""
         return replace(self, command=self.command[rows], response=self.response[rows])
 
@@ -157,7 +156,7 @@ class Spectra:
         """Response/command by least squares over the parts, (n,)."""
         return np.asarray(np.sum(np.conj(self.command) * self.response, axis=0) / np.maximum(self.power, 1e-300))
 
-    def in_twos(self, rows: npt.NDArray[np.intp]) -> Spectra:
+    def in_twos(self, rows: npt.NDArray[np.intp]) -> Self:
         """Sums of the parts 0 and 1, 2 and 3, ...: ringing of one part in the next is then within one window."""
         first = [np.flatnonzero(rows // 2 == pair) for pair in np.unique(rows // 2)]
         return replace(
