@@ -105,7 +105,7 @@ def test_what_vibrates_vibrates_no_longer(shaped: Recording) -> None:
         assert swings[1] < 1e-6
 
 
-def test_a_fade_goes_from_one_shaper_to_the_next_without_a_step(fading: Recording) -> None:
+def test_a_fade_goes_from_one_shaper_to_the_next_afterout_a_step(fading: Recording) -> None:
     """Every sample is what the two shapers and the weight say; nowhere a step."""
     outputs = [analysis.convolved(fading.command, taps) for taps in designs()]
     refused = rises(~fading.ok)[0]

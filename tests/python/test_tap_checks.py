@@ -11,9 +11,8 @@ from scipy import signal
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.checks import Prepared, excited_hz, find_hits, is_clipped, prepare, split_hits
-from shapegcode.identification.decay import find_decay
 from shapegcode.identification.plan import TapPlan, rapid_stop_program, recording_for, tap_plan
-from shapegcode.identification.spectra import decay_spectrum, frf, mode_envelopes
+from shapegcode.identification.spectra import decay_spectrum, find_decay, frf, mode_envelopes
 from shapegcode.io.record import Record
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine

@@ -10,7 +10,7 @@ from typing import ClassVar
 from shapegcode.characterization.air_tests import Kind
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Result
+from shapegcode.results.result import Result, Unjudged
 from shapegcode.results.table import Column, Table
 
 CUTTING_SUM = "cutting time constant + bell time"  # acceleration after interpolation, as from a stopwatch
@@ -120,7 +120,7 @@ class WrittenTest:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class CharacterisationTests(Result):
+class CharacterisationTests(Unjudged, Result):
     """Written test programs.
 
     Attributes:
@@ -205,7 +205,7 @@ class Characterisation(Result):
             return "repeat the tests that contradict the others"
         return "shapegcode machine show explains the machine file with these values, which -o FILE writes"
 
-    def _next_with(self, file: str) -> str:
+    def _next_after(self, file: str) -> str:
         return f"shapegcode machine show {file} explains it" if self.ok else self.next_step
 
     def to_toml(self) -> str:

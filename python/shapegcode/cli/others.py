@@ -125,7 +125,7 @@ def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[flo
     from shapegcode.cli.replay import changes, simulated_again
     from shapegcode.results.json import this_version
     from shapegcode.results.outcome import NotKeptError
-    from shapegcode.results.page.default import raw_page
+    from shapegcode.results.page.model import raw_page
     from shapegcode.results.revive import provenance_in, revived
 
     try:

@@ -18,7 +18,7 @@ from shapegcode.machine import Machine
 from shapegcode.results.json import Provenance
 from shapegcode.results.outcome import Pair
 from shapegcode.results.page import model
-from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
+from shapegcode.results.page.model import next_steps, pictures_of, warnings_of
 from shapegcode.results.table import Column, Table
 from shapegcode.verdict.figures import CaseVerdict
 

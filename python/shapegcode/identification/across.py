@@ -3,21 +3,19 @@
 With known poles the amplitudes follow linearly; the ratio of the amplitudes along two axes is the mode shape.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy import stats
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.checks import Prepared, Usable, is_clipped, prepare
-from shapegcode.identification.decay import part_of
 from shapegcode.identification.frf_model import measured_lines, mode_columns
 from shapegcode.identification.frf_search import cut
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode
+from shapegcode.identification.spectra import part_of
 from shapegcode.io.read import read_measurement
 from shapegcode.io.record import UNITS, ComplexArray, FrequencyResponse, ReadOptions, Record
 from shapegcode.io.units import FloatArray
@@ -40,7 +38,7 @@ class _Poles:
     applied: float  # 1/s, decay rate added by an exponential window
 
     @classmethod
-    def of(cls, modes: Sequence[IdentifiedMode], window_s: float | None = None) -> _Poles:
+    def of(cls, modes: Sequence[IdentifiedMode], window_s: float | None = None) -> Self:
         omega = 2.0 * np.pi * np.array([mode.frequency_hz.value for mode in modes])
         zeta = np.array([mode.damping_ratio.value for mode in modes])
         return cls(omega, zeta, 0.0 if window_s is None else 1.0 / window_s)
@@ -59,7 +57,7 @@ class _Amplitudes:
     value: ComplexArray  # (m,)
     variance: FloatArray  # (m,) of real and imaginary part together
 
-    def turned(self, is_turned: bool) -> _Amplitudes:
+    def turned(self, is_turned: bool) -> Self:
         """Amplitudes with the sign of the recorded signal, like those along the other axes."""
         return replace(self, value=-self.value) if is_turned else self
 

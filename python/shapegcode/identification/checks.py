@@ -10,8 +10,7 @@ import numpy as np
 from scipy.ndimage import label
 
 from shapegcode.errors import RecordError
-from shapegcode.identification.decay import find_decay, part_of
-from shapegcode.identification.spectra import decay_spectrum
+from shapegcode.identification.spectra import decay_spectrum, find_decay, part_of
 from shapegcode.io.record import UNITS, Quantity, Record
 from shapegcode.io.units import FloatArray
 

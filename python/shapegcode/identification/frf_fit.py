@@ -1,8 +1,6 @@
 """Modes of frequency responses and of impacts with many modes, each with its 95 % interval or the reason for its
 refusal."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

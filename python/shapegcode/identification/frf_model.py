@@ -3,8 +3,6 @@
 Poles are shared by all responses, residues are of each.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -17,10 +17,10 @@ from shapegcode.errors import ArgumentError, NumericError, RecordError
 from shapegcode.identification import model_search
 from shapegcode.identification.across import left_by, measured, with_moves
 from shapegcode.identification.checks import Prepared, prepare
-from shapegcode.identification.decay import split_stops
 from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf_modes, find_hit_modes
 from shapegcode.identification.problem import HIGHEST_SHARE, Fit, FitProblem, are_blows, problem_of
 from shapegcode.identification.result import Identification, MassCheck, by_support
+from shapegcode.identification.spectra import split_stops
 from shapegcode.identification.sweep import find_modes_of_captures, find_swept_modes, is_capture
 from shapegcode.io.data_file import open_file
 from shapegcode.io.record import FrequencyResponse, Quantity, ReadOptions, Record, UnevenTimeError, even_period

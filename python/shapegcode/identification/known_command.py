@@ -4,8 +4,6 @@ Apart from a smooth drive lag the sensor shows the commanded acceleration times 
 + omega²). The logger's start and clock and the control's waits are found from the record, part by part.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace

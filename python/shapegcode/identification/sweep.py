@@ -1,7 +1,5 @@
 """Modes from motion without a hammer: a resonance sweep, and a control's own capture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -5,8 +5,6 @@ All files from outside are opened here: settings, records, logs, dumps, results,
 file of a few megabytes takes gigabytes of memory, and no pipe or device blocks a command.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import gzip

@@ -1,7 +1,5 @@
 """Reads frequency responses from text with columns, and from MATLAB files (versions 4 to 7, by SciPy)."""
 
-from __future__ import annotations
-
 import io
 import os
 import re

@@ -1,7 +1,5 @@
 """Entries of LinuxCNC's INI files."""
 
-from __future__ import annotations
-
 import re
 
 from shapegcode.io.units import MM_PER_INCH

@@ -4,8 +4,6 @@ Sources of the formats: MTConnect Institute, MTConnect Standard, Part 1 and Part
 C++ Agent, "Adapter Agent Protocol Version 2.0": ``time|item|value``, also several ``|item|value`` in a line.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

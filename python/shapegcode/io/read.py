@@ -1,7 +1,5 @@
 """Reads records of tap tests and decays from any supported file; WAV files are read here."""
 
-from __future__ import annotations
-
 import io
 import warnings
 from pathlib import Path

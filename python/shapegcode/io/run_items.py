@@ -1,7 +1,5 @@
 """The data items of a log of runs, their time stamps, and notes of gaps and ignored data."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Mapping

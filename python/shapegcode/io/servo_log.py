@@ -1,7 +1,5 @@
 """Reads servo logs: CSV with a header, time and axis positions, with any column names."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path

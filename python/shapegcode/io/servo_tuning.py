@@ -3,8 +3,6 @@
 Sources of the format: eliasrhoden/Trace-Tools (MIT), `tuning_files.py` and `b85.py`.
 """
 
-from __future__ import annotations
-
 import base64
 import binascii
 import codecs

@@ -3,8 +3,6 @@
 Errors give line, column and text of the cell.
 """
 
-from __future__ import annotations
-
 import codecs
 import csv
 import io

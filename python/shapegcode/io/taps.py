@@ -1,7 +1,5 @@
 """Reads records of taps and decays from text with columns, including Klipper's accelerations."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path

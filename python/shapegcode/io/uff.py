@@ -1,7 +1,5 @@
 """Reads universal files: records and frequency responses in dataset 58, text or binary, with dataset 164's units."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal

@@ -5,8 +5,6 @@ in the row below. Meanings of names differ: ``x`` is an acceleration along X in 
 forces. So each file type has its own names; those of tap files are here, since universal files share them.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace

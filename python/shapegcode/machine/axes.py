@@ -1,10 +1,8 @@
 """The axes of a machine file: limits, vibration modes, feed drives."""
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -85,7 +83,7 @@ class Drive(TomlTable):
     )
 
     @model_validator(mode="after")
-    def _friction_is_complete(self) -> Drive:
+    def _friction_is_complete(self) -> Self:
         if self.friction_model == "viscous":
             return self
         sliding, static = self.friction_coulomb_n, self.friction_static_n
@@ -109,7 +107,7 @@ class FrequencyOver(InlineTable):
     damping_ratio: tuple[_Ratio, ...] | None = optional("damping ratios, one per row")
 
     @model_validator(mode="after")
-    def _is_a_table(self) -> FrequencyOver:
+    def _is_a_table(self) -> Self:
         if self.mass_kg is not None and self.position_mm is not None:
             raise ValueError("is either over position_mm of an axis or over mass_kg: both are given")
         if self.mass_kg is None and self.position_mm is None:
@@ -152,7 +150,7 @@ class Direction(InlineTable):
     z: Share = key("component along the Z axis", unit="1", default=0.0)
 
     @model_validator(mode="after")
-    def _points_somewhere(self) -> Direction:
+    def _points_somewhere(self) -> Self:
         if not any(self.as_tuple()):
             raise ValueError("x, y and z are 0: one must be another number")
         return self
@@ -210,7 +208,7 @@ class AxisMode(TomlTable):
         return _along(axis) if self.moves is None else self.moves.as_tuple()
 
     @model_validator(mode="after")
-    def _has_a_mass_and_lies_in_its_table(self) -> AxisMode:
+    def _has_a_mass_and_lies_in_its_table(self) -> Self:
         if self.mass_uncertainty_percent is not None and self.mass_kg is None:
             raise ValueError("mass_uncertainty_percent is given, mass_kg is not")
         if self.frequency_over is not None:
@@ -252,7 +250,7 @@ class Axis(TomlTable):
     )
 
     @model_validator(mode="after")
-    def _rigid_or_not(self) -> Axis:
+    def _rigid_or_not(self) -> Self:
         if self.rigid and self.modes:
             raise ValueError("rigid is true, but there are modes: delete one of them")
         return self

@@ -2,8 +2,6 @@
 other controls' planners, by the names of their own configuration files.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 

@@ -1,7 +1,5 @@
 """Dialects of controls other than FANUC's: data/control/dialects.toml has a row for each that `convert` writes."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Mapping

@@ -3,8 +3,6 @@
 Sources of the meanings are in docs/reference/parameters.md, also which are unconfirmed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -1,11 +1,9 @@
 """Machine file: how programs are read (offsets, variables, called programs), shaped and written; their tolerances."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
@@ -263,7 +261,7 @@ class Emission(TomlTable):
         return lines
 
     @model_validator(mode="after")
-    def _fits_its_lines_and_dialect(self) -> Emission:
+    def _fits_its_lines_and_dialect(self) -> Self:
         for line in (*self.prologue, *self.epilogue, *self.lock_lines, *self.unlock_lines):
             if len(line) > self.max_line_length:
                 limit = f"emission.max_line_length is {self.max_line_length}"
@@ -466,7 +464,7 @@ class Verdict(TomlTable):
     starved_s: Annotated[Positive, Field(le=10)] = key("duration of the buffer underrun", assumed=0.02)
 
     @model_validator(mode="after")
-    def _band_ascends(self) -> Verdict:
+    def _band_ascends(self) -> Self:
         low, high = self.override_percent
         if low > high:
             raise ValueError(f"override_percent = {toml(self.override_percent)}: the lower end comes first")

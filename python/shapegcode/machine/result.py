@@ -12,7 +12,7 @@ from typing import TypeVar
 from shapegcode.machine.machine import Machine
 from shapegcode.results.json import OldNames, hidden
 from shapegcode.results.outcome import Xyz
-from shapegcode.results.result import Result
+from shapegcode.results.result import Result, Unjudged
 from shapegcode.results.table import Column, Table
 from shapegcode.settings.keys import KeyValue, toml
 
@@ -114,9 +114,9 @@ class ParameterImport(Result):
     @property
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
-        return self._next_with("MACHINE")
+        return self._next_after("MACHINE")
 
-    def _next_with(self, file: str) -> str:
+    def _next_after(self, file: str) -> str:
         if not self.ok:
             return "punch the parameters out again (CNC-PARA.TXT, all of them), and import that."
         find = f"shapegcode identify TAP.csv --update {file}"
@@ -237,7 +237,7 @@ class OpenValue(OldNames):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class MachineDescription(Result):
+class MachineDescription(Unjudged, Result):
     """Every value of a machine with its unit, origin and meaning.
 
     Attributes:

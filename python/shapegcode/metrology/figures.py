@@ -1,11 +1,9 @@
 """Figures of a section of a path: contour, circles, walls, width, roughness."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Generic, Self, TypeVar
 
 from shapegcode import _core
 from shapegcode.io.units import FloatArray
@@ -39,7 +37,7 @@ class SidedError:
     below: float  # largest below it
 
     @classmethod
-    def of(cls, stats: Sequence[_core.DeviationStats], sides: Sequence[_core.SideFigures]) -> SidedError:
+    def of(cls, stats: Sequence[_core.DeviationStats], sides: Sequence[_core.SideFigures]) -> Self:
         """Combine the core's figures (mm) of one or several runs; all zero without any."""
         whole = ContourError.of(stats)
         names = ("left_mm", "right_mm", "above_mm", "below_mm")
@@ -59,7 +57,7 @@ class FittedCircle:
     form_error_um: float  # largest minus smallest radial distance
 
     @classmethod
-    def of(cls, arc: _core.ArcFigures | None, nominal_mm: float, centre_mm: FloatArray) -> FittedCircle | None:
+    def of(cls, arc: _core.ArcFigures | None, nominal_mm: float, centre_mm: FloatArray) -> Self | None:
         """Convert from the core; None: no circle."""
         if arc is None:
             return None
@@ -80,7 +78,7 @@ class MeasuredArc:
     orbit_error_percent: Tracks[float | None]  # area between track and arc over the sector; None: unknown
 
     @classmethod
-    def of(cls, figures: _core.SectionFigures, tool_diameter_mm: float) -> MeasuredArc:
+    def of(cls, figures: _core.SectionFigures, tool_diameter_mm: float) -> Self:
         """Convert the core's figures of an arc, given the diameter of the tool that cuts its walls."""
         nominal, centre, radius = figures.nominal_radius_mm, figures.nominal_centre_mm, tool_diameter_mm / 2.0
         walls = (figures.left_wall_arc, figures.right_wall_arc)
@@ -102,7 +100,7 @@ class WallDeviation:
     stations: int  # number of measured stations
 
     @classmethod
-    def of(cls, wall: _core.WallFigures) -> WallDeviation:
+    def of(cls, wall: _core.WallFigures) -> Self:
         """Convert from the core's figures in mm."""
         values_mm = (wall.least_mm, wall.mean_mm, wall.largest_mm, wall.band_mm)
         least, mean, largest, band = (1e3 * value if wall.stations else None for value in values_mm)
@@ -120,7 +118,7 @@ class Width:
     stations: int  # number of measured stations
 
     @classmethod
-    def of(cls, width: _core.WallFigures, tool_diameter_mm: float) -> Width:
+    def of(cls, width: _core.WallFigures, tool_diameter_mm: float) -> Self:
         """Convert from the core."""
         values = (width.least_mm, width.mean_mm, width.largest_mm)
         least, mean, largest = (value if width.stations else None for value in values)
@@ -138,7 +136,7 @@ class WallRoughness:
     evaluated_mm: float  # evaluation length
 
     @classmethod
-    def of(cls, figures: _core.Roughness | None) -> WallRoughness | None:
+    def of(cls, figures: _core.Roughness | None) -> Self | None:
         """Convert from the core's figures in mm; None: the wall is too short."""
         if figures is None:
             return None
@@ -182,9 +180,7 @@ class MeasuredSection:
     walls: WallProfile | None = field(metadata=hidden())  # wall profiles; None: too many stations to keep
 
     @classmethod
-    def of(
-        cls, figures: _core.SectionFigures, region: int, tool_diameter_mm: float, walls: WallProfile | None
-    ) -> MeasuredSection:
+    def of(cls, figures: _core.SectionFigures, region: int, tool_diameter_mm: float, walls: WallProfile | None) -> Self:
         """Convert from the core's figures, given the tool that cut the walls."""
         section, rest = figures.section, figures.rest
         settling = None

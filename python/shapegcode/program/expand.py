@@ -12,11 +12,11 @@ from shapegcode.machine import Machine
 from shapegcode.program.compensation import refuse_zero_radius
 from shapegcode.program.program import Program
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Result
+from shapegcode.results.result import Result, Unjudged
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Expansion(Result):
+class Expansion(Unjudged, Result):
     """The expanded program: calls, macros and coordinate modes resolved.
 
     Attributes:
@@ -51,9 +51,9 @@ class Expansion(Result):
     @property
     def next_step(self) -> str:
         """What to do next, in one sentence."""
-        return self._next_with("OUT")
+        return self._next_after("OUT")
 
-    def _next_with(self, file: str) -> str:
+    def _next_after(self, file: str) -> str:
         if self.expanded_radii_mm:
             return "use it only with these radii: the offsets in the control have no effect."
         return f"compute its cycle time: shapegcode time {file} -m MACHINE."

@@ -184,11 +184,9 @@ class Outcome(OldNames):
 
     def next_step_after(self, file: str) -> str:
         """The next step after a file was written."""
-        return self._next_with(file)
+        return self._next_after(file)
 
-    def _next_with(self, file: str) -> str:
-        """The next step with the name of that file, where a result names it."""
-        del file
+    def _next_after(self, _file: str) -> str:
         return self.next_step
 
     @property

@@ -13,17 +13,8 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.io.units import FloatArray
-from shapegcode.results import plot
-from shapegcode.results.motion_plots import (
-    AXIS_NAMES,
-    MOVES_MM,
-    SHOWN_MM,
-    Trace,
-    View,
-    line_style,
-    plot_feed,
-    plot_vibration,
-)
+from shapegcode.results import motion_plots, plot
+from shapegcode.results.motion_plots import Trace, View, line_style, plot_feed, plot_vibration
 from shapegcode.results.outcome import Plot
 
 if TYPE_CHECKING:
@@ -102,7 +93,7 @@ def plot_path(
         ax, 1, len(widths), size_inch=(7.2 if whole is None else 10.4, 6.4), width_ratios=widths,
         title=f"Deviation of the {what} from the path, drawn ×{factor:g}", part=part,
     )[0]  # fmt: skip
-    panel, shown = panels[0], [AXIS_NAMES.index(name) for name in plane]
+    panel, shown = panels[0], [motion_plots.AXIS_NAMES.index(name) for name in plane]
     panel.plot(*polyline[:, shown].T, color=plot.GREY, linewidth=3, alpha=0.55, label="programmed path")
     straight = _only_along(polyline, [deviation for *_, deviation in drawn])
     for number, (trace, along, feet, deviation) in enumerate(drawn):
@@ -115,8 +106,7 @@ def plot_path(
         panel.plot(*curve[: 0 if straight else None].T, label=label, **_style(number, curve, polyline))
     panel.set_aspect("equal", adjustable="datalim")
     panel.margins(0.08)
-    panel.set_xlabel(f"{plane[0]} in mm")
-    panel.set_ylabel(f"{plane[1]} in mm")
+    panel.set(xlabel=f"{plane[0]} in mm", ylabel=f"{plane[1]} in mm")
     if cut:
         panel.text(0.0, -0.13, _CUT, transform=panel.transAxes, fontsize=8, color="#555555", va="top")
     if straight:
@@ -185,7 +175,8 @@ def _only_along(polyline: FloatArray, deviations: Sequence[FloatArray]) -> bool:
     def across(vectors: FloatArray) -> float:
         return float(np.linalg.norm(vectors - np.outer(vectors @ direction, direction), axis=1).max())
 
-    return across(polyline - polyline[0]) < MOVES_MM and max(map(across, deviations)) < SHOWN_MM
+    moves = across(polyline - polyline[0]) >= motion_plots.MOVES_MM
+    return not moves and max(map(across, deviations)) < motion_plots.SHOWN_MM
 
 
 def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:

@@ -16,16 +16,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import numpy as np
 
 from shapegcode._core import ArgumentError
-from shapegcode.results.json import plain
+from shapegcode.results.json import Provenance, plain
 from shapegcode.results.outcome import NotKeptError, Outcome
+from shapegcode.results.page.model import Figure, Light, Page, Script, Section, page_of, sections_of, short_html
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from shapegcode.results.json import Provenance
-    from shapegcode.results.page.model import Figure, Light, Page, Script, Section
     from shapegcode.results.page.scene import Scene
 
 _UNITS = {
@@ -87,8 +86,6 @@ class Result(Outcome):
         Returns:
             Tables and pictures, unless the class adds more.
         """
-        from shapegcode.results.page.default import sections_of
-
         return sections_of(self, self.key_figures())
 
     def page(
@@ -113,11 +110,15 @@ class Result(Outcome):
         Raises:
             MachineError, NumericError: a program cannot be simulated.
         """
-        from shapegcode.results.page.default import page_of
-
         simulated = self.simulated if motion else None
         scene = None if simulated is None else simulated.scene(on_progress)
+        if scene is not None and not self.from_json:
+            scene = self._completed(scene)
         return page_of(self, self.light, self.page_sections(provenance), scene, provenance, problems)
+
+    def _completed(self, scene: Scene) -> Scene:
+        """The motion with what only the result knows."""
+        return scene
 
     def report(self, path: str | Path, script: Script = "inline") -> list[str]:
         """Write the page of the result: one HTML file, readable offline.
@@ -211,9 +212,16 @@ class Result(Outcome):
 
     def _repr_html_(self) -> str:
         """Answer and tables, for notebooks."""
-        from shapegcode.results.page.default import short_html
-
         return short_html(self)
+
+
+class Unjudged:
+    """Mixin of results without a verdict: what cannot be done is refused with an error."""
+
+    @property
+    def ok(self) -> bool:
+        """Always true: what cannot be done is refused."""
+        return True
 
 
 def _fields(value: object) -> Sequence[dataclasses.Field[Any]]:

@@ -103,19 +103,6 @@ class Answers(TomlTable):
             raise ValueError('dnc_baud is given, and delivery is not "dnc": delete one of them')
         return self
 
-    def stem_from(self, folder: Path) -> Answers:
-        """Resolve the file names relative to a folder.
-
-        Args:
-            folder: folder of the file of answers.
-
-        Returns:
-            New answers.
-        """
-        taps = {axis: _file_in(folder, answer) for axis, answer in self.modes.model_dump().items()}
-        dump = None if self.dump is None else str(folder / self.dump)
-        return self.model_copy(update={"dump": dump, "modes": ModesAnswer(**taps)})
-
 
 def is_mode(answer: str) -> bool:
     """True if an answer on vibration is a frequency in Hz, with or without a damping ratio."""
@@ -128,8 +115,8 @@ def mode_of(answer: str) -> tuple[float, float]:
     return float(frequency), float(damping) if damping.strip() else _USUAL_DAMPING
 
 
-def _file_in(folder: Path, answer: str) -> str:
-    return answer if answer in ("rigid", "unknown") or is_mode(answer) else str(folder / answer)
+def _is_file(answer: str) -> bool:
+    return answer not in ("rigid", "unknown") and not is_mode(answer)
 
 
 def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
@@ -160,15 +147,16 @@ def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
         if not isinstance(data, dict):
             raise AnswersError(str(path), (Problem("", "", "must be an object"),))
     found = validated(Answers, data, str(path), text, AnswersError)
-    return _with_files(found.stem_from(path.parent), str(path), text)
+    modes = {axis: str(path.parent / answer) if _is_file(answer) else answer for axis, answer in found.modes}
+    dump = None if found.dump is None else str(path.parent / found.dump)
+    found = found.model_copy(update={"dump": dump, "modes": ModesAnswer(**modes)})
+    return _with_files(found, str(path), text)
 
 
 def _with_files(answers: Answers, source: str, text: str) -> Answers:
     """Return the answers if their files exist."""
     named = {"dump": answers.dump} if answers.dump is not None else {}
-    for axis, answer in answers.modes.model_dump().items():
-        if answer not in ("rigid", "unknown") and not is_mode(answer):
-            named[f"modes.{axis}"] = answer
+    named |= {f"modes.{axis}": answer for axis, answer in answers.modes if _is_file(answer)}
     problems = tuple(
         Problem(key, toml(file), "no such file" + (_NOT_A_MODE if key != "dump" else ""), line_of(key, text))
         for key, file in named.items()

@@ -1,7 +1,5 @@
 """Ask the questions about a machine at a terminal; `answers` defines them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path

@@ -7,13 +7,11 @@ are swept over the bands, and where they exceed the bound the cutting plane (w, 
 Bound and sweep enclose the optimum, and the search ends when they meet.
 """
 
-from __future__ import annotations
-
 import math
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import highspy
 import numpy as np
@@ -198,7 +196,7 @@ class CutPool:
     """Planes of each band that are never removed."""
 
     @classmethod
-    def around(cls, bands: Sequence[ModeBand]) -> CutPool:
+    def around(cls, bands: Sequence[ModeBand]) -> Self:
         """Start with four directions at a few frequencies of every band."""
         pool = cls([], [], _STARTS * len(_QUARTERS))
         for band in bands:

@@ -122,8 +122,7 @@ def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
         label=f"limit {100.0 * result.vibration_limit:g} %",
     )  # fmt: skip
     upper.set_ylabel("worst residual in %")
-    lower.set_ylabel("|σ²| in ms²: µm on R20 at 200 mm/s")
-    lower.set_xlabel("duration in ms")
+    lower.set(xlabel="duration in ms", ylabel="|σ²| in ms²: µm on R20 at 200 mm/s")
     plot.legend_below(lower, of=upper, columns=5)
     return upper
 
@@ -176,8 +175,7 @@ def plot_sensitivity(
         )  # fmt: skip
     panel.set_ylim(bottom=0.0)
     panel.margins(x=0.01)
-    panel.set_xlabel("natural frequency in Hz")
-    panel.set_ylabel("residual vibration in %")
+    panel.set(xlabel="natural frequency in Hz", ylabel="residual vibration in %")
     plot.legend_below(panel, columns=3)
     return panel
 
@@ -285,8 +283,7 @@ def _draw_branches(branches: MinimalBranches, result: Recommendation, ax: Axes |
     panel.axvline(fast, color=plot.GREY, linewidth=0.8, linestyle="--", label=f"the faster mode, {fast:g} Hz")
     panel.set_ylim(bottom=0.0)
     panel.margins(x=0.01)
-    panel.set_xlabel("frequency of the faster mode in Hz")
-    panel.set_ylabel(f"duration in {unit}")
+    panel.set(xlabel="frequency of the faster mode in Hz", ylabel=f"duration in {unit}")
     plot.legend_below(panel, columns=3)
     return panel
 

@@ -4,8 +4,6 @@ A family is solved at continuous times, and on a grid from its defining conditio
 several by convolution, at continuous times and on a grid.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

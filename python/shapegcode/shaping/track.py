@@ -3,8 +3,6 @@
 If the grid permits, all have the same mean delay, so that the speed along the path does not change.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -10,7 +10,7 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
 from shapegcode.results.outcome import Plot
-from shapegcode.results.result import Result
+from shapegcode.results.result import Result, Unjudged
 from shapegcode.results.table import Column, Table
 from shapegcode.testcut.cut import CuttingLaw, Edge, TestCut
 from shapegcode.testcut.forces import Coefficient, CoefficientFit, Expected, MeanForces
@@ -18,7 +18,7 @@ from shapegcode.testcut.record import Revolutions
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class CutDesign(Result):
+class CutDesign(Unjudged, Result):
     """A designed test cut, before it is run.
 
     Attributes:
@@ -174,7 +174,7 @@ class TaperResult(Result):
             return "more passes, with other feeds or a longer stock"
         return "put [cutting] into the tool file (-o FILE writes it)"
 
-    def _next_with(self, file: str) -> str:
+    def _next_after(self, file: str) -> str:
         return self.next_step if self.poor else f"put [cutting] of {file} into the tool file"
 
     def tables(self) -> list[Table]:

@@ -3,8 +3,6 @@
 Those within the range of the machine file (table `[verdict]`) decide; the others are only shown.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -48,12 +46,6 @@ class Case:
     def nominal(self) -> bool:
         """True for the intended operation, with either rule of block timing."""
         return self.override == 1.0 and self.mode is None and not self.look_ahead and self.starved_s == 0.0
-
-    def needs_contour(self, target: Target) -> bool:
-        """True if the contour must be measured in this case: a shifted mode does not change the command."""
-        if self.mode is None:
-            return True
-        return self.counts and (self.override != 1.0 or target == "response")
 
 
 @dataclass(frozen=True)
@@ -287,9 +279,11 @@ class CaseSimulation:
     def _whole(self, case: Case) -> bool:
         if self.model.always_plans and case.override != 1.0:
             return True
+        # A shifted mode does not change the command.
+        needed = case.mode is None or (case.counts and (case.override != 1.0 or self.target == "response"))
         # With feed drives each would take a quarter of a conversion: cases that are only shown have the residual only.
         spared = case.override != 1.0 and not case.counts and self.model.machine.verdict.plant != "modal"
-        return case.needs_contour(self.target) and not spared and not self._beside(case)
+        return needed and not spared and not self._beside(case)
 
     def groups(self) -> list[list[Case]]:
         """Groups of overrides and shifted modes: one task for each full simulation, one for all short ones."""

@@ -1,7 +1,5 @@
 """Parts of a conversion's result: figures per case and per region, with their limits."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Verdict of an emitted program: simulate its regions in every condition, compare with the limits, summarise."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -5,8 +5,6 @@ at constant speed is τ + (1 − f)/K. A Sinumerik with speed feed-forward compe
 Feed drive: a rigid axis of 1 kg, since positions determine only force/mass.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

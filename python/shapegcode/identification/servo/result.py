@@ -176,7 +176,7 @@ class ServoFit(Result):
             return "-o FILE writes the machine file with " + ", ".join(self.written)
         return "--plots DIR plots the residual; -m and -o write gain and feed-forward into a machine file"
 
-    def _next_with(self, file: str) -> str:
+    def _next_after(self, file: str) -> str:
         return f"shapegcode machine show {file} explains it; measured here: {', '.join(self.written)}"
 
     def tables(self) -> list[Table]:

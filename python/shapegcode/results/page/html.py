@@ -3,8 +3,6 @@
 Its Content-Security-Policy forbids every connection and allows only scripts with the listed hashes.
 """
 
-from __future__ import annotations
-
 import base64
 import gzip
 import hashlib

@@ -3,8 +3,6 @@
 Extremes are kept; every curve is within a given fraction of a pixel. Figures are never computed from these data.
 """
 
-from __future__ import annotations
-
 import base64
 import gzip
 from collections.abc import Mapping

@@ -206,7 +206,7 @@ class CycleTimeCalibration(Result):
             return "write it with -o FILE; shapegcode time part.nc -m FILE gives the time of other programs"
         return "add runs of other programs, or state what the operator had set (override_percent in RUNS.toml)"
 
-    def _next_with(self, file: str) -> str:
+    def _next_after(self, file: str) -> str:
         return f"shapegcode time part.nc -m {file} gives the time of other programs" if self.ok else self.next_step
 
     def plots(self) -> Mapping[str, Plot]:
