@@ -172,7 +172,7 @@ def _held_at_ends(values: FloatArray) -> bool:
 
 
 class _Clock:
-    """Clock of a record; around a part's middle, program time = middle + (logger's time - its own) * (1 + rate)."""
+    """Clock of a record: program time = middle of a part + (logger's time - that of the middle) * (1 + rate)."""
 
     def __init__(self, command: KnownCommand, record: Record) -> None:
         if record.quantity != "acceleration":
