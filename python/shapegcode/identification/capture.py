@@ -72,7 +72,7 @@ def _response(
     windows = _windows(trace, period_s)
     if len(windows) < _FEWEST_PARTS:
         raise RecordError(
-            f"{source}: {trace.name} moves in {len(windows)} part{'' if len(windows) == 1 else 's'}: needed are two "
+            f"{source}: {trace.name} moves in {len(windows)} part{'' if len(windows) == 1 else 's'}; required: two "
             f"between rests of half a second, or {1.5 * _WINDOW_S:g} s of motion"
         )
     low, high = band_hz or (_LOWEST_HZ, np.inf)

@@ -66,7 +66,7 @@ def _check_samples(source: str, what: str, values: FloatArray) -> None:
     array = np.asarray(values)
     if array.ndim != 1 or array.dtype.kind not in "fiu" or not array.size:
         raise RecordError(
-            f"{source}: the {what} is of shape {array.shape} and type {array.dtype}: needed is one row of real numbers"
+            f"{source}: the {what} is of shape {array.shape} and type {array.dtype}; required: one row of real numbers"
         )
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:

@@ -64,7 +64,7 @@ class TextTable:
         if self.layout.decimal_comma:
             self._refuse_points()
         if len(table) < fewest:
-            raise RecordError(f"{self.path}: {len(table)} rows of numbers: too short; needed are at least {fewest}")
+            raise RecordError(f"{self.path}: {len(table)} rows of numbers: too short; required: at least {fewest}")
         return table
 
     def _table(self, data: bytes) -> FloatArray:
