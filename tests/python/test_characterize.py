@@ -288,7 +288,7 @@ GOOD_ROWS = "".join(f"{k},{k * 0.01:.3f}\n" for k in range(200))
             "time_ms,X\n" + GOOD_ROWS.replace("50,0.500\n", "").replace("51,0.510\n", "").replace("52,0.520\n", ""),
             "rows are missing",
         ),
-        ("time_ms,X\n1,0\n2,0\n", "2 rows of numbers: too short; needed are at least 100"),
+        ("time_ms,X\n1,0\n2,0\n", "2 rows of numbers: too short; required: at least 100"),
         ("time_s,X\n" + GOOD_ROWS, "from 0.02 to 50 ms"),
         ("time_ms,X\n" + GOOD_ROWS, "no commanded position of Y"),
     ],

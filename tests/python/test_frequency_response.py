@@ -207,7 +207,7 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path: Path) -> None:
     good = FrequencyResponse("frf", HZ[1:], noisy(HZ[1:]))
     with pytest.raises(RecordError, match=r"band of 500 to 900 Hz: must ascend and lie within the lines, 0.5 to 399.5"):
         identify([good], band_hz=(500.0, 900.0))
-    with pytest.raises(RecordError, match="10 lines of a frequency response: needed are 16"):
+    with pytest.raises(RecordError, match="10 lines of a frequency response; required: 16"):
         FrequencyResponse("few", HZ[1:11], noisy(HZ[1:11]))
 
 

@@ -154,7 +154,7 @@ def test_a_logger_that_starts_late_or_stops_early_shows_no_further_modes(
         check(found_in(program, Record("early", whole.period_s, whole.response[:count])), MODES)
     count = int((command.parts[2][1] + 3.3) * 1.01 * 800.0)
     first = int((command.parts[1][0] + 3.3) * 1.01 * 800.0)
-    with pytest.raises(RecordError, match=r"no (two parts of .* needed is one such pair|relation)"):
+    with pytest.raises(RecordError, match=r"no (two parts of .* required: one such pair|relation)"):
         found_in(program, Record("middle", whole.period_s, whole.response[first:count]))
 
 
@@ -171,9 +171,9 @@ def test_what_is_refused_with_its_reason(program: Path, motion: tuple[FloatArray
     clipped = Record("clipped", good.period_s, np.clip(good.response, -3.0, 3.0))
     with pytest.raises(RecordError, match=r"overload: the acceleration is cut off at 3 m/s²"):
         found_in(program, clipped)
-    with pytest.raises(RecordError, match=r"1.25 s: too short, needed are two parts"):
+    with pytest.raises(RecordError, match=r"1.25 s: too short; required: two parts"):
         found_in(program, Record("short", good.period_s, good.response[:1000]))
-    with pytest.raises(RecordError, match=r"40 samples per second are too slow: needed are 2.5 for each Hz"):
+    with pytest.raises(RecordError, match=r"40 samples per second are too slow; required: 2.5 for each Hz"):
         found_in(program, record(motion, Logger(rate_hz=40.0)))
     with pytest.raises(RecordError, match="velocity: a sweep needs an acceleration"):
         found_in(program, Record("laser", good.period_s, good.response, "velocity"))
@@ -195,7 +195,7 @@ def test_what_is_refused_with_its_reason(program: Path, motion: tuple[FloatArray
     refused = (
         ("X1. F100.\nY1.", "Y by 1 mm too"),
         ("M00", "nothing moves"),
-        ("X1. F100.", r"has no rest of 0.5 s or more: needed are 2 parts"),
+        ("X1. F100.", r"has no rest of 0.5 s or more; required: 2 parts"),
     )
     for text, why in refused:
         other = tmp_path / "other.nc"

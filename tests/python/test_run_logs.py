@@ -485,7 +485,7 @@ def test_streams_that_are_refused(tmp_path: Path) -> None:
     refused(tmp_path, whole + cut, rf"begun in line {whole.count(chr(10)) + 1} is truncated within", "a.xml")
     refused(tmp_path, whole.replace("</Samples>", "</Sample>", 1), r"a.xml:7: incomplete XML: mismatched tag", "a.xml")
     refused(
-        tmp_path, whole.replace("MTConnectStreams", "MTConnectDevices"), "the answer to `probe`: needed is", "a.xml"
+        tmp_path, whole.replace("MTConnectStreams", "MTConnectDevices"), "the answer to `probe`; required:", "a.xml"
     )
     bomb = '<?xml version="1.0"?><!DOCTYPE a [<!ENTITY x "y">]><MTConnectStreams/>'
     refused(tmp_path, bomb, "a.xml:1: a declared entity", "a.xml")

@@ -148,7 +148,7 @@ def test_an_axis_with_another_name_is_stated(tmp_path: Path) -> None:
 def test_an_encoding_that_is_none_is_refused(encoding: str, tmp_path: Path) -> None:
     path = write(tmp_path / "ast.xml")
     path.write_text(path.read_text().replace("ISO-8859-1", encoding))
-    with pytest.raises(sg.RecordError, match=r"ast\.xml:1: .*(needed is XML in UTF-8|unknown encoding)") as refused:
+    with pytest.raises(sg.RecordError, match=r"ast\.xml:1: .*(required: XML in UTF-8|unknown encoding)") as refused:
         sg.identify(path)
     assert "\n" not in str(refused.value)
 
@@ -168,5 +168,5 @@ def test_a_response_without_noise_warns_of_nothing(tmp_path: Path) -> None:
 
 def test_no_record_over_time(tmp_path: Path) -> None:
     path = write(tmp_path / "ast.xml")
-    with pytest.raises(sg.RecordError, match=r"ast\.xml: XML can .* needed is a record over time"):
+    with pytest.raises(sg.RecordError, match=r"ast\.xml: XML can .* required: a record over time"):
         read_records(path)

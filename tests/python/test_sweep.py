@@ -87,7 +87,7 @@ def test_what_a_sweep_must_hold(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match=r"short.csv: 5 s: too short for a sweep \(10 s or more\).*--decay"):
         identify(short)
     slow = save(tmp_path / "slow.csv", time[::8], response[::8])
-    with pytest.raises(RecordError, match=r"200 samples per second are too slow for 130 Hz: needed are 325"):
+    with pytest.raises(RecordError, match=r"200 samples per second are too slow for 130 Hz; required: 325"):
         identify(slow)
     with pytest.raises(RecordError, match="a sweep is identified alone"):
         identify([short, slow])

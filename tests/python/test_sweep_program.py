@@ -123,7 +123,7 @@ def test_limits_that_contradict_are_refused_with_their_value(tmp_path: Path) -> 
         write_sweep(file, VX500, "x", band_hz=(10.0, float("nan")))
     with pytest.raises(ArgumentError, match=r"seconds = 1e\+09: must be at most 100000 \(controller.max_program_s\)"):
         write_sweep(file, VX500, "x", seconds=1e9)
-    with pytest.raises(ArgumentError, match=r"seconds = 1: 0.83 cycles of 10 Hz .* needed are 3 or more, 3.6 s"):
+    with pytest.raises(ArgumentError, match=r"seconds = 1: 0.83 cycles of 10 Hz .* required: 3 or more, 3.6 s"):
         write_sweep(file, VX500, "x", band_hz=(10.0, 80.0), seconds=1.0)
     with pytest.raises(ArgumentError, match=r"axis = 'w': must be x, y or z"):
         write_sweep(file, VX500, "w")  # type: ignore[arg-type]

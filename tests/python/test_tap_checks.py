@@ -217,16 +217,16 @@ def test_a_half_sine_excites_as_its_transform_says() -> None:
 
 
 def test_too_short_a_record_says_how_long_it_must_be() -> None:
-    with pytest.raises(RecordError, match=r"2\.\d periods of 4\d.* Hz.*too short; needed are 0\.1\d* s \(8 periods\)"):
+    with pytest.raises(RecordError, match=r"2\.\d periods of 4\d.* Hz.*too short; required: 0\.1\d* s \(8 periods\)"):
         prepare([tap(half_sine(500, 200, 12, 500.0))])
-    with pytest.raises(RecordError, match="15 samples of response: too short; needed are 32"):
+    with pytest.raises(RecordError, match="15 samples of response: too short; required: 32"):
         prepare([tap(half_sine(215, 200, 12, 500.0))])
     damped = tap(half_sine(700, 100, 12, 500.0), modes=((46.0, 0.3, 50.0),))
     assert one(damped).refused == (), "few periods are enough where the response has decayed"
 
 
 def test_sampling_too_slow_for_the_mode() -> None:
-    with pytest.raises(RecordError, match="5000 samples per second are too slow for 2400 Hz: needed are 6000 or more"):
+    with pytest.raises(RecordError, match="5000 samples per second are too slow for 2400 Hz; required: 6000 or more"):
         prepare([GOOD], band_hz=2400.0)
     folded = tap(half_sine(5000, 200, 3, 500.0), modes=((2300.0, 0.01, 1.0),))
     with pytest.raises(RecordError, match=r"is above 2000 Hz, 80 % of half the sampling rate"):

@@ -170,7 +170,7 @@ def test_a_unit_is_the_same_in_every_kind_of_file(tmp_path: Path, unit: str, new
     np.testing.assert_allclose(cut.force_n[:, 0], FORCE * newton, rtol=1e-12)
     record = only(read(tmp_path, f"time_s,{form.format('force', unit)},acc_x_m/s^2\n" + rows()))
     np.testing.assert_allclose(record.force_n, FORCE * newton, rtol=1e-12)
-    with pytest.raises(RecordError, match="the unit 'V' is not known; needed is one of N, kN, kgf, lbf"):
+    with pytest.raises(RecordError, match="the unit 'V' is not known; required: one of N, kN, kgf, lbf"):
         (tmp_path / "cut.csv").write_text(f"{head}\n".replace(unit, "V") + rows(), encoding="utf-8")
         read_forces(tmp_path / "cut.csv")
 
@@ -319,7 +319,7 @@ BAD: dict[str, tuple[str | bytes, dict[str, Any], str]] = {
     "unknown unit": (
         "t_s,f [V],a_g\n" + rows(),
         {},
-        r":1: 'f \[V\]': the unit 'V' is not known; needed is one of N, kN",
+        r":1: 'f \[V\]': the unit 'V' is not known; required: one of N, kN",
     ),
     "unknown unit in its row": ("t,f,a\ns,N,V\n" + rows(), {}, r"'a': the unit 'V' is not known"),
     "name against unit": (

@@ -475,7 +475,7 @@ def test_where_no_interval_is_followed_none_is_proposed(tmp_path: Path, capsys: 
         ("time_s,fx_n\n0,1\n1,2\n2,3\n3,4\n", "no column of fy"),
         ("fx_n,fy_n\n0,1\n1,2\n2,3\n3,4\n", "no column of time, position or radial_depth"),
         ("time_s,fx_n,fy_n\n0,1,1\n1,2,2\n2,3,1\n3,4,1\n4,x,1\n", ":6: column 2 (fx_n) 'x' is not a finite number"),
-        ("radial_depth_mm,fx_n,fy_n\n0.4,1,1\n0.5,2,2\n", "2 rows of numbers: too short; needed are at least 4"),
+        ("radial_depth_mm,fx_n,fy_n\n0.4,1,1\n0.5,2,2\n", "2 rows of numbers: too short; required: at least 4"),
         ("position_mm,fx_n,fy_n\n1,1,1\n2,1,2\n1.5,3,1\n3,4,1\n4,4,1\n", ":4: the position decreases"),
         ("radial_depth_mm,fx_n,fy_n\n" + "9,1,1\n" * 9, "must be above 0 and below the diameter"),
         ("time_s,fx_n,fy_n\n" + "\n".join(f"{k},1,1" for k in range(20)), "means over time have no position"),

@@ -332,7 +332,7 @@ def _resultant(loads: Sequence[Load]) -> result.ResultantForce:
 
 
 def _peak(column: str, loads: Sequence[tuple[Callable[[int], str], PathLoad]]) -> result.PeakLoad:
-    """Largest value of a column before and after, with the location of the latter. *loads*: a function that locates, and the load."""
+    """Largest value of a column before and after, with the location of the latter; *loads*: locating function, load."""
     original, emitted, place = 0.0, 0.0, ""
     for place_of, load in loads:
         was, now = getattr(load.original, column), getattr(load.emitted, column)

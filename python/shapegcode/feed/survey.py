@@ -81,7 +81,7 @@ def survey(
     machine = Machine.of(machine)
     tools = [tools] if isinstance(tools, Tool) else list(tools)
     if not tools:
-        raise _core.ArgumentError("no tool is given: needed is at least one")
+        raise _core.ArgumentError("no tool is given; required: at least one")
     program = program_for_conversion(program, machine)
     walk = Walk(program, tools)
     material = _material(walk, program, machine, tools, stock, resolution_mm)

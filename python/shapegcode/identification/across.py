@@ -79,7 +79,7 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
     if not any(by_axis.values()):
         raise RecordError(
             f"{', '.join(dict.fromkeys(each.source for each in others)) or found.files[0]}: no response along "
-            f"{' or '.join(letter.upper() for letter in by_axis)}: needed is a triaxial sensor, or files that "
+            f"{' or '.join(letter.upper() for letter in by_axis)}; required: a triaxial sensor, or files that "
             "state their axis"
         )
     if not found.modes:
@@ -162,13 +162,13 @@ def _records_beside(
     if not together and ready.records[0].force_n is None:
         raise RecordError(
             f"{records[0].source}: amplitudes of separate free decays cannot be compared across axes: "
-            "needed is one record of all axes"
+            "required: one record of all axes"
         )
     forceless = [] if together else [each for each in records if each.force_n is None]
     if forceless:
         raise RecordError(
             f"{forceless[0].source}: no force, but {ready.records[0].source} has one: amplitudes of different impacts "
-            "are comparable relative to their forces only; needed is the hammer's signal in both"
+            "are comparable relative to their forces only; required: the hammer's signal in both"
         )
     hits = ready if together else prepare(records)
     return [(use, _beside(use.record, records, files)) for use in hits.usable]
@@ -193,7 +193,7 @@ def _beside(use: Record, records: Sequence[Record], files: Sequence[str]) -> Rec
     if is_clipped(beside.response):
         raise RecordError(
             f"{beside.source}: overload: the response ({beside.quantity}) is cut off at "
-            f"{np.max(np.abs(beside.response)):.5g} {UNITS[beside.quantity]}; needed is a larger range of the input or "
+            f"{np.max(np.abs(beside.response)):.5g} {UNITS[beside.quantity]}; required: a larger range of the input or "
             "a softer impact"
         )
     return beside

@@ -107,14 +107,14 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> Usable:
     assert force is not None
     if not np.ptp(force) > 0.0:
         raise RecordError(
-            f"zero force: every sample is {force[0]:zg} N; needed is the hammer's signal, or take it as a free decay "
+            f"zero force: every sample is {force[0]:zg} N; required: the hammer's signal, or take it as a free decay "
             "(--ignore-force)"
         )
     for name, values in (("force", force), (f"response ({record.quantity})", record.response)):
         if is_clipped(values):
             top = float(values[np.argmax(np.abs(values - np.median(values)))])
             raise RecordError(
-                f"overload: the {name} is cut off at {top:.5g}; needed is a larger input range or a softer impact"
+                f"overload: the {name} is cut off at {top:.5g}; required: a larger input range or a softer impact"
             )
     hits = find_hits(record)
     off_pulse = np.ones(len(force), dtype=bool)
@@ -136,7 +136,7 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> Usable:
         )
     if hit.first == 0 and hit.peak > 0 and (force[0] - np.median(force)) / hit.peak_n > _CUT_PULSE:
         raise RecordError(
-            "the record begins inside the pulse: part of the force is missing; needed is a pre-trigger of some "
+            "the record begins inside the pulse: part of the force is missing; required: a pre-trigger of some "
             f"{MIN_LEAD} samples or more"
         )
     if hit.second_share > 0.0:
@@ -209,7 +209,7 @@ def _decay(record: Record, band_hz: float | None, start_s: float | None, warning
     if is_clipped(free.response):
         raise RecordError(
             f"overload: the response ({record.quantity}) is cut off at {np.max(np.abs(free.response)):.5g} "
-            f"{UNITS[record.quantity]}; needed is a larger range of the input"
+            f"{UNITS[record.quantity]}; required: a larger range of the input"
         )
     refuse_short(free, free.response, 0.0, band_hz, warnings)
     tenth = free.response[-max(len(free.response) // 10, MIN_LEAD) :]
@@ -223,7 +223,7 @@ def _decay(record: Record, band_hz: float | None, start_s: float | None, warning
 def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s: float | None = None) -> Prepared:
     """Split recordings into impacts, find the starts of decays, and refuse unusable records."""
     if not records:
-        raise RecordError("no record: needed is at least one tap or decay")
+        raise RecordError("no record: at least one tap or decay is required")
     _refuse_mixture(records)
     warnings = list(dict.fromkeys(text for record in records for text in record.warnings))
     notes = tuple(dict.fromkeys(text for record in records for text in record.notes))
@@ -332,12 +332,12 @@ def refuse_short(
     half_rate = 0.5 / record.period_s
     if len(response) < _MIN_SAMPLES:
         raise RecordError(
-            f"{len(response)} samples of response: too short; needed are {_MIN_SAMPLES} at the very least, and "
+            f"{len(response)} samples of response: too short; required: {_MIN_SAMPLES} at the very least, and "
             f"{MIN_PERIODS:g} periods of the lowest mode"
         )
     if band_hz is not None and band_hz > FOLDING * half_rate:
         raise RecordError(
-            f"{1.0 / record.period_s:g} samples per second are too slow for {band_hz:g} Hz: needed are "
+            f"{1.0 / record.period_s:g} samples per second are too slow for {band_hz:g} Hz; required: "
             f"{2.0 * band_hz / FOLDING:.4g} or more, better {5.0 * band_hz:.4g}"
         )
     if not np.ptp(response) > 0.0:
@@ -350,7 +350,7 @@ def refuse_short(
     if frequency > FOLDING * half_rate:
         text = (
             f"the strongest vibration, {frequency:.4g} Hz, is above {FOLDING * half_rate:.4g} Hz, "
-            f"{100 * FOLDING:g} % of half the sampling rate: sampling may be too slow and the mode aliased; needed are "
+            f"{100 * FOLDING:g} % of half the sampling rate: sampling may be too slow and the mode aliased; required: "
             f"{5.0 * frequency:.4g} samples per second or more, with an anti-aliasing filter"
         )
         if band_hz is None:
@@ -365,7 +365,7 @@ def refuse_short(
     if last > DECAYED * first and periods < MIN_PERIODS:
         raise RecordError(
             f"{duration:.4g} s contain {periods:.1f} periods of {lowest:.4g} Hz, and the response is still "
-            f"at {100 * last / first:.0f} %: too short; needed are {MIN_PERIODS / lowest:.4g} s "
+            f"at {100 * last / first:.0f} %: too short; required: {MIN_PERIODS / lowest:.4g} s "
             f"({MIN_PERIODS:g} periods) or more"
         )
     if last > DECAYED * first and record.force_n is not None:

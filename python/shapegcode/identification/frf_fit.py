@@ -482,7 +482,7 @@ def _record_refusal(hertz: float, zeta: float, measured: _Measured) -> str:
             return ""
         return (
             f"its half-power width of {width:.3g} Hz is less than the {measured.resolution_hz:.3g} Hz between two "
-            "lines: window and record length can cause such a peak; needed is a finer resolution, or the time record"
+            "lines: window and record length can cause such a peak; required: a finer resolution, or the time record"
         )
     refusal, lasting = model_search.lasting_refusal(hertz, zeta, measured.record_s)
     if refusal:

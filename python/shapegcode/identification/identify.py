@@ -222,7 +222,7 @@ def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: m
     if not stops:
         raise RecordError(
             f"{records[0].source}: no stop after which the machine rests for a third of a second and its vibration "
-            "falls to a third: needed is a run with pauses, such as dwells, or the decay after one stop"
+            "falls to a third; required: a run with pauses, such as dwells, or the decay after one stop"
         )
     ready = prepare(stops, band_hz=highest_hz)
     first = ready.usable[: max(_FIRST_STOPS, len(ready.usable) // 3)]

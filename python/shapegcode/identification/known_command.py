@@ -87,11 +87,11 @@ def known_command(program: str | Path | Program, machine: Machine | str | Path) 
     moved = np.ptp(positions, axis=0)
     axis = int(np.argmax(moved))
     if not moved[axis] > 0.0:
-        raise RecordError(f"{program.source}: nothing moves: needed is the program that ran during the record")
+        raise RecordError(f"{program.source}: nothing moves; required: the program that ran during the record")
     others = [f"{'XYZ'[k]} by {moved[k]:.3g} mm" for k in range(3) if k != axis and moved[k] > 0.0]
     if others:
         raise RecordError(
-            f"{program.source}: {'XYZ'[axis]} moves by {moved[axis]:.3g} mm, and {' and '.join(others)} too: needed is "
+            f"{program.source}: {'XYZ'[axis]} moves by {moved[axis]:.3g} mm, and {' and '.join(others)} too; required: "
             "a program that moves one axis, as shapegcode sweep writes it"
         )
     x = positions[:, axis]
@@ -169,7 +169,7 @@ def _held_at_ends(values: FloatArray) -> bool:
 
 
 class _Clock:
-    """Clock of a record; around a part's middle, program time = middle + (logger's time - its own) * (1 + rate)."""
+    """Clock of a record: program time = middle of a part + (logger's time - that of the middle) * (1 + rate)."""
 
     def __init__(self, command: KnownCommand, record: Record) -> None:
         if record.quantity != "acceleration":
@@ -179,22 +179,22 @@ class _Clock:
         if _held_at_ends(record.response):
             raise RecordError(
                 f"{record.source}: overload: the acceleration is cut off at {np.max(np.abs(record.response)):.4g} "
-                "m/s²; needed is a larger range of the sensor, or less acceleration (shapegcode sweep --acceleration)"
+                "m/s²; required: a larger range of the sensor, or less acceleration (shapegcode sweep --acceleration)"
             )
         if len(command.parts) < _FEWEST_PARTS:
             raise RecordError(
-                f"{command.source}: has no rest of {REST_S:g} s or more: needed are {_FEWEST_PARTS} parts "
+                f"{command.source}: has no rest of {REST_S:g} s or more; required: {_FEWEST_PARTS} parts "
                 "separated by such rests, as from shapegcode sweep"
             )
         duration, needed = len(record.response) * record.period_s, command.parts[1][1]
         if duration < needed - command.parts[0][0]:
             raise RecordError(
-                f"{record.source}: {duration:.3g} s: too short, needed are two parts of {command.source} between its "
+                f"{record.source}: {duration:.3g} s: too short; required: two parts of {command.source} between its "
                 f"rests: {needed:.3g} s or more from its start"
             )
         if 1.0 / record.period_s < _OVER_HALF * _NARROWEST * _LOWEST_HZ:
             raise RecordError(
-                f"{record.source}: {1.0 / record.period_s:g} samples per second are too slow: needed are "
+                f"{record.source}: {1.0 / record.period_s:g} samples per second are too slow; required: "
                 f"{_OVER_HALF:g} for each Hz of the highest mode, {_OVER_HALF * _NARROWEST * _LOWEST_HZ:g} or more"
             )
         self.command, self.record = command, record
@@ -347,7 +347,7 @@ class _Clock:
         if len(inside) < fewest:
             raise RecordError(
                 f"{self.record.source}: no two parts of {self.command.source} (1 and 2, 3 and 4, ...) are both in the "
-                f"record as commanded, from the start of the first to {_RINGS_S:g} s after the second: needed is one "
+                f"record as commanded, from the start of the first to {_RINGS_S:g} s after the second; required: one "
                 "such pair, a rise and fall of a sweep"
             )
         return inside

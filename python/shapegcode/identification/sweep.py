@@ -94,8 +94,8 @@ def _spectrum(record: Record, band: tuple[float, float]) -> tuple[FloatArray, Fl
         raise RecordError(f"band of {band[0]:g} to {band[1]:g} Hz: must ascend, by {10.0 * _BIN_HZ:g} Hz or more")
     if band[1] > 0.8 * half:
         raise RecordError(
-            f"{record.source}: {1.0 / record.period_s:g} samples per second are too slow for {band[1]:g} Hz: needed "
-            f"are {2.5 * band[1]:.4g} or more, or another band (--frequencies)"
+            f"{record.source}: {1.0 / record.period_s:g} samples per second are too slow for {band[1]:g} Hz; required: "
+            f"{2.5 * band[1]:.4g} or more, or another band (--frequencies)"
         )
     if duration < _MIN_S:
         raise RecordError(
@@ -233,7 +233,7 @@ def _response(
     windows = _windows(trace, period_s)
     if len(windows) < _FEWEST_PARTS:
         raise RecordError(
-            f"{source}: {trace.name} moves in {len(windows)} part{'' if len(windows) == 1 else 's'}: needed are two "
+            f"{source}: {trace.name} moves in {len(windows)} part{'' if len(windows) == 1 else 's'}; required: two "
             f"between rests of half a second, or {1.5 * _WINDOW_S:g} s of motion"
         )
     low, high = band_hz or (_LOWEST_HZ, np.inf)

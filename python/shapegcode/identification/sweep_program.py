@@ -320,8 +320,8 @@ def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[lis
     if lasts_s * hertz[0] < _MIN_CYCLES:
         needed = 2.0 * (len(edges) - 1) * _MIN_CYCLES / hertz[0]
         raise ArgumentError(
-            f"seconds = {seconds:g}: {lasts_s * hertz[0]:.2g} cycles of {hertz[0]:g} Hz in each rise and fall: needed "
-            f"are {_MIN_CYCLES:g} or more, {math.ceil(10.0 * needed) / 10.0:g} s"
+            f"seconds = {seconds:g}: {lasts_s * hertz[0]:.2g} cycles of {hertz[0]:g} Hz in each rise and fall; "
+            f"required: {_MIN_CYCLES:g} or more, {math.ceil(10.0 * needed) / 10.0:g} s"
         )
     step, digits = machine.controller.least_increment_mm, machine.controller.feed_decimals_mm
     found, carried = [], 0.0

@@ -281,7 +281,7 @@ def read_edge_json(path: str | Path) -> EdgeCapture:
 
 def _parsed(file: DataFile, where: str, data: bytes) -> dict[str, Any]:
     if not data.strip():
-        raise RecordError(f"{where}: the file is empty; needed is JSON with Header, Payload and Footer")
+        raise RecordError(f"{where}: the file is empty; required: JSON with Header, Payload and Footer")
     try:
         found = file.json(where, data)
     except UnicodeDecodeError as error:
@@ -363,7 +363,7 @@ class _Part:
         for index, each in enumerate(listed):
             address = (each.get("Address") or each.get("Name")) if isinstance(each, dict) else None
             if not isinstance(address, str) or not address.strip():
-                raise RecordError(f"{key}[{index}] has no Address: needed is for example 'DES_POS|1'")
+                raise RecordError(f"{key}[{index}] has no Address; required: for example 'DES_POS|1'")
             if address in dict(found):
                 raise RecordError(f"{key}[{index}]: {address} is listed twice: it is unclear which one is valid")
             found.append((address.strip(), str(each.get("Axis") or "")))

@@ -120,7 +120,7 @@ def _places(table: TextTable, header: list[str], options: ReadOptions) -> dict[s
     if not any(header):
         if len(header) not in _BARE_COLUMNS:
             raise RecordError(
-                f"{table.path}: {len(header)} columns and no header: needed are frequency, real and imaginary part "
+                f"{table.path}: {len(header)} columns and no header; required: frequency, real and imaginary part "
                 "(and coherence), or a header that names the columns"
             )
         return dict(zip(("frequency", "real", "imaginary", "coherence"), range(len(header)), strict=False))
@@ -137,7 +137,7 @@ def _places(table: TextTable, header: list[str], options: ReadOptions) -> dict[s
     listed = ", ".join(repr(text) for text in header)
     if "frequency" not in found or not pairs:
         raise RecordError(
-            f"{table.where}: needed are columns of the frequency, and of real and imaginary part or magnitude and "
+            f"{table.where}: columns are missing: frequency, and real and imaginary part or magnitude and "
             f"phase; the header names {listed}"
         )
     wanted = ["frequency", *pairs[0], *(["coherence"] if "coherence" in found else [])]

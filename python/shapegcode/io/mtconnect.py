@@ -158,7 +158,7 @@ class _Document:
         if not self._open and name != "MTConnectStreams":
             kinds = {"MTConnectDevices": "the answer to `probe`", "MTConnectError": "an error of the agent"}
             raise RecordError(
-                f"{self._path}:{self._here}: <{name}>{', ' + kinds[name] if name in kinds else ''}: needed is "
+                f"{self._path}:{self._here}: <{name}>{', ' + kinds[name] if name in kinds else ''}; required: "
                 "MTConnectStreams, the answer to `sample`"
             )
         depth = len(self._open)
@@ -267,7 +267,7 @@ class _Odd:
     def end(self, readable: bool) -> None:
         """The end of the file; *readable*: at least one time stamp was readable."""
         if self._unreadable and not readable:
-            raise RecordError(f"{self._unreadable}; needed is for example 2017-02-10T18:33:01.138Z")
+            raise RecordError(f"{self._unreadable}; required: for example 2017-02-10T18:33:01.138Z")
         if self.until:
             raise RecordError(
                 f"{self._path}:{self._began}: the asset that begins here does not end: no line is "

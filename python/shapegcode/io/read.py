@@ -33,7 +33,7 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
             )
         return read_wav(path, options)
     if is_xml(head):
-        raise RecordError(f"{path}: XML can only contain a frequency response: needed is a record over time")
+        raise RecordError(f"{path}: XML can only contain a frequency response; required: a record over time")
     if _is_uff(head):
         return read_uff(path, options)
     if path.suffix.lower() in _NO_TEXT:
@@ -90,7 +90,7 @@ def _channels(path: Path) -> tuple[int, FloatArray, bool]:
         raise
     except Exception as error:  # SciPy raises errors of any kind
         raise RecordError(
-            f"{path}: the WAV file cannot be read ({error}); needed is PCM of 16, 24 or 32 bits, or float of 32 or 64"
+            f"{path}: the WAV file cannot be read ({error}); required: PCM of 16, 24 or 32 bits, or float of 32 or 64"
         ) from error
     if data.ndim == 1:
         data = data[:, np.newaxis]
@@ -99,7 +99,7 @@ def _channels(path: Path) -> tuple[int, FloatArray, bool]:
             return rate, data.astype(np.float64), False
     if data.dtype == np.uint8:
         raise RecordError(
-            f"{path}: 8 bits per sample resolve 1/128 of full scale, too coarse for a decay; needed are 16, 24 or 32 "
+            f"{path}: 8 bits per sample resolve 1/128 of full scale, too coarse for a decay; required: 16, 24 or 32 "
             "bits, or float"
         )
     # SciPy puts 24 bits into the upper three bytes of 32, so full scale is that of the type.
@@ -116,7 +116,7 @@ def read_wav(path: Path, options: ReadOptions) -> list[Record]:
     count, channels = data.shape
     if channels > 2:
         raise RecordError(
-            f"{path}: {channels} channels; needed is one (free decay) or two (force, response); "
+            f"{path}: {channels} channels; required: one (free decay) or two (force, response); "
             "write CSV or UFF for more"
         )
     if rate <= 0 or count < 16:

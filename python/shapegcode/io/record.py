@@ -72,7 +72,7 @@ def _check_samples(source: str, what: str, values: FloatArray) -> None:
     array = np.asarray(values)
     if array.ndim != 1 or array.dtype.kind not in "fiu" or not array.size:
         raise RecordError(
-            f"{source}: the {what} is of shape {array.shape} and type {array.dtype}: needed is one row of real numbers"
+            f"{source}: the {what} is of shape {array.shape} and type {array.dtype}; required: one row of real numbers"
         )
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
@@ -218,9 +218,7 @@ class FrequencyResponse:
             if np.ndim(values) != 1 or len(values) != count:
                 raise RecordError(f"{self.source}: {len(values)} {what} for {count} frequencies: must be equally many")
         if count < FEWEST_LINES:
-            raise RecordError(
-                f"{self.source}: {count} lines of a frequency response: needed are {FEWEST_LINES} or more"
-            )
+            raise RecordError(f"{self.source}: {count} lines of a frequency response; required: {FEWEST_LINES} or more")
         if self.frequency_hz[0] <= 0.0 or np.any(np.diff(self.frequency_hz) <= 0.0):
             raise RecordError(f"{self.source}: the frequencies must be above 0 and ascend")
         if not np.any(self.response):
@@ -321,7 +319,7 @@ def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, fl
         si = {"acceleration": "(m/s²)/N", "velocity": "(m/s)/N", "displacement": "m/N"}[named]
         return named, 1.0 / over, [f"{where}: the response has no unit: {si} is assumed"]
     raise RecordError(
-        f"{where}: unclear whether it is displacement, velocity or acceleration over force: needed is a unit such "
+        f"{where}: unclear whether it is displacement, velocity or acceleration over force; required: a unit such "
         "as m/N, µm/N, (m/s)/N, (m/s²)/N or g/N in the header, or --response-unit (of the response, over N), or "
         "--quantity"
     )

@@ -135,7 +135,7 @@ def _format(path: Path, stated: LogFormat | None) -> LogFormat:
     if any(mark in line for line in lines[:_TABLE_LINES] for mark in (b",", b";", b"\t", b"|")):
         return "csv"
     raise RecordError(
-        f"{path}:1: not a log of runs: the file begins with {begin[:60]!r}; needed is SHDR text (time|item|value), an "
+        f"{path}:1: not a log of runs: the file begins with {begin[:60]!r}; required: SHDR text (time|item|value), an "
         "MTConnectStreams document, Sinumerik Edge JSON or a table with a header"
     )
 

@@ -82,7 +82,7 @@ def _columns(table: TextTable) -> _Columns:
             target.setdefault(label.axis, index)
     if time < 0 or not (found.command or found.actual):
         raise ArgumentError(
-            f"{table.where}: no header with a time and an axis; needed is for example {_EXAMPLE}; the header is "
+            f"{table.where}: no header with a time and an axis; required: for example {_EXAMPLE}; the header is "
             f"{', '.join(table.layout.header)[:60]!r}"
         )
     if not found.command:

@@ -23,7 +23,7 @@ _MAX_BYTES = 64 << 20
 _SIEMENS = "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ!#$`()*+-/:;=?@[]^_{|}~"
 _USUAL = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;<=>?@^_`{|}~"
 _DIGITS = str.maketrans(_SIEMENS, _USUAL)
-_NEEDED = "needed is the result of an auto servo tuning (Setup, Optimize), saved with its measurements"
+_NEEDED = "required: the result of an auto servo tuning (Setup, Optimize), saved with its measurements"
 
 
 def is_xml(head: bytes) -> bool:
@@ -47,7 +47,7 @@ def read_servo_tuning(path: Path, options: ReadOptions) -> list[FrequencyRespons
     controller = next(root.iter("DynamicModelPositionController840DSL"), None)
     plant = _lines(path, controller, "m_pPlant")
     if plant is None:
-        raise RecordError(f"{path}: <{root.tag}> contains no m_pPlant of a speed controller: {_NEEDED}")
+        raise RecordError(f"{path}: <{root.tag}> contains no m_pPlant of a speed controller; {_NEEDED}")
     hertz, values = plant
     measured = _lines(path, controller, "m_pMeasCoherence")
     coherence = None
@@ -94,7 +94,7 @@ def _root(path: Path) -> Element:
     except RecordError:
         raise
     except (LookupError, ValueError) as error:  # from the declared codec
-        raise RecordError(f"{path}:1: {error}: needed is XML in UTF-8, UTF-16 or an encoding of one byte") from error
+        raise RecordError(f"{path}:1: {error}; required: XML in UTF-8, UTF-16 or an encoding of one byte") from error
     return builder.close()
 
 
@@ -133,7 +133,7 @@ def _doubles(path: Path, name: str, array: Element) -> Any:
     """Numbers of an array: base-85 words of four bytes, high word first, a dot for 0."""
     where = f"{path}: {array.get('name')} of {name}"
     if array.get("format") != "base85":
-        raise RecordError(f"{where} has the format {array.get('format')!r}: needed is base85")
+        raise RecordError(f"{where} has the format {array.get('format')!r}; required: base85")
     text = "".join("".join(each.text or "" for each in array.iter("raw")).split())
     if unknown := set(text) - set(_SIEMENS + "."):
         raise RecordError(f"{where} has {min(unknown)!r}, which is no base-85 digit")

@@ -56,7 +56,7 @@ def head_of(path: Path) -> bytes:
     """The beginning of a file."""
     head = next(chunks(path), b"")[:_LOG_HEAD_BYTES]
     if not head.strip():
-        raise RecordError(f"{path}: the file is empty; needed is the log of a run")
+        raise RecordError(f"{path}: the file is empty; required: the log of a run")
     if head[:4] != b"PK\x03\x04":
         refuse_binary(path, head, "a log of a run: SHDR text, MTConnect streams, Sinumerik Edge JSON or a table")
     return head
@@ -88,7 +88,7 @@ def refuse_binary(path: Path, head: bytes, needed: str) -> None:
     strange = sorted(set(head) - _TEXT_BYTES)
     if strange:
         position = head.index(bytes([strange[0]]))
-        raise RecordError(f"{path}: a binary file (byte 0x{strange[0]:02x} at {position}); needed is {needed}")
+        raise RecordError(f"{path}: a binary file (byte 0x{strange[0]:02x} at {position}); required: {needed}")
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
@@ -240,7 +240,7 @@ def find_layout(path: Path, head: bytes, by_number: bool) -> Layout:
     if rows is None:
         shown = next((line for line in lines if line.strip()), "")
         raise RecordError(
-            f"{path}:1: no rows of numbers among the first {len(lines)} lines; needed are columns of numbers separated "
+            f"{path}:1: no rows of numbers among the first {len(lines)} lines; required: columns of numbers separated "
             f"by comma, semicolon, tab or blanks below a header such as 'time_s,force_N,acc_m/s^2'; the first line is "
             f"{shown[:80]!r}"
         )
@@ -252,7 +252,7 @@ def find_layout(path: Path, head: bytes, by_number: bool) -> Layout:
     header, units = _choose_header(path, above, rows, lines)
     if not header[1] and not by_number:
         raise RecordError(
-            f"{path}:1: no header: the first line is {lines[rows.start][:80]!r}; needed is a line that names the "
+            f"{path}:1: no header: the first line is {lines[rows.start][:80]!r}; required: a line that names the "
             "columns, such as 'time_s,force_N,acc_m/s^2', or columns named by number (--time-column 1 ...)"
         )
     # Cells without a name in the header, except empty ones after the last delimiter.
@@ -368,7 +368,7 @@ class TextTable:
         if self.layout.decimal_comma:
             self._refuse_points()
         if len(table) < fewest:
-            raise RecordError(f"{self.path}: {len(table)} rows of numbers: too short; needed are at least {fewest}")
+            raise RecordError(f"{self.path}: {len(table)} rows of numbers: too short; required: at least {fewest}")
         return table
 
     def _table(self, data: bytes) -> FloatArray:

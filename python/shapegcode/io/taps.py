@@ -130,7 +130,7 @@ class _Chooser:
                 if options.period_s is not None or self.table.layout.period_s is not None:
                     return None
                 raise RecordError(
-                    f"{self.where}: no column of time; {self._listed()}; needed is one called time (or t, Zeit), "
+                    f"{self.where}: no column of time; {self._listed()}; required: one called time (or t, Zeit), "
                     "--time-column, or the period (--sample-period)"
                 )
             index = found[0]
@@ -179,7 +179,7 @@ class _Chooser:
                 found = chosen or found
         if not found:
             raise RecordError(
-                f"{self.where}: no column of a response; {self._listed()}; needed is an acceleration, velocity "
+                f"{self.where}: no column of a response; {self._listed()}; required: an acceleration, velocity "
                 f"or displacement, as in {_EXAMPLE!r}, or --response-column"
             )
         columns = [self._response(k) for k in found]

@@ -104,7 +104,7 @@ class UffFile:
                 "datasets of type " + ", ".join(map(str, sorted(set(self.types)))) if self.types else "no dataset"
             )
             raise RecordError(
-                f"{self.path}: no time record: the file contains {held}; needed are time records (dataset 58, function "
+                f"{self.path}: no time record: the file contains {held}; required: time records (dataset 58, function "
                 "type 1) of the response, and of the force for a mass: spectra do not show overload, double hits "
                 "and noise"
             )
@@ -124,7 +124,7 @@ class UffFile:
             )
         direction = int(data["rsp_dir"])
         if abs(direction) > 3:
-            raise RecordError(f"{where}: direction {direction} is a rotation: needed are x, y, z (1 to 3)")
+            raise RecordError(f"{where}: direction {direction} is a rotation; required: x, y, z (1 to 3)")
         measures = self._measures(where, data)
         factor = self._factor(where, data, measures, units)
         period, start = self._period(where, data)
@@ -161,7 +161,7 @@ class UffFile:
             return self.options.quantity
         raise RecordError(
             f"{where}: unknown quantity: ordinate data type {code}, unit "
-            f"{data.get('ordinate_axis_units_lab', '')!r}, title {data.get('id1', '')!r}; needed is data type 13 "
+            f"{data.get('ordinate_axis_units_lab', '')!r}, title {data.get('id1', '')!r}; required: data type 13 "
             "(force), 12 (acceleration), 11 (velocity) or 8 (displacement), or a unit"
         )
 
@@ -196,7 +196,7 @@ class UffFile:
         if text.upper() not in {"", "NONE"}:
             known = units_of(measures)
             raise RecordError(
-                f"{where}: the unit {text!r} of the {measures} is not known and there is no dataset 164; needed is one "
+                f"{where}: the unit {text!r} of the {measures} is not known and there is no dataset 164; required: one "
                 f"of {known}, or a scale (--force-scale, --response-scale)"
             )
         self.unitless.append(where.rsplit(" ", 1)[1])
@@ -419,7 +419,7 @@ def _scale(
     if kind in _FORCES and denominator in _RESPONSES:
         raise RecordError(f"{where}: force over response (an apparent mass or stiffness): export response over force")
     if denominator not in {0, *_FORCES}:
-        raise RecordError(f"{where}: its denominator is of data type {denominator}: needed is a force (13)")
+        raise RecordError(f"{where}: its denominator is of data type {denominator}; required: a force (13)")
     top = str(data.get("ordinate_axis_units_lab", "")).strip()
     bottom = str(data.get("orddenom_axis_units_lab", "")).strip()
     named = [text for text in (top, bottom) if text.upper() not in {"", "NONE"}]

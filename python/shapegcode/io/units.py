@@ -202,7 +202,7 @@ def _is_name(text: str, names: Names) -> bool:
 
 def unit_of(where: str, label: Label, allowed: tuple[Measured, ...], remedy: str = "") -> Unit | None:
     """Unit of a label for a quantity; None: not stated."""
-    needed = f"needed is one of {units_of(*allowed)}"
+    needed = f"required: one of {units_of(*allowed)}"
     if label.unit is None and label.unknown_unit:
         raise RecordError(
             f"{where}: {label.text!r}: the unit {label.unknown_unit!r} is not known; {needed}"

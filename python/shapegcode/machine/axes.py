@@ -227,7 +227,7 @@ def _along(axis: int) -> tuple[float, float, float]:
 
 
 class Axis(TomlTable):
-    """Limits of one axis; all three tables are required."""
+    """Limits of one axis; a machine file has a table for each of X, Y and Z."""
 
     max_feed_mm_per_min: _Speed = key("largest cutting feed of this axis", fanuc="1430")
     rapid_mm_per_min: _Speed = key("rapid traverse (G00)", fanuc="1420")

@@ -279,7 +279,7 @@ def _tools(draft: Draft, tables: ControlTables) -> None:
 
 
 def _mm(draft: Draft, value: float, point: bool) -> float:
-    """Value of a table in mm: with a point mm, or inch by the setting; without one in least increments."""
+    """Value of a table, in mm; one with a point is in mm or inch, by the setting, one without in least increments."""
     if not point:
         return value * (increment_um(draft)[0] / 1000)
     return value * (MM_PER_INCH if draft.values.bit(0, 2) else 1.0)

@@ -47,7 +47,7 @@ class _TomlWriter:
         self._explains = not short
 
     def _add(self, line: str, key: str) -> None:
-        """Add a line with its remark as a comment: for readers; the table of origins is what counts."""
+        """Add a line with its remark as a comment for readers; programs read the table of origins."""
         if remark := self.remarks.pop(key, ""):
             self.written[key] = remark
         self.lines.append(f"{line}  # {remark}" if remark else line)

@@ -76,7 +76,7 @@ def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: fl
     """Design the shortest shaper with taps at multiples of a period that meets the conditions.
 
     Among the shapers of the shortest duration, one without negative impulses has the least second central moment (the
-    contour cost; under a limit to 0.1 %), one with them the least sum of magnitudes.
+    contour cost; to 0.1 % if the residual is limited over bands), one with them the least sum of magnitudes.
 
     Source: this project.
     """

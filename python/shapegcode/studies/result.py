@@ -335,7 +335,7 @@ class Optimum(Result):
         probability: required probability of staying within tolerance.
         draws: machines on which a candidate is simulated; four times as many new ones confirm it.
         best: the best candidate; None: none has the required probability.
-        as_it_is: the machine file without a choice; None: no emitted program.
+        as_it_is: with the settings of the machine file; None: no emitted program.
         candidates: all converted ones, shortest first.
         combinations: number of possible combinations.
         warnings: caution, before you run.

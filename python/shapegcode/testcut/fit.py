@@ -167,7 +167,7 @@ def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> Me
     else:
         if record.position_mm is None:
             raise ArgumentError(
-                f"{record.file}: means over time have no position: needed is position_mm or radial_depth_mm"
+                f"{record.file}: means over time have no position; required: position_mm or radial_depth_mm"
             )
         row = fully_engaged(cut, measuring, record.position_mm)
         met = engagement(cut.tool, measuring, record.position_mm[row], up=cut.up)

@@ -307,7 +307,7 @@ def _outliers(measured: FloatArray, left: FloatArray, noise: FloatArray) -> npt.
 def _check(data: MeanForces, chip: FloatArray, count: int, edge: bool) -> None:
     rows = len(chip)
     if rows < 2 * count:
-        raise ArgumentError(f"{rows} mean forces are too few for {count} coefficients: needed are {2 * count} or more")
+        raise ArgumentError(f"{rows} mean forces are too few for {count} coefficients; required: {2 * count} or more")
     if not np.all(chip > 0.0):
         raise ArgumentError("some forces are at positions without engagement: remove them")
     low, high = float(chip.min()), float(chip.max())

@@ -74,7 +74,7 @@ def _columns(table: TextTable) -> dict[str, tuple[int, float]]:
     if missing:
         raise ArgumentError(
             f"{table.where}: no column of {' and '.join(missing)}; the header is "
-            f"{', '.join(table.layout.header)[:80] or 'missing'!r}; needed is for example {_EXAMPLE}, "
+            f"{', '.join(table.layout.header)[:80] or 'missing'!r}; required: for example {_EXAMPLE}, "
             "position_mm,fx_n,fy_n or radial_depth_mm,fx_n,fy_n"
         )
     return found
