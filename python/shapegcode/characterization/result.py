@@ -10,7 +10,7 @@ from typing import ClassVar
 from shapegcode.characterization.air_tests import Kind
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Result, Unjudged
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 CUTTING_SUM = "cutting time constant + bell time"  # acceleration after interpolation, as from a stopwatch
@@ -120,7 +120,7 @@ class WrittenTest:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class CharacterisationTests(Unjudged, Result):
+class CharacterisationTests(Result):
     """Written test programs.
 
     Attributes:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from shapegcode.identification import checks
 from shapegcode.machine import Machine
-from shapegcode.results.result import Result, Unjudged
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 
@@ -39,7 +39,7 @@ class RapidStop:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class TapPlan(Unjudged, Result):
+class TapPlan(Result):
     """How to do a tap test.
 
     Attributes:

@@ -19,7 +19,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.stream import stream
 from shapegcode.program import Program
-from shapegcode.results.result import Result, Unjudged
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 _PAUSE_S = 1.0, 2.5  # after each rise, and after each fall, for the vibration to decay
@@ -66,7 +66,7 @@ class SweptBand:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class SweepProgram(Unjudged, Result):
+class SweepProgram(Result):
     """A program that shakes an axis.
 
     Attributes:

@@ -12,7 +12,7 @@ from typing import TypeVar
 from shapegcode.machine.machine import Machine
 from shapegcode.results.json import OldNames, hidden
 from shapegcode.results.outcome import Xyz
-from shapegcode.results.result import Result, Unjudged
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 from shapegcode.settings.keys import KeyValue, toml
 
@@ -237,7 +237,7 @@ class OpenValue(OldNames):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class MachineDescription(Unjudged, Result):
+class MachineDescription(Result):
     """Every value of a machine with its unit, origin and meaning.
 
     Attributes:

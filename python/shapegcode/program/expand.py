@@ -12,11 +12,11 @@ from shapegcode.machine import Machine
 from shapegcode.program.compensation import refuse_zero_radius
 from shapegcode.program.program import Program
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Result, Unjudged
+from shapegcode.results.result import Result
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Expansion(Unjudged, Result):
+class Expansion(Result):
     """The expanded program: calls, macros and coordinate modes resolved.
 
     Attributes:

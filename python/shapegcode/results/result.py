@@ -215,15 +215,6 @@ class Result(Outcome):
         return short_html(self)
 
 
-class Unjudged:
-    """Mixin of results without a verdict: what cannot be done is refused with an error."""
-
-    @property
-    def ok(self) -> bool:
-        """Always true: what cannot be done is refused."""
-        return True
-
-
 def _fields(value: object) -> Sequence[dataclasses.Field[Any]]:
     return dataclasses.fields(value) if dataclasses.is_dataclass(value) and not isinstance(value, type) else ()
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Result, Unjudged
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 
@@ -21,7 +21,7 @@ class OpenQuestion:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class MachineSetup(Unjudged, Result):
+class MachineSetup(Result):
     """A machine file made from answers.
 
     Attributes:

@@ -10,7 +10,7 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
 from shapegcode.results.outcome import Plot
-from shapegcode.results.result import Result, Unjudged
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 from shapegcode.testcut.cut import CuttingLaw, Edge, TestCut
 from shapegcode.testcut.forces import Coefficient, CoefficientFit, Expected, MeanForces
@@ -18,7 +18,7 @@ from shapegcode.testcut.record import Revolutions
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class CutDesign(Unjudged, Result):
+class CutDesign(Result):
     """A designed test cut, before it is run.
 
     Attributes:
