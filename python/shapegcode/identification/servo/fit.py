@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import least_squares, minimize, minimize_scalar
+from scipy.signal import lfilter
 
 from shapegcode import _core
 from shapegcode.errors import ArgumentError
@@ -76,8 +78,6 @@ def delayed(way: FloatArray, samples: float) -> FloatArray:
 
 def lag_way(way: FloatArray, gain_per_s: float, period_s: float, late: float = 0.0) -> FloatArray:
     """Error of a first-order lag without feed-forward (f = 0), exact for set-points joined by straight lines."""
-    from scipy.signal import lfilter
-
     kept = math.exp(-gain_per_s * period_s)
     share = (1.0 - kept) / (gain_per_s * period_s)  # for a ramp over one period
     first = way[1] - way[0]
@@ -97,8 +97,6 @@ def lag_way(way: FloatArray, gain_per_s: float, period_s: float, late: float = 0
 
 def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) -> LoopFit:
     """Fit dead time, gain, feed-forward and offset; the last two by inner linear least squares."""
-    from scipy.optimize import minimize, minimize_scalar
-
     low, high = (math.log(each) for each in GAINS)
     scale = max(rms(counted(trace.lag, use)) ** 2, 1e-18)
 
@@ -216,8 +214,6 @@ _STARTS = ((150.0, 0.02), (40.0, 0.005))  # bandwidth, integral time
 
 def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, tell: Callable[[], None]) -> DriveFit:
     """Fit the drive, started at the best servo lag."""
-    from scipy.optimize import least_squares
-
     top_speed = max(float(np.abs(np.diff(way)).max()) for way in trace.command) / period_s
     acceleration = max(float(np.quantile(np.abs(np.diff(way, 2)), 0.99)) for way in trace.command) / period_s**2
 
