@@ -39,9 +39,7 @@ class Placed:
 
     def blocks(self, emitted: Program) -> _core.Path:
         """The shaped blocks as they were read back."""
-        if self.path is not None:
-            return self.path
-        return emitted.core.cutting_path(self.first_line, self.last_line)
+        return emitted.core.cutting_path(self.first_line, self.last_line) if self.path is None else self.path
 
 
 @dataclass(frozen=True)
@@ -276,6 +274,10 @@ class Case:
         """True for the intended operation, with either rule of block timing."""
         return self.override == 1.0 and self.mode is None and not self.look_ahead and self.starved_s == 0.0
 
+    def needs_contour(self, target: Target) -> bool:
+        """True if the contour must be measured in this case: a shifted mode does not change the command."""
+        return self.mode is None or (self.counts and (self.override != 1.0 or target == "response"))
+
 
 @dataclass(frozen=True)
 class CaseFigures:
@@ -508,11 +510,9 @@ class CaseSimulation:
     def _whole(self, case: Case) -> bool:
         if self.model.always_plans and case.override != 1.0:
             return True
-        # A shifted mode does not change the command.
-        needed = case.mode is None or (case.counts and (case.override != 1.0 or self.target == "response"))
         # With feed drives each would take a quarter of a conversion: cases that are only shown have the residual only.
         spared = case.override != 1.0 and not case.counts and self.model.machine.verdict.plant != "modal"
-        return needed and not spared and not self._beside(case)
+        return case.needs_contour(self.target) and not spared and not self._beside(case)
 
     def groups(self) -> list[list[Case]]:
         """Groups of overrides and shifted modes: one task for each full simulation, one for all short ones."""
