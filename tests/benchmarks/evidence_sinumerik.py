@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 import shapegcode as sg
-from shapegcode.identification.servo.models import delayed, rms
+from shapegcode.identification.servo.fit import delayed, rms
 
 SHIPPED = Path(__file__).resolve().parents[2] / "python/shapegcode/data/measured/sinumerik/capture.json.gz"
 

@@ -21,7 +21,7 @@ from shapegcode import _core, cli
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.model.machine_model import BLOCK_ENDS, MachineModel
 from shapegcode.shaping.grid import choose_grid
-from shapegcode.verdict.cases import Case, CaseSimulation
+from shapegcode.verdict.figures import Case, CaseSimulation
 
 _WITH, _WITHOUT = "with-override-contours", "without-override-contours"
 _TEN_LINES = b"%\nO1\nG21G17G90G94G40G49G80\nG0X0.Y0.Z0.\nG1X50.F3000\nY50.\nX20.\nY20.\nM30\n%\n"

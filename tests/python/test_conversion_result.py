@@ -12,8 +12,7 @@ from acceptance import machine_with
 from shapegcode.conversion.tables import BeforeAfter, Sensitivity, sensitivity_table
 from shapegcode.results.json import schema
 from shapegcode.results.outcome import Pair, Xyz
-from shapegcode.verdict.cases import case_table
-from shapegcode.verdict.figures import RegionVerdict
+from shapegcode.verdict.figures import RegionVerdict, case_table
 
 PART = "%\nO1\nG21G17G90G94\nG54G00X0Y0Z0\nG01X20.F12000\nG03X40.Y20.I0J20.\nG01Y40.\nM30\n%\n"
 TWO = PART.replace("M30", "G00X0Y0\nG01X30.F3000\nM30")

@@ -18,7 +18,7 @@ from shapegcode.cli import main
 from shapegcode.results import plot as canvas
 from shapegcode.results.json import schema
 from shapegcode.shaping.bands import machine_bands
-from shapegcode.verdict.cases import stated_cases
+from shapegcode.verdict.figures import stated_cases
 
 FloatArray = npt.NDArray[np.float64]
 PERIOD_S = 1.0 / 2048.0

@@ -13,7 +13,7 @@ import shapegcode as sg
 from command import run
 from edge_writer import MEASURED, edge_document, write_edge
 from shapegcode import _core
-from shapegcode.identification.servo.models import delayed, lag_way
+from shapegcode.identification.servo.fit import delayed, lag_way
 
 FloatArray = NDArray[np.float64]
 PERIOD_S = 0.002

@@ -21,7 +21,7 @@ from shapegcode.cli import main
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results.outcome import Deviation
 from shapegcode.shaping import choose_shaper
-from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region, stated_cases
+from shapegcode.verdict.figures import CaseFigures, RegionLimits, judge_region, stated_cases
 
 Vector = npt.NDArray[np.float64]
 TICK = 0.001

@@ -12,7 +12,7 @@ import numpy as np
 from shapegcode.characterization import moves
 from shapegcode.characterization.air_tests import AXES, AirTest, whole_periods
 from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, ControllerFact, Facts, mean
-from shapegcode.identification.servo.models import GAINS, lag_way
+from shapegcode.identification.servo.fit import GAINS, lag_way
 from shapegcode.io.servo_log import ServoLog
 from shapegcode.io.units import FloatArray
 

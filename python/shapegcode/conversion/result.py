@@ -28,8 +28,7 @@ from shapegcode.results.json import Provenance, exact, hidden, sparse
 from shapegcode.results.outcome import CONTOURS, ContourError, Pair, Plot, Xyz
 from shapegcode.results.result import Result
 from shapegcode.results.table import Table
-from shapegcode.verdict.cases import case_table
-from shapegcode.verdict.figures import AppliedLimits, BlockCount, Placed, ProgramFigures, UsedShaper
+from shapegcode.verdict.figures import AppliedLimits, BlockCount, Placed, ProgramFigures, UsedShaper, case_table
 
 if TYPE_CHECKING:
     from shapegcode.results.page.model import Light, Section

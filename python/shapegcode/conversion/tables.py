@@ -18,8 +18,7 @@ from shapegcode.results.json import OldNames
 from shapegcode.results.outcome import Pair, Xyz
 from shapegcode.results.table import NO_BREAK, Column, Table
 from shapegcode.settings.keys import KeyValue
-from shapegcode.verdict.cases import Case, CaseFigures, case_figures, judge_region, unbroken
-from shapegcode.verdict.figures import Placed
+from shapegcode.verdict.figures import Case, CaseFigures, Placed, case_figures, judge_region, unbroken
 from shapegcode.verdict.judge import Judge, RegionFigures
 
 _LEAST_SHARE = 0.01  # of a limit: smaller effects do not matter

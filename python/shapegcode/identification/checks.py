@@ -1,10 +1,9 @@
 """Which records can be used: double hits, overload, missing force, too short, too slow; measures their noise."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 from scipy.ndimage import label
@@ -36,6 +35,18 @@ class RecordUse:
         return None if self.samples is None or self.period_s is None else self.samples * self.period_s
 
 
+@dataclass(frozen=True)
+class Hit:
+    """One impact of the hammer."""
+
+    first: int  # first sample of the pulse
+    peak: int  # sample of its largest force
+    end: int  # first sample after the pulse
+    peak_n: float  # largest force relative to the offset, with its sign
+    second_share: float = 0.0  # largest later pulse before the next impact, relative to this one; 0: none
+    second_s: float = 0.0  # its delay after this one
+
+
 @dataclass(frozen=True, eq=False)
 class Usable:
     """A usable record and its noise and pulse; all but the record is None for a free decay."""
@@ -62,7 +73,7 @@ class Prepared:
         """Usable records."""
         return tuple(each.record for each in self.usable)
 
-    def without(self, unused: Sequence[Usable], why: str) -> Prepared:
+    def without(self, unused: Sequence[Usable], why: str) -> Self:
         """Copy with some of the records refused."""
         refused = tuple(RecordUse(each.record.source, False, why) for each in unused)
         usable = tuple(each for each in self.usable if each not in unused)
@@ -386,18 +397,6 @@ _BOUNCE_S = 0.1  # A second impact within this time is a bounce of the hammer
 _RESTED = 0.1  # Before an intended next impact the response has fallen to this fraction of its peak
 _LEAD_SHARE = 0.1  # A record of one impact begins this fraction of the time between impacts before it
 _MAD = 1.4826  # Normal noise: standard deviation over median absolute deviation
-
-
-@dataclass(frozen=True)
-class Hit:
-    """One impact of the hammer."""
-
-    first: int  # first sample of the pulse
-    peak: int  # sample of its largest force
-    end: int  # first sample after the pulse
-    peak_n: float  # largest force relative to the offset, with its sign
-    second_share: float = 0.0  # largest later pulse before the next impact, relative to this one; 0: none
-    second_s: float = 0.0  # its delay after this one
 
 
 def _pulses(force: FloatArray, sigma: float) -> list[Hit]:

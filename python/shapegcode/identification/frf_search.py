@@ -1,7 +1,5 @@
 """Searches modes of frequency responses: poles stable over model orders and bands, fitted window by window."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -38,6 +36,15 @@ _CLEAR, _OPPOSED = 6.0, 8.0  # gain over Bayes' criterion that a mode needs; if 
 _TWINS = 0.02  # modes nearer than this fraction of their width are one
 _START_DAMPING = (0.005, 0.02, 0.06)
 _NO_VIBRATION = 0.5
+
+
+@dataclass(frozen=True)
+class Pole:
+    """A pole of a model of some order in some band."""
+
+    omega: float  # rad/s
+    zeta: float
+    order: int
 
 
 @dataclass(frozen=True)
@@ -478,15 +485,6 @@ def _correlated(columns: ComplexArray, correlation: ComplexArray) -> ComplexArra
 
 _CIRCLE = 0.85  # fraction of the unit circle onto which a band is mapped
 _LINES_PER_ORDER, _MAX_ORDER, _MIN_ORDER, _MOST_POLE_DAMPING = 4, 24, 2, 0.3
-
-
-@dataclass(frozen=True)
-class Pole:
-    """A pole of a model of some order in some band."""
-
-    omega: float  # rad/s
-    zeta: float
-    order: int
 
 
 def band_poles(parts: Sequence[Lines], low: float, high: float) -> list[Pole]:

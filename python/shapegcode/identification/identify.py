@@ -23,8 +23,8 @@ from shapegcode.identification.result import Identification, MassCheck, by_suppo
 from shapegcode.identification.spectra import split_stops
 from shapegcode.identification.sweep import find_modes_of_captures, find_swept_modes, is_capture
 from shapegcode.io.data_file import open_file
+from shapegcode.io.read import is_klipper, read_sweep
 from shapegcode.io.record import FrequencyResponse, Quantity, ReadOptions, Record, UnevenTimeError, even_period
-from shapegcode.io.taps import is_klipper, read_sweep
 from shapegcode.io.units import FloatArray
 
 if TYPE_CHECKING:

@@ -1,7 +1,5 @@
 """Chooses the number of modes by models of growing order; intervals and refusals of each mode."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -30,6 +28,21 @@ _MAX_DAMPING = 0.7  # of a pole used as a start
 _PATIENCE = 2  # Consecutive unsupported models that end the search: one may have missed its start
 
 
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Models by number of modes."""
+
+    fits: tuple[Fit, ...]  # the best fit of each number of modes, from 1
+    # by number of modes, from 0: samples * ln(mean square of the residual) + (parameters + modes) * ln(samples);
+    # lower is better. Each mode counts one parameter more, since its frequency was searched
+    evidence: tuple[float, ...]
+
+    @property
+    def order(self) -> int:
+        """Number of modes with the best evidence."""
+        return int(np.argmin(self.evidence))
+
+
 @dataclass(frozen=True)
 class Sought:
     """Search parameters."""
@@ -46,21 +59,6 @@ class Sought:
         if self.modes is not None and len(models.fits) < self.modes:
             raise RecordError(f"{self.modes} modes are asked for, and the data support no more than {len(models.fits)}")
         return self.modes or models.order
-
-
-@dataclass(frozen=True, eq=False)
-class Search:
-    """Models by number of modes."""
-
-    fits: tuple[Fit, ...]  # the best fit of each number of modes, from 1
-    # by number of modes, from 0: samples * ln(mean square of the residual) + (parameters + modes) * ln(samples);
-    # lower is better. Each mode counts one parameter more, since its frequency was searched
-    evidence: tuple[float, ...]
-
-    @property
-    def order(self) -> int:
-        """Number of modes with the best evidence."""
-        return int(np.argmin(self.evidence))
 
 
 def search(problem: FitProblem, sought: Sought) -> Search:

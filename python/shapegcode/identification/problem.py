@@ -1,9 +1,8 @@
 """Data of a fit over time: taps with force, or free decays, in the form of the core's fits."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy.signal import firwin, kaiserord, oaconvolve
@@ -20,6 +19,22 @@ MIN_SWINGS = 2.0  # Least cycles of a mode in the record to find its frequency
 HIGHEST_SHARE = 0.45  # Ratio to the sampling rate up to which the force between samples is known
 _STEPS, _QUICK_STEPS = 60, 15  # iterations of a fit; of one that only locates a mode
 _PEAKS = 2  # tried peaks of the residual's spectrum
+
+
+@dataclass(frozen=True, eq=False)
+class Thinned:
+    """Decimated tap records."""
+
+    responses: list[FloatArray]  # (n,) each
+    forces: list[FloatArray]  # (n,) each, force as from a recorder
+    straight: list[FloatArray]  # (n,) each, force linear between samples
+    period_s: float  # time between two samples
+    # power of white noise after the filter, relative to the band up to half the new rate
+    white_share: float
+    noise_correlation: float  # correlation of consecutive samples of filtered white noise
+    # noise per sample of the pulse relative to the original; the pulse's impulse is known as before
+    force_noise: float
+    first_s: list[float]  # time of the first new sample relative to the first old one, per record
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +118,7 @@ class FitProblem:
         highest = inner[np.argsort(power[inner])[::-1][:_PEAKS]]
         return [float(2.0 * np.pi * frequency[index]) for index in highest]
 
-    def other_courses(self, near: Fit) -> list[FitProblem]:
+    def other_courses(self, near: Fit) -> list[Self]:
         """The same taps with each other possible intersample behaviour of the force."""
         if self.thinned is None:
             return [replace(self, hold="linear"), replace(self, hold="impulse")]
@@ -117,7 +132,7 @@ class FitProblem:
             responses = [response - free * (sampled - course) for response, sampled, course in parts]
         return [replace(self, forces=straight, responses=responses, hold="linear")]
 
-    def record(self, index: int) -> FitProblem:
+    def record(self, index: int) -> Self:
         """One record alone."""
         forces = None if self.forces is None else [self.forces[index]]
         return replace(self, forces=forces, responses=[self.responses[index]])
@@ -163,22 +178,6 @@ _FEW = 4096  # Fewer samples than this need no decimation
 _MARGIN = 1.25  # Margin for response peaks above the band that the impact excites
 _MARGIN_OF_BLOWS = 2.0
 _GRID = 8  # points of the filter's transform per coefficient
-
-
-@dataclass(frozen=True, eq=False)
-class Thinned:
-    """Decimated tap records."""
-
-    responses: list[FloatArray]  # (n,) each
-    forces: list[FloatArray]  # (n,) each, force as from a recorder
-    straight: list[FloatArray]  # (n,) each, force linear between samples
-    period_s: float  # time between two samples
-    # power of white noise after the filter, relative to the band up to half the new rate
-    white_share: float
-    noise_correlation: float  # correlation of consecutive samples of filtered white noise
-    # noise per sample of the pulse relative to the original; the pulse's impulse is known as before
-    force_noise: float
-    first_s: list[float]  # time of the first new sample relative to the first old one, per record
 
 
 def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:

@@ -7,8 +7,6 @@ Both grammars of CNC-PARA.TXT are read: ``N01420Q1A1P24000.0A2P24000.0`` (30i, 0
 in hexadecimal), ``#500=[25283*65536]/134217728`` (the same of older series). Lines end in LF, CR-LF or LF-CR-CR.
 """
 
-from __future__ import annotations
-
 import ast
 import math
 import operator
@@ -164,6 +162,38 @@ LONGEST_MS = 10_000.0
 _MAX_VALUE = 1e7
 
 
+@dataclass(frozen=True)
+class Entry:
+    """One value of a dump."""
+
+    number: int  # parameter number
+    target: str  # "A1", "S2", "L1", "T1", or empty if the value has no axis, spindle or path
+    letter: str  # "P", or "M" and "I" for values in mm and inch
+    text: str  # the value as written
+    line: int  # line number in the dump, from 1
+
+
+@dataclass
+class Dump:
+    """The records of a dump."""
+
+    file: str  # its name
+    entries: dict[tuple[int, str], Entry] = field(default_factory=dict)  # first value of each (number, target)
+    with_q: bool = False  # True where records carry Q1 (30i, 0i-D, 0i-F)
+    complete: bool = False  # True if it ends with ``%``
+    # (number, line) of records that repeat a value for another path
+    repeated: list[tuple[int, int]] = field(default_factory=list)
+    strange: list[tuple[int, str]] = field(default_factory=list)  # (line, text) of lines that are not records
+    records: int = 0  # number of records
+    # other parameters, with the line of their first record
+    others: dict[int, int] = field(default_factory=dict)
+
+    def get(self, number: int, axis: int | None = None) -> Entry | None:
+        """The value of a parameter for an axis (1, 2, ...), or of the first path; None if it is missing."""
+        targets = ("", "L1") if axis is None else (f"A{axis}",)
+        return next((self.entries[number, name] for name in targets if (number, name) in self.entries), None)
+
+
 class DumpValues:
     """Reads values of a dump and checks them."""
 
@@ -222,38 +252,6 @@ _NUMBER = r"[-+]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})"
 _RECORD = re.compile(r"N\s*(\d{1,6})\s*(Q\d+)?\s*(.*)", re.ASCII)
 _VALUE = re.compile(rf"(?:([LAST])\s*(\d{{1,4}})\s*)?([PMI])\s*({_NUMBER})\s*", re.ASCII)
 _VALUES = re.compile(rf"(?:(?:[LAST]\s*\d{{1,4}}\s*)?[PMI]\s*{_NUMBER}\s*)+", re.ASCII)
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One value of a dump."""
-
-    number: int  # parameter number
-    target: str  # "A1", "S2", "L1", "T1", or empty if the value has no axis, spindle or path
-    letter: str  # "P", or "M" and "I" for values in mm and inch
-    text: str  # the value as written
-    line: int  # line number in the dump, from 1
-
-
-@dataclass
-class Dump:
-    """The records of a dump."""
-
-    file: str  # its name
-    entries: dict[tuple[int, str], Entry] = field(default_factory=dict)  # first value of each (number, target)
-    with_q: bool = False  # True where records carry Q1 (30i, 0i-D, 0i-F)
-    complete: bool = False  # True if it ends with ``%``
-    # (number, line) of records that repeat a value for another path
-    repeated: list[tuple[int, int]] = field(default_factory=list)
-    strange: list[tuple[int, str]] = field(default_factory=list)  # (line, text) of lines that are not records
-    records: int = 0  # number of records
-    # other parameters, with the line of their first record
-    others: dict[int, int] = field(default_factory=dict)
-
-    def get(self, number: int, axis: int | None = None) -> Entry | None:
-        """The value of a parameter for an axis (1, 2, ...), or of the first path; None if it is missing."""
-        targets = ("", "L1") if axis is None else (f"A{axis}",)
-        return next((self.entries[number, name] for name in targets if (number, name) in self.entries), None)
 
 
 def read_dump(data: bytes, file: str, wanted: Container[int]) -> Dump:

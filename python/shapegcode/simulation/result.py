@@ -14,8 +14,7 @@ from shapegcode.results.json import hidden, sparse
 from shapegcode.results.outcome import CONTOURS, ContourError, Plot, Tracks, Xyz
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table, xyz_columns
-from shapegcode.verdict.cases import case_table
-from shapegcode.verdict.figures import ProgramFigures
+from shapegcode.verdict.figures import ProgramFigures, case_table
 
 if TYPE_CHECKING:
     from shapegcode.results.page.model import Figure

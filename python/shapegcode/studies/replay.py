@@ -20,7 +20,7 @@ from shapegcode.program.compensation import program_for_conversion
 from shapegcode.program.computer import cores
 from shapegcode.results.outcome import Deviation
 from shapegcode.studies.varied import sampled_machine
-from shapegcode.verdict.cases import CaseFigures, RegionLimits, judge_region
+from shapegcode.verdict.figures import CaseFigures, RegionLimits, judge_region
 from shapegcode.verdict.judge import Judge, RegionFigures
 
 SHARE = "share_of_limit"

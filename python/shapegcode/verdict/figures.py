@@ -1,13 +1,24 @@
-"""Parts of a conversion's result: figures per case and per region, with their limits."""
+"""Operating conditions of an emitted program (`[verdict]` of the machine file), and the figures of its cuts in them."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
 
 from shapegcode import _core
+from shapegcode.io.units import FloatArray
+from shapegcode.machine import Machine
+from shapegcode.machine.controller import PLANNER_NAMES
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.modes import Offset
 from shapegcode.program import Program
 from shapegcode.results.json import OldNames, sparse
-from shapegcode.results.outcome import ContourError, Pair, Tracks, Xyz
+from shapegcode.results.outcome import CONTOURS, ContourError, Deviation, Pair, Tracks, Xyz
+from shapegcode.results.table import NO_BREAK, Column, Table
 
 _LEAST_BETTER = 0.3  # relative reduction of a figure that counts as a benefit
 
@@ -28,9 +39,7 @@ class Placed:
 
     def blocks(self, emitted: Program) -> _core.Path:
         """The shaped blocks as they were read back."""
-        if self.path is not None:
-            return self.path
-        return emitted.core.cutting_path(self.first_line, self.last_line)
+        return emitted.core.cutting_path(self.first_line, self.last_line) if self.path is None else self.path
 
 
 @dataclass(frozen=True)
@@ -238,3 +247,353 @@ class ProgramFigures:
         """Time of all cuts, until the set-points rest."""
         cuts = self.all_cuts
         return Pair(math.fsum(cut.time_s.original for cut in cuts), math.fsum(cut.time_s.emitted for cut in cuts))
+
+
+Target = Literal["command", "response"]
+
+ALL_MODES = "all"
+_OVERRIDES_PERCENT = (50.0, 60.0, 70.0, 80.0, 90.0, 110.0, 120.0)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One operating condition of the emitted program."""
+
+    name: str  # shown name, unique
+    block_end: str | None  # "ceil" or "carry"; None if look-ahead replans the blocks
+    counts: bool  # it is within the range of the machine file
+    override: float = 1.0  # feed override, 1 = 100 %
+    # the shifted mode ("x.1": first of the X axis, as in the machine file), "all", or None
+    mode: str | None = None
+    shift: float = 0.0  # in units of its uncertainty, -1 or +1
+    look_ahead: bool = False  # the controller's look-ahead is left on
+    starved_s: float = 0.0  # time for which the block buffer is empty once; 0: never
+
+    @property
+    def nominal(self) -> bool:
+        """True for the intended operation, with either rule of block timing."""
+        return self.override == 1.0 and self.mode is None and not self.look_ahead and self.starved_s == 0.0
+
+    def needs_contour(self, target: Target) -> bool:
+        """True if the contour must be measured in this case: a shifted mode does not change the command."""
+        return self.mode is None or (self.counts and (self.override != 1.0 or target == "response"))
+
+
+@dataclass(frozen=True)
+class CaseFigures:
+    """One region simulated in one operating condition."""
+
+    residual_mm: FloatArray  # largest |table - command| while the set-points rest, (3,)
+    command: Deviation | None  # deviation of the command; None: not measured
+    response: Deviation | None  # deviation of the table; None: not measured
+    time_s: float  # until the set-points rest
+
+
+@dataclass(frozen=True)
+class RegionLimits:
+    """Limits of a region."""
+
+    residual_um: FloatArray  # limit per axis, (3,)
+    contour_um: float  # limit of the target's deviation
+    target: Target = "command"  # target: the command, or the machine table (response)
+
+
+@dataclass(frozen=True)
+class LimitCheck:
+    """A figure of a case and its limit."""
+
+    figure: str  # its name
+    value_um: float  # its value
+    limit_um: float  # its limit
+    decimals: int = 2  # significant decimals
+
+    @property
+    def share(self) -> float:
+        """Ratio to the limit; infinite if the limit is 0."""
+        if self.limit_um > 0.0:
+            return self.value_um / self.limit_um
+        return math.inf if self.value_um > 0.0 else 0.0
+
+    @property
+    def is_missed(self) -> bool:
+        """True if the figure exceeds its limit."""
+        return self.value_um > self.limit_um * (1.0 + 1e-9)
+
+    def __str__(self) -> str:
+        for decimals in range(self.decimals, self.decimals + 4):  # as many as show which one is larger
+            value, limit = (f"{each:.{decimals}f}" for each in (self.value_um, self.limit_um))
+            if value != limit:
+                break
+        return f"{self.figure} {value} um, limit {limit} um"
+
+
+def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]]]]:
+    """Key of every mode with an uncertainty, with the names and shifts of its cases."""
+    found = []
+    for axis, table in zip("XYZ", machine.axes.as_tuple(), strict=True):
+        for number, mode in enumerate(table.modes, start=1):
+            name, damping = f"{axis} {mode.frequency_hz:.4g} Hz", mode.damping_uncertainty_percent
+            less = f", damping {-damping:.3g} %" if damping else ""
+            if percent := mode.frequency_uncertainty_percent:
+                variants = [(f"{name} {shift * percent:+.3g} %{less}", shift) for shift in (-1.0, 1.0)]
+            elif damping:
+                variants = [(f"{name}{less}", -1.0)]
+            else:
+                continue
+            found.append((f"{axis.lower()}.{number}", variants))
+    return found
+
+
+def stated_cases(machine: Machine) -> list[Case]:
+    """Operating conditions of the verdict for a machine; the nominal ones come first (ceil, carry).
+
+    Overrides from 50 to 120 % and at the ends of the range (none if the override is locked); each mode, and all of
+    them, shifted up and down by their uncertainty with the lowest damping; both together at the corners of
+    the range; the look-ahead mode left on (for a controller that has one); and a block buffer that runs empty once. A
+    control whose planner cannot be switched off uses it in all of them, and stops in time if its buffer runs empty.
+    """
+    band, kind = machine.verdict, machine.controller.kind
+    low, high = band.override_percent
+    own = machine.controller.block_end if kind == "fanuc" else None
+    cases = [Case(f"nominal, planner of {PLANNER_NAMES[kind]}", None, counts=True)]
+    if own is not None:
+        counting = ("ceil", "carry") if band.block_end == "both" else (own,)
+        cases = [Case(f"nominal, {rule}", rule, counts=rule in counting) for rule in ("ceil", "carry")]
+
+    def at_override(percent: float) -> Case:
+        return Case(f"override {percent:g} %", own, low <= percent <= high, override=percent / 100.0)
+
+    turns = machine.emission.override != "lock"  # a disabled override has no effect
+    ends = sorted({low, high} - {100.0}) if turns else []
+    cases += [at_override(percent) for percent in sorted({*_OVERRIDES_PERCENT, *ends} - {100.0}) if turns]
+    modes = _uncertain_modes(machine)
+    for mode, variants in modes:
+        cases += [Case(words, own, band.mode_uncertainty, mode=mode, shift=shift) for words, shift in variants]
+    if modes:
+        together = [(-1.0, "all modes low")]
+        if any(len(variants) > 1 for _, variants in modes):
+            together.append((1.0, "all modes high"))
+        cases += [Case(words, own, band.mode_uncertainty, mode=ALL_MODES, shift=shift) for shift, words in together]
+        cases += [
+            replace(corner, name=f"{corner.name}, {words}", counts=band.mode_uncertainty, mode=ALL_MODES, shift=shift)
+            for corner in map(at_override, ends)
+            for shift, words in together
+        ]
+    if own is None:
+        return cases
+    if machine.controller.motion == "look_ahead" or band.look_ahead:
+        cases.append(Case("look-ahead on", None, band.look_ahead, look_ahead=True))
+    cases.append(Case(f"underrun {band.starved_s * 1e3:g} ms", own, band.starved_block, starved_s=band.starved_s))
+    return cases
+
+
+def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[LimitCheck]:
+    """Check the figures of a region in one case against their limits: residuals, and the target's deviation."""
+    check = [
+        LimitCheck(f"residual vibration {axis}", float(now), float(limit))
+        for axis, now, limit in zip("XYZ", figures.residual_mm * 1e3, limits.residual_um, strict=True)
+    ]
+    deviation = figures.command if limits.target == "command" else figures.response
+    if deviation is not None:
+        check.append(LimitCheck(CONTOURS[limits.target], deviation.largest_mm * 1e3, limits.contour_um, decimals=1))
+    return check
+
+
+def region_misses(
+    cases: Sequence[Case], figures: Sequence[CaseFigures | None], limits: RegionLimits
+) -> list[tuple[str, LimitCheck]]:
+    """Figures of a cut beyond their limits in conditions that count, each in its worst condition, as text."""
+    worst: dict[str, tuple[LimitCheck, Case]] = {}
+    for case, simulated in zip(cases, figures, strict=True):
+        for check in judge_region(simulated, limits) if case.counts and simulated is not None else ():
+            if check.figure not in worst or check.value_um > worst[check.figure][0].value_um:
+                worst[check.figure] = (check, case)
+    return [
+        (str(check) if case.nominal else f"{check} ({case.name})", check)
+        for check, case in worst.values()
+        if check.is_missed
+    ]
+
+
+_NUMBER = re.compile(r"(\d) (%|ms\b|s\b|mm\b|Hz\b|µm\b)")
+_SWINGS_UM = 0.005  # an axis below this everywhere has no column
+
+
+def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table:
+    """Table of operating conditions: figures, whether it counts, and which one decides."""
+    columns = (
+        Column("condition", value=lambda case: unbroken(case.name), text=True),
+        *(
+            Column(axis.upper(), value=f"residual_um.{axis}", digits=2)
+            for axis in "xyz"
+            if any(case.residual_um[axis] >= _SWINGS_UM for case in cases)
+        ),
+        Column("command", value=lambda case: _known(case.contour_error_um.command, 1)),
+        Column("table", value=lambda case: _known(case.contour_error_um.response, 1)),
+        Column("s", value=lambda case: _known(case.time_s, 2)),
+        Column("of limit", value=lambda case: _share(case.share_of_limit)),
+        Column("verdict", value=lambda case: _verdict(case, case is worst), left=True),
+    )
+    shown = sum(not case.counts for case in cases)
+    brackets = "; those in brackets are only shown" if shown else ""
+    return Table(
+        "operating conditions: residual X Y Z, contour error of command and machine table, µm",
+        columns,
+        cases,
+        caption=f"{len(cases) - shown} of {len(cases)} operating conditions count{brackets} ([verdict]); "
+        "ceil, carry: block timing (controller.block_end)",
+        row_style=lambda case: _style(case, case is worst),
+    )
+
+
+def unbroken(text: str) -> str:
+    """Keep a number and its unit on one line."""
+    return _NUMBER.sub(rf"\1{NO_BREAK}\2", text)
+
+
+def _known(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _share(share: float | None) -> str:
+    return "no limit but 0" if share is None else f"{share * 100:.0f} %"
+
+
+def _verdict(case: CaseVerdict, worst: bool) -> str:
+    word = "within" if case.within else "OUT"
+    return (word if case.counts else f"({word.lower()})") + (" <- worst" if worst else "")
+
+
+def _style(case: CaseVerdict, worst: bool) -> str:
+    colour = "" if case.within else "red"
+    return "dim" if not case.counts else f"bold {colour}".strip() if worst else colour
+
+
+# A simulated operating condition: its figures; time by which all blocks are longer than at 100 %, before
+# filters, if only the end was simulated, else 0.
+SimulatedCase = tuple[_core.SimulationFigures, float]
+
+
+@dataclass(frozen=True)
+class CaseSimulation:
+    """Simulates one emitted region; every method is a separate task."""
+
+    blocks: _core.Path  # emitted blocks
+    path: _core.Path  # programmed path
+    model: MachineModel  # the machine for the core
+    cases: Sequence[Case]  # operating conditions
+    target: Target  # target of the contour tolerance
+    offset: Offset  # from positions of the region to machine positions
+    tracker: _core.ContourTracker  # of the programmed path
+    increment_mm: float  # least increment of the program
+
+    def nominal(self, rule: _core.BlockEnd) -> _core.SimulationFigures:
+        """Simulate the blocks at 100 %; with the control's own block timing also an underrun at the worst position."""
+        own = rule == self.model.own_rule
+        return self.model.simulate_emitted(
+            self.blocks, self.path, rule, offset=self.offset,
+            other_overrides=[case.override for case in self.cases if self._beside(case)] if own else (),
+            starved_blocks=_core.fastest_block_ends(self.blocks) if own else (),
+            memory_s=self.model.vibration_memory_s, tracker=self.tracker, increment_mm=self.increment_mm,
+        )  # fmt: skip
+
+    def planned(self) -> _core.SimulationFigures | None:
+        """Simulate with the look-ahead left on; None if no case needs it."""
+        if not any(case.look_ahead for case in self.cases):
+            return None
+        return self.model.simulate_planned(self.blocks, self.path, offset=self.offset, tracker=self.tracker)
+
+    def _beside(self, case: Case) -> bool:
+        """True if the contour of a case is computed with the nominal case."""
+        return case.override != 1.0 and case.mode is None and self.model.bounds_deviations
+
+    def _whole(self, case: Case) -> bool:
+        if self.model.always_plans and case.override != 1.0:
+            return True
+        # With feed drives each would take a quarter of a conversion: cases that are only shown have the residual only.
+        spared = case.override != 1.0 and not case.counts and self.model.machine.verdict.plant != "modal"
+        return case.needs_contour(self.target) and not spared and not self._beside(case)
+
+    def groups(self) -> list[list[Case]]:
+        """Groups of overrides and shifted modes: one task for each full simulation, one for all short ones."""
+        others = [case for case in self.cases if case.override != 1.0 or case.mode is not None]
+        whole = [[case] for case in others if self._whole(case)]
+        return [*whole, [case for case in others if not self._whole(case)]]
+
+    def others(self, cases: Sequence[Case]) -> dict[str, SimulatedCase]:
+        """Simulate a group of cases; results by name."""
+        simulated = {}
+        for case in cases:
+            whole = self._whole(case)
+            run = self.model.simulate_emitted(
+                self.blocks, self.path, override=case.override, shift=case.shift,
+                only=None if case.mode == ALL_MODES else case.mode, offset=self.offset, contour=whole,
+                command_contour=case.override != 1.0,
+                last_seconds=0.0 if whole else self.model.vibration_memory_s, tracker=self.tracker,
+            )  # fmt: skip
+            cut_s = 0.0
+            if not whole and case.override != 1.0:
+                # The time at 100 % is subtracted: computed here, where no other task waits for it.
+                cut_s = self._cut_s(case.override) - self._own_cut_s
+            simulated[case.name] = run, cut_s
+        return simulated
+
+    def _cut_s(self, override: float) -> float:
+        return _core.simulated_duration_s(self.blocks, self.model.period_s, self.model.own_rule, override)
+
+    @cached_property
+    def _own_cut_s(self) -> float:
+        return self._cut_s(1.0)
+
+    def figures(
+        self,
+        nominal: Sequence[_core.SimulationFigures],
+        planned: _core.SimulationFigures | None,
+        others: Mapping[str, SimulatedCase],
+    ) -> tuple[CaseFigures, ...]:
+        """Combine the results of the tasks, one entry per case."""
+        by_rule = {rule.name: run for rule, run in zip(self.model.block_rules, nominal, strict=True)}
+        own = by_rule[self.model.own_rule.name]
+        figures = []
+        for case in self.cases:
+            if case.name in others:
+                figures.append(self._other(case, others[case.name], own))
+            elif case.starved_s > 0.0:
+                figures.append(_starved(own, case.starved_s if own.starved else 0.0))
+            else:
+                run = planned if case.look_ahead and planned is not None else by_rule.get(case.block_end or "", own)
+                figures.append(case_figures(run))
+        return tuple(figures)
+
+    def _other(self, case: Case, simulated: SimulatedCase, own: _core.SimulationFigures) -> CaseFigures:
+        (run, cut_s), whole = simulated, self._whole(case)
+        if case.override == 1.0:  # the set-points are those of the nominal case, only the response differs
+            response = Deviation.of([run.response]) if whole else None
+            return CaseFigures(run.residual_mm, Deviation.of([own.command]), response, own.duration_s)
+        if whole:
+            return case_figures(run)
+        time_s = own.duration_s + cut_s
+        if not self._beside(case):
+            return CaseFigures(run.residual_mm, None, None, time_s)
+        largest = next(each for each in own.other_overrides if each.override_ratio == case.override)
+        command, response = (Deviation(mm, math.nan, math.nan) for mm in (largest.command_mm, largest.response_mm))
+        return CaseFigures(run.residual_mm, command, response, time_s)
+
+
+def case_figures(run: _core.SimulationFigures, *, contour: bool = True, response: bool = True) -> CaseFigures:
+    """Figures of a simulation."""
+    if not contour:
+        return CaseFigures(run.residual_mm, None, None, run.duration_s)
+    followed = Deviation.of([run.response]) if response else None
+    return CaseFigures(run.residual_mm, Deviation.of([run.command]), followed, run.duration_s)
+
+
+def _starved(run: _core.SimulationFigures, waited_s: float) -> CaseFigures:
+    """Worst figures over all positions of the underrun; the residual is usually that without an underrun."""
+    runs: list[_core.SimulationFigures | _core.StarvedFigures] = [run, *run.starved]
+    return CaseFigures(
+        np.max([each.residual_mm for each in runs], axis=0),
+        Deviation.of(each.command for each in runs),
+        Deviation.of(each.response for each in runs),
+        run.duration_s + waited_s,
+    )

@@ -18,27 +18,25 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm, written_increment_mm
 from shapegcode.program.computer import cores
 from shapegcode.results.outcome import ContourError, Deviation, Pair, Tracks, Xyz, largest_xyz_um
-from shapegcode.verdict.cases import (
+from shapegcode.verdict.figures import (
     ALL_MODES,
     Case,
     CaseFigures,
     CaseSimulation,
-    RegionLimits,
-    SimulatedCase,
-    Target,
-    case_figures,
-    judge_region,
-    region_misses,
-    stated_cases,
-)
-from shapegcode.verdict.figures import (
     CaseVerdict,
     FeedExcess,
     FrequencyResidual,
     OverrideResidual,
     Placed,
     ProgramFigures,
+    RegionLimits,
     RegionVerdict,
+    SimulatedCase,
+    Target,
+    case_figures,
+    judge_region,
+    region_misses,
+    stated_cases,
     worst_counted,
 )
 
