@@ -32,7 +32,8 @@ from shapegcode.verdict.cases import case_table
 from shapegcode.verdict.figures import AppliedLimits, BlockCount, Placed, ProgramFigures, UsedShaper
 
 if TYPE_CHECKING:
-    from shapegcode.results.page.model import Light, Page, Section
+    from shapegcode.results.page.model import Light, Section
+    from shapegcode.results.page.scene import Scene
 
 _VIBRATIONS = {"residual_vibration_um": "residual vibration", "peak_vibration_um": "peak vibration"}
 _LEAST_SHOWN_UM = 0.05
@@ -421,26 +422,12 @@ class Conversion(ProgramFigures, Result):
         found: tuple[Light, str] = self._beside("page").light_of(self)
         return found
 
-    def page(self, **options: Any) -> Page:
-        """The conversion as a page, see `Result.page`, with the verdict in the emitted program.
-
-        Args:
-            options: of `Result.page`.
-
-        Returns:
-            The page, as data.
-
-        Raises:
-            MachineError, NumericError: a program cannot be simulated.
-        """
-        page = super().page(**options)
-        if page.scene is None or self.from_json:
-            return page
-        # It was read back before the verdict was written.
-        *others, last = page.scene.variants
+    def _scene_with_more(self, scene: Scene) -> Scene:
+        """The verdict in the emitted program, which was read back before it was written."""
+        *others, last = scene.variants
         # In FANUC's words, to whose lines the simulated motion refers.
         with_verdict = replace(last, text=self.emitted.text.decode("utf-8", "replace"))
-        return replace(page, scene=replace(page.scene, variants=(*others, with_verdict)))
+        return replace(scene, variants=(*others, with_verdict))
 
     def page_sections(self, provenance: Provenance | None = None) -> tuple[Section, ...]:
         """Before and after, sensitivity to unverified parameters, time components, and the operator's run sheet.

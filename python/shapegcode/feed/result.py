@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import astuple, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.results.json import hidden
 from shapegcode.results.outcome import Pair, Plot
-from shapegcode.results.page.model import Figure, Page
+from shapegcode.results.page.model import Figure
 from shapegcode.results.page.scene import Scene
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
@@ -205,23 +205,10 @@ class FeedSchedule(Result):
         """Form error of the walls along the cutting path; None without walls."""
         return None if self.traces is None else wall_maps(self.survey, self.loads, self.traces)
 
-    def page(self, **options: Any) -> Page:
-        """The schedule as a page, see `Result.page`; its motion includes the cutting force.
-
-        Args:
-            options: options of `Result.page`.
-
-        Returns:
-            The page, as data.
-
-        Raises:
-            MachineError, NumericError: a program cannot be simulated.
-        """
-        page = super().page(**options)
-        if page.scene is None or self.from_json:
-            return page
-        scene: Scene = self._beside("plots").with_forces(page.scene, self)
-        return replace(page, scene=scene)
+    def _scene_with_more(self, scene: Scene) -> Scene:
+        """The cutting force along the motion."""
+        found: Scene = self._beside("plots").with_forces(scene, self)
+        return found
 
     def key_figures(self) -> tuple[Figure, ...]:
         """Time and largest force, before and after."""

@@ -121,15 +121,20 @@ class Result(Outcome):
         from shapegcode.results.page.default import page_of
 
         simulated = self.simulated if motion else None
+        scene = None if simulated is None else simulated.scene(on_progress)
         return page_of(
             self,
             title=self.page_title,
             light=self.light,
             sections=self.page_sections(provenance),
-            scene=None if simulated is None else simulated.scene(on_progress),
+            scene=scene if scene is None or self.from_json else self._scene_with_more(scene),
             provenance=provenance,
             problems=problems,
         )
+
+    def _scene_with_more(self, scene: Scene) -> Scene:
+        """The motion on its page, with what a class adds to it."""
+        return scene
 
     def report(self, path: str | Path, script: Script = "inline") -> list[str]:
         """Write the page of the result: one HTML file, readable offline.

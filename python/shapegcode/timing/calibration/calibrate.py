@@ -18,7 +18,7 @@ from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.timing.calibration import motion as fitting, observed as logs, open_times, result
 from shapegcode.timing.calibration.runs_file import RunsFile, load_runs
-from shapegcode.timing.interval import time_interval
+from shapegcode.timing.cycle_time import time_interval
 
 _Hold = tuple[float, float, str]  # begin and length in s, and reason
 
