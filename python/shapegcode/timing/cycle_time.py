@@ -98,7 +98,12 @@ def cycle_time(
         log_next=_log_next(interval, others, machine, (feed_override, rapid_override)),
         full_interpolation_s=_core.interpolate_program(program.core, model).total_s if full else None,
         tools=tuple(
-            ToolTime(**_parts(each), duration_s=float(each.total_s), tool=_tool(each.tool), first_line=each.first_line)
+            ToolTime(
+                **_parts(each),
+                duration_s=float(each.total_s),
+                tool=each.tool if each.tool >= 0 else None,
+                first_line=each.first_line,
+            )
             for each in timed.tools
         ),
         regions=tuple(_regions(timed.regions, program, feed_override)),
@@ -137,10 +142,6 @@ def _parts(timed: _core.CycleTime | _core.ToolTime) -> dict[str, float]:
     return {name: float(getattr(timed, name)) for name in PARTS}
 
 
-def _tool(number: int) -> int | None:
-    return None if number < 0 else number
-
-
 def _regions(rows: npt.NDArray[Any], program: Program, feed_override: float) -> Iterator[RegionTime]:
     programmed: dict[tuple[int, int], deque[float]] = defaultdict(deque)
     for region in program.regions:
@@ -148,8 +149,8 @@ def _regions(rows: npt.NDArray[Any], program: Program, feed_override: float) -> 
     names = ("start_s", "duration_s", "cutting_s", "acceleration_s", "in_position_s", "length_mm")
     for row in rows:
         times = {name: float(row[name]) for name in names}
-        lines = int(row["first_line"]), int(row["last_line"])
-        yield RegionTime(lines, _tool(int(row["tool"])), **times, programmed_s=programmed[lines].popleft())
+        lines, tool = (int(row["first_line"]), int(row["last_line"])), int(row["tool"])
+        yield RegionTime(lines, tool if tool >= 0 else None, **times, programmed_s=programmed[lines].popleft())
 
 
 def _blocks(rows: npt.NDArray[Any], program: Program) -> Iterator[BlockTime]:
