@@ -15,7 +15,7 @@ import pytest
 
 import shapegcode as sg
 from command import COMMAND, run
-from shapegcode.batching import runs as batching
+from shapegcode.batching import batch as batching
 from shapegcode.batching.plan import called_files, find_programs
 from shapegcode.results.json import plain
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from command import COMMAND, run
-from shapegcode.batching import runs as batching
+from shapegcode.batching import batch as batching
 from test_batch import HEAD, TAIL, contents, parent_of
 
 TIMES = 20

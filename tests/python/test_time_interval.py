@@ -16,7 +16,7 @@ from shapegcode.cli import main
 from shapegcode.timing.calibration.calibrate import _scatters
 from shapegcode.timing.calibration.motion import FunctionFit
 from shapegcode.timing.calibration.open_times import function_rows, kind_weights, run_scatter
-from shapegcode.timing.interval import TimeInterval, time_interval
+from shapegcode.timing.cycle_time import TimeInterval, time_interval
 
 NONE = {"cuts_percent": 0.0, "between_cuts_s": 0.0, "runs_percent": 0.0}
 # Two tool changes, three M08; cuts of T1 and T2.

@@ -32,7 +32,7 @@ def characterize(
     machine: Machine,
     *,
     units: str | None = None,
-    on_progress: Callable[[float], None] | None = None,
+    on_progress: Callable[[float], None] = lambda _done: None,
 ) -> Characterisation:
     """Fit controller parameters to results of the programs of `write_characterization_tests`.
 
@@ -59,8 +59,7 @@ def characterize(
     factors, logs = parse_units(units) if units is not None else None, {}
     for done, (name, path) in enumerate(sheet.logs.items(), start=1):
         logs[name] = read_log(path, factors)
-        if on_progress is not None:
-            on_progress(0.5 * done / len(sheet.logs))
+        on_progress(0.5 * done / len(sheet.logs))
     found = fit_logs(sheet.tests, logs) if logs else []
     contradictions: list[str] = []
     if sheet.times_s:

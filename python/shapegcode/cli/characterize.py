@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 
+_OF_ACTIONS = {"axes": ["servo"], "drive": ["servo"], "plots": ["servo", "runs"], "look-ahead": ["runs"]}
+
+
 def _characterize(args: argparse.Namespace) -> int:
     _check_options(args)
     machine = load_machine(args, writes_program=args.write is not None)
@@ -33,13 +36,10 @@ def _characterize(args: argparse.Namespace) -> int:
 
 def _check_options(args: argparse.Namespace) -> None:
     """Refuse options that do not belong to the selected action."""
-    for option, value in (("--axes", args.axes), ("--drive", args.drive or None)):
-        if value is not None and args.servo is None:
-            raise ArgumentError(f"{option}: only with --servo")
-    if args.plots is not None and args.servo is None and args.runs is None:
-        raise ArgumentError("--plots: only with --servo and --runs")
-    if args.look_ahead is not None and args.runs is None:
-        raise ArgumentError("--look-ahead: only with --runs")
+    for option, actions in _OF_ACTIONS.items():
+        value = getattr(args, option.replace("-", "_"))
+        if value not in (None, False) and all(getattr(args, action) is None for action in actions):
+            raise ArgumentError(f"--{option}: only with {' and '.join(f'--{action}' for action in actions)}")
     if args.runs is not None and args.units is not None:
         raise ArgumentError("--units: only with --fit and --servo; for runs set feed_unit in the file of runs")
 
@@ -130,29 +130,22 @@ CHARACTERIZE = Interface(
 
 def _write_cut(args: argparse.Namespace) -> int:
     from shapegcode.cutting.tool import Tool
-    from shapegcode.testcut.design import (
-        CornerShape,
-        CutConditions,
-        corner_cut,
-        interval_cut,
-        taper_cut,
-        write_test_cut,
-    )
+    from shapegcode.testcut import design as cuts
 
     feed = args.feeds[0] if args.action == "taper" else args.feed
-    conditions = CutConditions(
+    conditions = cuts.CutConditions(
         load_machine(args, writes_program=True), Tool.load(args.tool), feed, args.axial_depth, args.spindle, args.up
     )
     if args.action == "taper":
-        design = taper_cut(conditions, args.feeds if len(args.feeds) > 1 else None, args.radial_depth, args.length)
+        design = cuts.taper_cut(conditions, args.feeds if len(args.feeds) > 1 else None, args.radial_depth, args.length)
     else:
-        shape = CornerShape(args.allowance, args.rough_radius, args.finish_radius)
+        shape = cuts.CornerShape(args.allowance, args.rough_radius, args.finish_radius)
         if args.action == "corner":
-            design = corner_cut(conditions, shape, args.interval)
+            design = cuts.corner_cut(conditions, shape, args.interval)
         else:
-            design = interval_cut(conditions, shape, args.intervals, args.feeds)
+            design = cuts.interval_cut(conditions, shape, args.intervals, args.feeds)
     runner.check_files(args, also_written=[Path(args.output).with_suffix(".json")])
-    design = write_test_cut(design, args.output, args.program)
+    design = cuts.write_test_cut(design, args.output, args.program)
     return runner.finish(design, args, wrote=design.files)
 
 

@@ -52,7 +52,8 @@ def _convert(args: argparse.Namespace) -> int:
     if hasattr(args, "several") and machine.emission.dialect != "fanuc":
         raise ArgumentError(f"--program all writes FANUC's words alone (emission.dialect = {machine.emission.dialect})")
     runner.check_files(args, also_written=[failed])
-    _give_memory_back()
+    if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
+        libc.mallopt(_MMAP_THRESHOLD, _LARGE_BYTES)  # glibc returns large blocks of memory to the system at once
     with runner.progress(f"converting {args.input}", args) as bar:
         with _loading("shapegcode.conversion.convert"):
             program = read_for_conversion(args.input, machine, program_number=args.program)
@@ -98,12 +99,6 @@ def _loading(module: str) -> Iterator[None]:
         yield
     finally:
         thread.join()
-
-
-def _give_memory_back() -> None:
-    """Have glibc return large blocks of memory to the system at once."""
-    if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
-        libc.mallopt(_MMAP_THRESHOLD, _LARGE_BYTES)
 
 
 def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:

@@ -168,10 +168,10 @@ def write_new(args: argparse.Namespace, text: str) -> None:
 
 
 def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
-    """Refuse to write a file that the same run also reads or writes."""
-    others = list(others)
-    for target in targets:
-        for other in others:
+    """Refuse to write a file that the same run also reads, or writes twice."""
+    targets, others = list(targets), list(others)
+    for rank, target in enumerate(targets, start=1):
+        for other in [*others, *targets[rank:]]:
             same = target.exists() and other.exists() and target.samefile(other)
             if same or target.absolute() == other.absolute():
                 raise ArgumentError(

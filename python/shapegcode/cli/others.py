@@ -101,8 +101,7 @@ def _report(args: argparse.Namespace) -> int:
     if args.output == "-":
         raise ArgumentError("-o -: a page cannot go to standard output, name a file")
     targets = [_target(source, report) if args.output is None else Path(args.output) for source, report in jobs]
-    for rank, target in enumerate(targets):
-        refuse_same_file([target], [*(source for source, _ in jobs), *targets[rank + 1 :]])
+    refuse_same_file(targets, [source for source, _ in jobs])
     written = []
     for (source, report), target in zip(jobs, targets, strict=True):
         with runner.progress(f"writing {target}", args) as bar:

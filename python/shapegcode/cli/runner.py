@@ -120,8 +120,6 @@ def check_files(
     targets = [Path(value) for value in (*given.values(), *also_written) if value != "-"]
     read = [Path(name) for _, name in given_files(args)]
     refuse_same_file(targets, [*read, *map(Path, also_read)])
-    for rank, target in enumerate(targets):
-        refuse_same_file([target], targets[rank + 1 :])
 
 
 def standard_output(args: argparse.Namespace) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -341,18 +341,15 @@ def plan_curve(
     return CutCurve(tuple(um for um, _ in ordered), tuple(time_s for _, time_s in ordered))
 
 
+@dataclass
 class CutCurves:
     """The curve of each cut of a conversion on one grid, planned on first use."""
 
-    def __init__(
-        self,
-        writer: TextWriter,
-        program: Program,
-        machine: Machine,
-        originals: Sequence[Future[_core.SimulationFigures]],
-    ) -> None:
-        self._writer, self._program, self._machine, self._originals = writer, program, machine, originals
-        self._known: dict[int, CutCurve] = {}
+    _writer: TextWriter
+    _program: Program
+    _machine: Machine
+    _originals: Sequence[Future[_core.SimulationFigures]]
+    _known: dict[int, CutCurve] = field(default_factory=dict)
 
     def use(self, writer: TextWriter) -> None:
         """Plan on another grid from now on."""

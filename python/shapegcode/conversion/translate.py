@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget
-from shapegcode.conversion.linear_feed import joints_of, linear_lines
 from shapegcode.conversion.result import Conversion, DialectNotes
+from shapegcode.conversion.write import joints_of, linear_lines
 from shapegcode.errors import RoundTripError
 from shapegcode.io.units import MM_PER_INCH
 from shapegcode.machine import Machine

@@ -345,8 +345,11 @@ def read_back(parts: list[bytes], placed: Sequence[Placed], machine: Machine) ->
     states = emitted.core.probed
     for index, place in enumerate(placed):
         region = place.region
-        _compare_states(states[2 * index], region.entry, place.first_line - 1, region.incremental, tolerance_mm)
-        _compare_states(states[2 * index + 1], region.exit, place.last_line, region.incremental, tolerance_mm)
+        for state, own, line in (
+            (states[2 * index], region.entry, place.first_line - 1),
+            (states[2 * index + 1], region.exit, place.last_line),
+        ):
+            _compare_states(state, own, line, math.inf if region.incremental else tolerance_mm[own.units])
         blocks = place.blocks(emitted)
         _compare_ends(blocks, place, tolerance_mm)
         if blocks.largest_sweep_rad >= _LARGEST_SWEEP_RAD:
@@ -357,24 +360,15 @@ def read_back(parts: list[bytes], placed: Sequence[Placed], machine: Machine) ->
     return emitted
 
 
-def _compare_states(
-    emitted: _core.ModalState,
-    original: _core.ModalState,
-    line: int,
-    incremental: bool,
-    tolerance_mm: Mapping[int, float],
-) -> None:
+def _compare_states(emitted: _core.ModalState, original: _core.ModalState, line: int, limit_mm: float) -> None:
     for field in _STATE_FIELDS:
         was, now = getattr(original, field), getattr(emitted, field)
         if was != now and not (field == "feed" and original.feed_mode == 93):
             raise RoundTripError(f"emitted line {line}: modal {field} is {now}, the original has {was}")
     if original.known != emitted.known:
         raise RoundTripError(f"emitted line {line}: known axes {emitted.known}, the original has {original.known}")
-    if incremental:
-        return
-    limit = tolerance_mm[original.units]
     for axis, known, was, now in zip("XYZ", original.known, original.position_mm, emitted.position_mm, strict=True):
-        if known and abs(was - now) > limit:
+        if known and abs(was - now) > limit_mm:
             raise RoundTripError(f"emitted line {line}: {axis} is at {now:.6f} mm, the original at {was:.6f} mm")
 
 

@@ -123,7 +123,8 @@ class _Allowance:
     def _runs(self, paths: Sequence[_core.Path]) -> Iterator[Points]:
         top = self._keys.z_mm[1] - 1e-9
         for path in paths:
-            points = path.polyline(self._step_rad(path))
+            radius = max((path[index].radius_mm for index in range(len(path))), default=0.0)
+            points = path.polyline(chord_angle_rad(radius + self._reach + self._rough))
             below = np.concatenate([[False], points[:, 2] < top, [False]])
             edges = np.flatnonzero(below[1:] != below[:-1])
             for first, last in zip(edges[::2], edges[1::2], strict=True):
@@ -132,10 +133,6 @@ class _Allowance:
                 plane = plane[np.concatenate([[True], moved])]
                 if len(plane) > 1:
                     yield plane
-
-    def _step_rad(self, path: _core.Path) -> float:
-        radius = max((path[index].radius_mm for index in range(len(path))), default=0.0)
-        return chord_angle_rad(radius + self._reach + self._rough)
 
     def _closed(self, loop: Points) -> tuple[Area, Area]:
         """The part behind the wall of a closed contour, and the removed area in front of it."""

@@ -128,7 +128,11 @@ def _plan_all(
             return None
         options = _writer_options(part.region, machine)
         divisible = _core.divisible_segments(program.core, part.region, options)
-        return plan_region(part, machine, motion, divisible, margin, _feed_unit_mm_per_min(part.region, machine))
+        control = machine.controller
+        feed_unit_mm_per_min = 10.0**-control.feed_decimals_mm
+        if part.region.exit.units == 20:
+            feed_unit_mm_per_min = MM_PER_INCH * 10.0**-control.feed_decimals_inch
+        return plan_region(part, machine, motion, divisible, margin, feed_unit_mm_per_min)
 
     plans: list[FeedPlan | None] = []
     with ThreadPoolExecutor(max_workers=2) as pool:
@@ -151,12 +155,6 @@ def _writer_options(
         modal_feed=modal_feed,
         restore_feed=restore_feed,
     )
-
-
-def _feed_unit_mm_per_min(region: _core.Region, machine: Machine) -> float:
-    if region.exit.units == 20:
-        return MM_PER_INCH * 10.0**-machine.controller.feed_decimals_inch
-    return 10.0**-machine.controller.feed_decimals_mm
 
 
 def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine) -> tuple[bytes, list[int], int]:

@@ -6,8 +6,11 @@ look-ahead; full interpolation checks it.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict, deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +22,7 @@ from shapegcode.model.machine_model import fanuc_model
 from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.program.stamp import OVERRIDE_LOCKED
-from shapegcode.timing.interval import LogNext, TimeInterval, time_interval
-from shapegcode.timing.result import PARTS, BlockTime, CycleTime, RegionTime, ToolTime
+from shapegcode.timing.result import PARTS, BlockTime, CycleTime, LogNext, OpenPart, RegionTime, ToolTime
 
 _KINDS = {kind.value: name for name, kind in _core.BlockKind.__members__.items()}
 _CUTTING, _RAPID = _core.BlockKind.cutting.value, _core.BlockKind.rapid.value
@@ -96,7 +98,12 @@ def cycle_time(
         log_next=_log_next(interval, others, machine, (feed_override, rapid_override)),
         full_interpolation_s=_core.interpolate_program(program.core, model).total_s if full else None,
         tools=tuple(
-            ToolTime(**_parts(each), duration_s=float(each.total_s), tool=_tool(each.tool), first_line=each.first_line)
+            ToolTime(
+                **_parts(each),
+                duration_s=float(each.total_s),
+                tool=each.tool if each.tool >= 0 else None,
+                first_line=each.first_line,
+            )
             for each in timed.tools
         ),
         regions=tuple(_regions(timed.regions, program, feed_override)),
@@ -135,10 +142,6 @@ def _parts(timed: _core.CycleTime | _core.ToolTime) -> dict[str, float]:
     return {name: float(getattr(timed, name)) for name in PARTS}
 
 
-def _tool(number: int) -> int | None:
-    return None if number < 0 else number
-
-
 def _regions(rows: npt.NDArray[Any], program: Program, feed_override: float) -> Iterator[RegionTime]:
     programmed: dict[tuple[int, int], deque[float]] = defaultdict(deque)
     for region in program.regions:
@@ -146,8 +149,8 @@ def _regions(rows: npt.NDArray[Any], program: Program, feed_override: float) -> 
     names = ("start_s", "duration_s", "cutting_s", "acceleration_s", "in_position_s", "length_mm")
     for row in rows:
         times = {name: float(row[name]) for name in names}
-        lines = int(row["first_line"]), int(row["last_line"])
-        yield RegionTime(lines, _tool(int(row["tool"])), **times, programmed_s=programmed[lines].popleft())
+        lines, tool = (int(row["first_line"]), int(row["last_line"])), int(row["tool"])
+        yield RegionTime(lines, tool if tool >= 0 else None, **times, programmed_s=programmed[lines].popleft())
 
 
 def _blocks(rows: npt.NDArray[Any], program: Program) -> Iterator[BlockTime]:
@@ -175,3 +178,101 @@ def _moves(program: Program) -> dict[tuple[int, bool], deque[tuple[float, float]
         note(path[index] for index in range(len(path)))
     note(segment for segment, dwell_s in program.core.other_moves if dwell_s <= 0.0)
     return found
+
+
+# --- the 95 % interval: uncertainty of calibrated parameters, and unexplained scatter ---------------------------------
+
+_DEVIATIONS = 1.96  # standard deviations of a 95 % interval
+_KIND = "kind of look-ahead"
+CUTS, BETWEEN, RUNS = "scatter, cuts of a tool", "scatter between cuts", "repeated runs"
+
+# Contents of a program that determines a parameter, by a word of its name; the first match.
+_TELLS = {
+    _KIND: "a program unlike those logged, with corners of many angles and moves of many lengths",
+    "block is read": "a program with many moves below {move:.2g} mm",
+    "acceleration is built up": "a program with many moves below {move:.2g} mm",
+    "step of Z": "a program of a surface, in which Z changes its speed from move to move",
+    "step of X and Y": "a program with sharp corners at the full feed",
+    "at a corner": "a program with corners of many angles at the full feed",
+    "corners that are stops": "a program with corners of 1° to 90° at the full feed",
+    "in arcs": "a program with small arcs at a high feed",
+    "acceleration of Z": "a program that cuts up and down with Z",
+    "acceleration of X": "a program with many starts and stops of X and Y",
+    "feed is reached": "a program with many starts and stops",
+    "rapid": "a program with many rapids, short and long",
+    "spindle": "a program with several spindle speeds, each with its M03 and M05",
+    "cuts of a tool": "this program itself, or one with the same kind of work",
+}
+
+
+@dataclass(frozen=True)
+class TimeInterval:
+    """The 95 % interval of a program's time."""
+
+    total_s: float
+    mean_move_mm: float  # mean length of its moves in cuts
+    steps: Mapping[str, float]  # change of the time by each undetermined direction, s
+    scatters: Mapping[str, float]  # standard deviation of scatter that no parameter explains, s
+
+    @property
+    def half_width_s(self) -> float:
+        """Half of the interval, s."""
+        return _half(self.steps.values(), self.scatters.values())
+
+    def parts(self) -> tuple[OpenPart, ...]:
+        """Its components, the largest first."""
+        found: dict[str, float] = defaultdict(float)
+        for name, value in (*self.steps.items(), *self.scatters.items()):
+            found[_KIND if name.startswith(_KIND) else name] += value**2
+        whole = sum(found.values()) or 1.0
+        parts = [OpenPart(name, _DEVIATIONS * math.sqrt(each), each / whole) for name, each in found.items() if each]
+        return tuple(sorted(parts, key=lambda part: -part.share))
+
+    def narrowed_by(self) -> str:
+        """What a program must contain so that its log narrows the interval; no log narrows the scatter between runs."""
+        name = next((part.name for part in self.parts() if part.name not in (BETWEEN, RUNS)), CUTS)
+        text = next((text for word, text in _TELLS.items() if word in name), f"a program in which {name} occurs alone")
+        return text.format(move=self.mean_move_mm)
+
+    def after_logging(self, other: TimeInterval) -> float:
+        """Half-width, s, once another program's time is known up to its scatter (least squares)."""
+        common = sum(value * other.steps.get(name, 0.0) for name, value in self.steps.items())
+        known = sum(value**2 for value in (*other.steps.values(), *other.scatters.values()))
+        left = sum(value**2 for value in self.steps.values()) - (common**2 / known if known > 0.0 else 0.0)
+        return _half((math.sqrt(max(left, 0.0)),), self.scatters.values())
+
+
+def _half(*values: Iterable[float]) -> float:
+    return _DEVIATIONS * math.sqrt(sum(value**2 for each in values for value in each))
+
+
+def time_interval(
+    program: Program, machine: Machine, feed_override: float, rapid_override: float
+) -> TimeInterval | None:
+    """Interval of a program's time; None: the machine file holds no calibration scatter."""
+    times = machine.times
+    if times.scatter is None:
+        return None
+
+    def timed(of: Machine) -> _core.CycleTime:
+        model = fanuc_model(of, feed_override=feed_override, rapid_override=rapid_override)
+        return _core.time_program(program.core, model, False)
+
+    best = timed(machine)
+    steps: dict[str, float] = {}
+    for row in times.open:
+        change = timed(machine.with_values(row.by_key())).total_s - best.total_s
+        steps[row.name] = math.hypot(steps.get(row.name, 0.0), change * math.sqrt(row.weight))
+        steps[row.name] *= math.copysign(1.0, change)
+    cuts: dict[int, float] = defaultdict(float)
+    for region in best.regions:
+        cuts[int(region["tool"])] += float(region["duration_s"])
+    move = float(best.regions["length_mm"].sum()) / max(program.core.block_count, 1)
+    gaps = [0, *sorted({line for kind, _, line in program.core.steps if kind == _core.StepKind.function})]
+    sections = sum(after - before > 2 for before, after in pairwise([*gaps, program.core.line_count + 1]))
+    scatters = {
+        CUTS: times.scatter.cuts_percent / 100.0 * math.hypot(*cuts.values()),
+        BETWEEN: times.scatter.between_cuts_s * math.sqrt(sections),
+        RUNS: times.scatter.runs_percent / 100.0 * best.total_s,
+    }
+    return TimeInterval(best.total_s, move, steps, scatters)

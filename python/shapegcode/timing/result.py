@@ -14,7 +14,6 @@ from shapegcode.results.outcome import Plot
 from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table, share_percent
-from shapegcode.timing.interval import LogNext, OpenPart
 
 AGREEMENT_PERCENT = 0.5  # Largest difference at which closed form and full interpolation agree
 
@@ -82,6 +81,23 @@ class BlockTime:
     programmed_feed_mm_per_min: float | None  # programmed F; None except for cutting blocks
     mean_feed_mm_per_min: float  # length over duration
     reached_feed_mm_per_min: float  # highest speed along the path; 0 without motion
+
+
+@dataclass(frozen=True)
+class OpenPart:
+    """Contribution of one source to the interval of a time."""
+
+    name: str  # a parameter, the kind of look-ahead, or a scatter
+    half_width_s: float  # half of the 95 % interval from this source alone, s
+    share: float  # ratio of the variance, 0 to 1
+
+
+@dataclass(frozen=True)
+class LogNext:
+    """A program that could be logged next for calibration."""
+
+    program: str  # its name
+    half_width_s: float  # half of the 95 % interval that would remain for the timed program, s
 
 
 LABELS = {

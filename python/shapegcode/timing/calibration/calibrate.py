@@ -18,7 +18,7 @@ from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.timing.calibration import motion as fitting, observed as logs, open_times, result
 from shapegcode.timing.calibration.runs_file import RunsFile, load_runs
-from shapegcode.timing.interval import time_interval
+from shapegcode.timing.cycle_time import time_interval
 
 _Hold = tuple[float, float, str]  # begin and length in s, and reason
 
@@ -51,7 +51,7 @@ def calibrate_cycle_time(
     machine: Machine,
     *,
     families: Sequence[str] | None = None,
-    on_progress: Callable[[float], None] | None = None,
+    on_progress: Callable[[float], None] = lambda _done: None,
 ) -> result.CycleTimeCalibration:
     """Calibrate the cycle-time model of a machine from run logs.
 
@@ -118,14 +118,13 @@ def calibrate_cycle_time(
 class _Meter:
     """Progress: the number of fits started, and the steps of the current one."""
 
-    def __init__(self, on_progress: Callable[[float], None] | None, fits: int) -> None:
+    def __init__(self, on_progress: Callable[[float], None], fits: int) -> None:
         self._on_progress, self._fits, self._done, self._steps = on_progress, fits, 0, 0
 
     def step(self) -> None:
         self._steps += 20
-        if self._on_progress is not None:
-            within = min(0.99, self._steps / _CALLS)
-            self._on_progress(0.97 * (self._done + within) / self._fits)
+        within = min(0.99, self._steps / _CALLS)
+        self._on_progress(0.97 * (self._done + within) / self._fits)
 
     def next(self) -> None:
         self._done, self._steps = min(self._done + 1, self._fits - 1), 0

@@ -291,7 +291,7 @@ def fit_motion(
     rapid_mm_per_s: float,
     *,
     thorough: bool = True,
-    on_step: Callable[[], None] | None = None,
+    on_step: Callable[[], None] = lambda: None,
 ) -> MotionFit:
     """Minimise the misfit over the parameters of a family: Nelder-Mead, restarted at its end."""
     from scipy.optimize import minimize
@@ -314,7 +314,7 @@ def fit_motion(
     def cost(point: FloatArray) -> float:
         nonlocal calls
         calls += 1
-        if on_step is not None and calls % 20 == 0:
+        if calls % 20 == 0:
             on_step()
         beyond = float(np.abs(point - np.clip(point, low, high)).sum())
         usual = _PRIOR * float((((point - typical) / reach) ** 2).sum())
@@ -485,15 +485,11 @@ def fit_functions(runs: Sequence[ObservedRun], motion: MotionFit, machine: Machi
     """Fit the times between cuts by least squares, robust against operator actions."""
     spans = [span for run in runs for span in _spans(run)]
     names = _names(runs)
-    kept = (False, True) if any(map(_returns, runs)) else (False,)
+    # Only where a program ends with its first tool the tool in the spindle matters.
+    used = ([tool for tool in run.timed.tools.tolist() if tool >= 0] for run in runs)
+    kept = (False, True) if any(tools and tools[0] == tools[-1] for tools in used) else (False,)
     fits = [_fit(spans, names, motion, machine, each) for each in kept]
     return min(fits, key=lambda fit: fit.scatter_s * (0.98 if not fit.last_tool_in_spindle else 1.0))
-
-
-def _returns(run: ObservedRun) -> bool:
-    """Whether a program ends with its first tool: only then the tool in the spindle matters."""
-    used = [tool for tool in run.timed.tools.tolist() if tool >= 0]
-    return bool(used) and used[0] == used[-1]
 
 
 def _names(runs: Sequence[ObservedRun]) -> list[str]:
