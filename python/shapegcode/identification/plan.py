@@ -1,7 +1,5 @@
 """How to do a tap test, or to record the decay after a rapid stop, on a machining centre: text for the operator."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from dataclasses import dataclass

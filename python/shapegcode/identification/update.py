@@ -1,7 +1,5 @@
 """Writes identified modes of one axis into a machine file; everything else stays byte for byte."""
 
-from __future__ import annotations
-
 import copy
 import math
 import re

@@ -11,7 +11,7 @@ import numpy as np
 
 from shapegcode.errors import RecordError
 from shapegcode.io.data_file import open_file, read_file
-from shapegcode.io.frf_files import is_frf_text, is_mat, read_frf_mat, read_frf_text
+from shapegcode.io.frf_files import is_frf_text, is_mat, is_xml, read_frf_mat, read_frf_text, read_servo_tuning
 from shapegcode.io.record import (
     RESPONSES,
     STATED_RATE_TOLERANCE,
@@ -28,7 +28,6 @@ from shapegcode.io.record import (
     stated_unit,
     volts_of,
 )
-from shapegcode.io.servo_tuning import is_xml, read_servo_tuning
 from shapegcode.io.table import TextTable, is_clock_time
 from shapegcode.io.uff import is_frf_uff, read_frf_uff, read_uff
 from shapegcode.io.units import FloatArray, Label, Measured, Unit, tap_label, unit_of

@@ -8,8 +8,6 @@ header with a time and other items, one row per instant. Each yields the events 
 runs. Item names are in `run_items`.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence

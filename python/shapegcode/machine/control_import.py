@@ -3,8 +3,6 @@
 A base machine supplies what a dump lacks; an INI file is supplemented by defaults. See docs/reference/parameters.md.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Results on machines: import of a parameter dump; values with unit, origin and meaning; two machines compared."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

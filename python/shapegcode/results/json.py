@@ -3,8 +3,6 @@
 Numbers have nine digits except `json_exact`; values below a millionth and minus zero are 0; NaN, infinity are null.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import hashlib
@@ -20,7 +18,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path, PurePath
-from typing import Any, cast
+from typing import Any, Self, cast
 
 import numpy as np
 
@@ -39,7 +37,7 @@ class ProvenanceFile:
     size_bytes: int  # its size
 
     @classmethod
-    def of(cls, role: str, name: str | Path, content: bytes | memoryview | None = None) -> ProvenanceFile:
+    def of(cls, role: str, name: str | Path, content: bytes | memoryview | None = None) -> Self:
         """Make the entry of a file, or of content to be written."""
         if content is not None:
             return cls(role, str(name), hashlib.sha256(content).hexdigest(), len(content))

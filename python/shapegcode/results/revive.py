@@ -3,8 +3,6 @@
 Data that are not in the JSON (samples, programs) are missing: access raises an error that says so.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import importlib

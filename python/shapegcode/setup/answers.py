@@ -9,13 +9,11 @@
 Every question may be left open: without its key the machine file has no value for it.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Strict, field_validator, model_validator
 
@@ -92,7 +90,7 @@ class Answers(TomlTable):
         return answer
 
     @model_validator(mode="after")
-    def _is_likely(self) -> Answers:
+    def _is_likely(self) -> Self:
         for name, (low, high, example) in _LIKELY.items():
             answer = getattr(self, name)
             if answer is not None and not all(low <= value <= high for value in answer.as_tuple()):

@@ -1,7 +1,5 @@
 """Make a short machine file from answers, with their provenance; everything else is a default."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

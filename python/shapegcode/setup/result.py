@@ -1,7 +1,5 @@
 """Result of the setup: the short machine file, and the open questions."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Compares shapers: designs every family, marks the useful designs, and recommends one."""
 
-from __future__ import annotations
-
 import cmath
 import contextlib
 import itertools

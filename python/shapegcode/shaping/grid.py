@@ -1,7 +1,5 @@
 """Block period of a conversion and the shaper on its grid, chosen for a machine."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

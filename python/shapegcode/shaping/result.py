@@ -1,7 +1,5 @@
 """Result of a comparison of shapers: ranking, recommendation and reason; tables, the answer, the next step."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar

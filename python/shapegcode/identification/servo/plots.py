@@ -1,7 +1,5 @@
 """The pictures of a servo log: the control's contour deviation, and the model's residual."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 
