@@ -41,9 +41,6 @@ def refused(done: subprocess.CompletedProcess[str], *parts: str) -> None:
         assert part in lines[0]
 
 
-# ---- programs ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_rejected_program(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -85,8 +82,6 @@ def test_absolute_centres_are_hinted_at() -> None:
     assert caught.value.column > 1
 
 
-# ---- command lines -----------------------------------------------------------------------------------------
-
 REFUSED = [
     ("check no.nc", "no.nc: no such file"),
     ("check good.nc -m vx501", "no built-in machine"),
@@ -125,9 +120,6 @@ def test_what_a_command_cannot_do_is_refused_and_nothing_is_written(folder: Path
     assert (done.returncode, done.stdout) == (2, "")
     assert said in done.stderr.splitlines()[-1]
     assert os.listdir(folder) == ["good.nc"]
-
-
-# ---- files -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -173,9 +165,6 @@ def test_suffix_of_a_failed_output_may_not_hit_the_input(folder: Path) -> None:
     assert (folder / "a.out-of-tolerance").read_text() == GOOD
 
 
-# ---- a disk that is full -----------------------------------------------------------------------------------
-
-
 def test_full_device(folder: Path) -> None:
     refused(run(folder, "convert", "good.nc", "-m", "vx500", "-o", "/dev/full"), "/dev/full", os.strerror(errno.ENOSPC))
     assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
@@ -208,9 +197,6 @@ def test_full_standard_output(folder: Path) -> None:
     assert done.returncode == 2
     assert os.strerror(errno.ENOSPC) in done.stderr
     assert "Traceback" not in done.stderr
-
-
-# ---- machine files and options -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -278,9 +264,6 @@ def test_a_cut_of_months_is_refused(folder: Path) -> None:
     (folder / "slow.nc").write_text(GOOD.replace("X10.F600", "X90000.F1.5"))
     refused(run(folder, "convert", "slow.nc", "-m", "vx500", "-o", "out.nc"), "slow.nc:")
     assert not (folder / "out.nc").exists()
-
-
-# ---- anything at all ---------------------------------------------------------------------------------------
 
 
 def survives(data: bytes, machine: sg.Machine) -> str:

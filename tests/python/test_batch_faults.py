@@ -1,8 +1,5 @@
-"""A batch whose worker or client is killed, or whose disk fills, at random instants: --resume has the same bytes.
-
-Kill -9 is what a power cut or the system's memory killer does: no handler runs. The disk is a real one that is too
-small (a tmpfs); where the system lets nobody mount one, writing fails at random instead.
-"""
+"""A batch whose worker or client is killed (-9), or whose disk fills (a tmpfs, or writes that fail at random where
+nobody may mount one), at random instants: --resume has the same bytes."""
 
 import errno
 import os

@@ -2,6 +2,7 @@
 
 import functools
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,9 +43,6 @@ def part(body: str, head: str = HEAD) -> str:
 @functools.cache
 def sample(name: str) -> Judged:
     return convert(read_sample(name), machine_with({**CALCULATOR, **SAMPLE_KEYS.get(name, {})}))
-
-
-# ---- the sample programs -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -125,8 +123,6 @@ def test_a_cut_whose_end_its_unit_cannot_name_is_left_unchanged_with_its_reason(
     assert "it ends at X 132.00000 mm, 1.26 um off the increments of G20" in outcomes[1].reason
     assert "limit 0.50 um" in outcomes[1].reason
 
-
-# ---- programs made by hand, each for one thing -------------------------------------------------------------
 
 INCH = HEAD.replace("G21", "G20")
 G91_UNKNOWN = "%\nO1\nG21G17G94\nG91G1X10.F600\nY5.\nG2X5.Y5.I5.\nM30\n%\n"
@@ -387,13 +383,7 @@ def test_original_after_interpolation_is_what_the_judge_plays() -> None:
     """The figures of the original, too, are the judge's: blocks at their feed, smoothed on each axis."""
     keys = {"controller.motion": "after_interpolation", "controller.time_constant_s": 0.05}
     judged = convert(part("G1X20.F900\nG3X40.Y20.R20.\nG1Y40.\n"), machine_with(keys))
-    filtered = Judged(
-        judged.conversion,
-        machine_with({**keys, "controller.shaped_time_constant_s": 0.05}),
-        judged.original,
-        judged.emitted,
-        judged.header_lines,
-    )
+    filtered = replace(judged, machine=machine_with({**keys, "controller.shaped_time_constant_s": 0.05}))
     for programmed, _, entry in judged.regions():
         run = figures(filtered, programmed, programmed, "ceil")
         for axis, ours in zip("xyz", run.residual, strict=True):
@@ -425,9 +415,6 @@ def test_conversion_is_the_same_every_time() -> None:
     first, second = (sg.convert(sg.Program.from_text(text, machine), machine) for _ in range(2))
     assert first.text == second.text
     assert first.to_dict() == second.to_dict()
-
-
-# ---- programs nobody thought of ----------------------------------------------------------------------------
 
 
 def check_made_up(text: str) -> None:

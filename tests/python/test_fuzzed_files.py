@@ -1,7 +1,5 @@
-"""Valid files of every kind with something wrong in them: read, or refused in words; no crash, no wait, no gigabytes.
-
-``python tests/python/test_fuzzed_files.py KIND FOLDER SEED COUNT`` reads one kind in this process and says what broke.
-"""
+"""Valid files with something wrong in them: read, or refused in words; no crash, no wait, no gigabytes. One kind here:
+``python tests/python/test_fuzzed_files.py KIND FOLDER SEED COUNT`` says what broke."""
 
 import gzip
 import io

@@ -162,9 +162,6 @@ def test_contour_cost_in_micrometres() -> None:
     assert Design("average", shaper, None, 0.0, 0.0).radial_error_um(speed, radius) == pytest.approx(expected, rel=3e-3)
 
 
-# --- pictures -----------------------------------------------------------------------------------------------
-
-
 def test_pictures_are_complete(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
