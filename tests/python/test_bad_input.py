@@ -329,13 +329,10 @@ def fuzz(seed: int, count: int) -> None:
     assert seen["converted"] > count / 20
 
 
-def test_changed_bytes_never_crash() -> None:
-    fuzz(seed=1, count=50)
-
-
 @pytest.mark.slow
-def test_many_changed_bytes_never_crash() -> None:
-    fuzz(seed=2, count=100)
+@pytest.mark.parametrize(("seed", "count"), [(1, 50), (2, 100)])
+def test_changed_bytes_never_crash(seed: int, count: int) -> None:
+    fuzz(seed, count)
 
 
 @settings(max_examples=200, suppress_health_check=list(HealthCheck))
@@ -364,8 +361,5 @@ def test_words_at_random_never_crash(words: list[tuple[str, str]]) -> None:
     words_survive(words)
 
 
-@pytest.mark.slow
-@settings(max_examples=200, suppress_health_check=list(HealthCheck))
-@given(WORDS)
-def test_many_words_at_random_never_crash(words: list[tuple[str, str]]) -> None:
-    words_survive(words)
+MANY = settings(max_examples=200, suppress_health_check=list(HealthCheck))
+test_many_words_at_random_never_crash = pytest.mark.slow(MANY(given(WORDS)(words_survive)))

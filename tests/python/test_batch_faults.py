@@ -90,7 +90,6 @@ def test_killed_workers(tmp_path: Path, whole: dict[str, bytes]) -> None:
 
 @pytest.mark.slow
 def test_killed_client(tmp_path: Path, whole: dict[str, bytes]) -> None:
-    """Its workers end with it."""
     draw = random.Random(11)
     for _ in range(TIMES):
         client = started()
@@ -120,7 +119,6 @@ def disk() -> Iterator[bool]:
 
 @pytest.mark.slow
 def test_full_disk(tmp_path: Path, whole: dict[str, bytes], disk: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In the middle of a page, of the JSON, of the manifest, of the folder of a run."""
     draw = random.Random(13)
     needed = sum(len(data) for data in whole.values())
     write = batching.write_bytes

@@ -302,7 +302,6 @@ def test_sample_under_all_three(name: str) -> None:
 
 
 def test_comments_travel_on_the_line_too() -> None:
-    """A comment is sent with the block behind it."""
     text = HEAD + "G1X10.F600\n(" + "A" * 100 + ")\nY10.\n" + TAIL
     plain = text.replace("A" * 100, "A")
     loads = [budgeted(t, PERIOD, baud=1e9).conversion.to_dict()["budget"]["before"]["baud"] for t in (plain, text)]

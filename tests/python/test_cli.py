@@ -164,7 +164,6 @@ def test_options_that_stand_for_a_key_of_the_machine(words: str, key: str, value
 
 
 def test_an_option_has_one_name_and_one_unit_on_every_command() -> None:
-    """What the same option takes, as its metavar and type say."""
     found: dict[str, set[tuple[object, object]]] = {}
 
     def look(parser: argparse.ArgumentParser) -> None:

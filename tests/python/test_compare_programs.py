@@ -281,26 +281,10 @@ def test_programs_with_little_in_common_are_aligned() -> None:
     assert result.count("stops").unchanged == 1
 
 
-CALLING = """%
-O0001
-G21 G17 G90 G94 G40 G49 G80
-T1 M06
-G54 S3000 M03
-G00 X0 Y0
-G43 H1 Z2.
-G01 Z-1. F200.
-M98 P100
-G65 P200 A5.
-G00 Z20.
-M30
-O0100
-X10.
-M99
-O0200
-G01 Y#1
-M99
-%
-"""
+CALLING = (
+    "%\nO0001\nG21 G17 G90 G94 G40 G49 G80\nT1 M06\nG54 S3000 M03\nG00 X0 Y0\nG43 H1 Z2.\nG01 Z-1. F200.\nM98 P100\n"
+    "G65 P200 A5.\nG00 Z20.\nM30\nO0100\nX10.\nM99\nO0200\nG01 Y#1\nM99\n%\n"
+)
 
 
 def test_an_expanded_macro_differs_in_calls() -> None:

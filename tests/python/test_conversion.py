@@ -64,7 +64,6 @@ def test_sample_program(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["CONTOUR_R.NC", "TEST_G90.NC"])
 def test_contour_of_whole_sample(name: str) -> None:
-    """Every region's contour error, however long it is."""
     check_figures(sample(name), contour_budget_s=1e9)
 
 
@@ -429,8 +428,5 @@ def test_made_up_program(text: str) -> None:
     check_made_up(text)
 
 
-@pytest.mark.slow
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
-@given(programs())
-def test_many_made_up_programs(text: str) -> None:
-    check_made_up(text)
+MANY = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+test_many_made_up_programs = pytest.mark.slow(MANY(given(programs())(check_made_up)))

@@ -296,17 +296,7 @@ def test_random_programs_read_back(dialect: str, seeds: range, tmp_path: Path) -
 
 # ---- derived by hand, each from the page named -----------------------------------------------------------------------
 
-UNITS = """G21G90
-G00X1.Y-.5Z5.
-G04P600
-G04X1.5
-G01X2.F500
-G09X3.
-G02X5.Y-2.5R2.
-G64
-G03X3.Y-.5I-2.J0.F50.
-M30
-"""
+UNITS = "G21G90\nG00X1.Y-.5Z5.\nG04P600\nG04X1.5\nG01X2.F500\nG09X3.\nG02X5.Y-2.5R2.\nG64\nG03X3.Y-.5I-2.J0.F50.\nM30\n"
 GOLDEN = {
     # G04 P with a point is seconds: https://pastebin.com/prSjxEWB
     "haas": "G21G90/G00X1.Y-.5Z5./G04P0.6/G04P1.5/G01X2.F500./G09X3./G02X5.Y-2.5R2./G64/G03X3.Y-.5I-2.J0.F50./M30",

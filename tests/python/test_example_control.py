@@ -125,7 +125,6 @@ def test_spindle_coolant_and_tool_change_come_in_order(session: Run) -> None:
 
 
 def test_set_points_keep_the_limits(session: Run) -> None:
-    """By differences, whatever the operator did."""
     positions = session.columns("{}_mm")
     for order, limit in ((1, MAX_SPEED), (2, MAX_ACCELERATION), (3, MAX_JERK)):
         found = np.abs(np.diff(positions, order, axis=0)).max() / PERIOD_S**order

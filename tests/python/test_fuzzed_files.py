@@ -292,7 +292,6 @@ def test_every_kind_is_in_the_list() -> None:
 
 
 def test_the_fuzzer_finds_what_it_is_for(tmp_path: Path) -> None:
-    """A reader that fails in each way: its failures are counted."""
     code = f"""
 import sys
 sys.path[:0] = {[str(TESTS / "python"), str(TESTS / "oracles")]!r}

@@ -109,7 +109,6 @@ def test_a_straight_path_gets_a_note(tmp_path: Path) -> None:
 
 
 def test_pictures_go_into_the_callers_axes(tmp_path: Path) -> None:
-    """Several in one figure, each within the place it was given."""
     figure = plot.figure(24, 16)
     places = figure.subplots(2, 2)
     long = View([trace.part(0.2, 0.5, 0.3) for trace in traces()], "the worst place", "time from there in s")

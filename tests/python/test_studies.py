@@ -188,7 +188,6 @@ def test_where_a_mode_moves_is_simulated_and_not_converted_for() -> None:
 
 
 def test_a_known_value_is_converted_for() -> None:
-    """The same as `convert` says of the machine with that value."""
     hz = 52.0
     measure = ["residual_um", "contour_um", "time_s", "original_residual_um", "cutting_time_s"]
     vary = {X_HZ: sg.listed([hz], known=True)}
