@@ -314,7 +314,7 @@ BAD: dict[str, tuple[Any, ...]] = {
     "no time": ("force_N,acc_g\n" + rows(columns=2), r":1: no column of time; the header names 'force_N', 'acc_g'"),
     "no response": ("time_s,force_N\n" + rows(columns=2), r":1: no column of a response"),
     "nothing known": ("foo,bar,baz\n" + rows(), r"no column of time; the header names 'foo', 'bar', 'baz'"),
-    "unknown unit": ("t_s,f [V],a_g\n" + rows(), r":1: 'f \[V\]': the unit 'V' is not known; needed is one of N, kN"),
+    "unknown unit": ("t_s,f [V],a_g\n" + rows(), r":1: 'f \[V\]': the unit 'V' is not known; .* one of N, kN"),
     "unknown unit in its row": ("t,f,a\ns,N,V\n" + rows(), r"'a': the unit 'V' is not known"),
     "name against unit": (
         "t_s,force [m/s²],a_g\n" + rows(),
