@@ -109,9 +109,6 @@ _LONG = (b"[" * 2000, b"{" * 2000, b"a." * 3000, b";" * 5000, b"\xff\xfe")
 _PIECES = (*_LONG, *(bytes([one]) for one in b'\0"<&\n\r]'))
 
 
-# ---- files of some megabytes that would become gigabytes, or take minutes ----------------------------------------
-
-
 def _packed(head: bytes, piece: bytes, megabytes: int, tail: bytes = b"") -> bytes:
     """Gzip members one behind the other, so that this process stays small."""
     middle = gzip.compress(piece * ((1 << 20) // len(piece)))

@@ -1,8 +1,5 @@
-"""What modes move across the axis they were found along: taps, decays, frequency responses, a sweep.
-
-Simulated by SciPy and NumPy alone: a mode with the shape (x, y, z) at a point answers along k to a push along y with
-the residue phi_y phi_k / m.
-"""
+"""What modes move across the axis they were found along: taps, decays, frequency responses, a sweep, simulated by SciPy
+and NumPy: a mode with the shape (x, y, z) answers along k to a push along y with the residue phi_y phi_k / m."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -86,12 +83,8 @@ def test_taps_with_a_sensor_of_three_axes(files: list[Path]) -> None:
 
 
 def test_a_sensor_that_is_turned_between_taps() -> None:
-    hits = [
-        hit(MODES, seed, axes=letter)
-        for letter in AXES
-        for seed in range(5 * AXES.index(letter), 5 * AXES.index(letter) + 3)
-    ]
-    records = [record for of_hit in hits for record in of_hit]
+    seeds = [(letter, 5 * rank + k) for rank, letter in enumerate(AXES) for k in range(3)]
+    records = [record for letter, seed in seeds for record in hit(MODES, seed, axes=letter)]
     found = sg.identify(along(records, "y"), across=[*along(records, "x"), *along(records, "z")])
     check(found, MODES, within=0.05)
 
@@ -132,8 +125,7 @@ def responses(modes: Structure) -> dict[str, sg.FrequencyResponse]:
             shape[1]
             * shape[k]
             / mode.mass_kg
-            * s**2
-            / (s**2 + 2.0 * mode.damping_ratio * mode.omega * s + mode.omega**2)
+            / (1.0 + 2.0 * mode.damping_ratio * mode.omega / s + (mode.omega / s) ** 2)
             for mode, shape in modes
         )
         noise = 1e-3 * (rng.standard_normal(len(s)) + 1j * rng.standard_normal(len(s)))
@@ -141,8 +133,9 @@ def responses(modes: Structure) -> dict[str, sg.FrequencyResponse]:
     return found
 
 
-def test_frequency_responses() -> None:
-    lines = responses(MODES)
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["along the arrow", "against it"])
+def test_frequency_responses(sign: float) -> None:
+    lines = {letter: replace(each, response=sign * each.response) for letter, each in responses(MODES).items()}
     check(sg.identify([lines["y"]], across=[lines["x"], lines["z"]]), MODES)
 
 
@@ -227,11 +220,6 @@ def test_a_hit_against_the_arrow_has_the_same_signs(count: int) -> None:
     assert any("sign is reversed" in warning for warning in found.warnings)
 
 
-def test_frequency_responses_against_the_arrow() -> None:
-    lines = {letter: replace(each, response=-each.response) for letter, each in responses(MODES).items()}
-    check(sg.identify([lines["y"]], across=[lines["x"], lines["z"]]), MODES)
-
-
 def in_one_file(hits: Sequence[Sequence[sg.Record]], source: str) -> list[sg.Record]:
     """Hits one after the other."""
     joined = []
@@ -269,11 +257,17 @@ def test_the_other_axes_of_a_refused_hit_do_not_count(files: list[Path], tmp_pat
     assert [use.used for use in found.records] == [True, True, False]
 
 
-def test_other_hits_need_their_force() -> None:
-    records = hit(MODES, 1)
-    others = [replace(record, source="stop", force_n=None) for record in along(hit(MODES, 2), "z")]
-    with pytest.raises(RecordError, match=r"stop: no force, but tap1 has one"):
-        sg.identify(along(records, "y"), across=others)
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"source": "stop", "force_n": None}, r"stop: no force, but tap1 has one"),
+        ({"quantity": "velocity"}, r"velocity.*acceleration"),
+    ],
+)
+def test_other_hits_need_their_force_and_the_same_quantity(changes: dict[str, Any], said: str) -> None:
+    others = [replace(record, **changes) for record in along(hit(MODES, 2), "z")]
+    with pytest.raises(RecordError, match=said):
+        sg.identify(along(hit(MODES, 1), "y"), across=others)
 
 
 @pytest.mark.parametrize(("share", "words"), [(0.0, "is the sensor connected"), (0.3, "overload")])
@@ -307,10 +301,3 @@ def test_the_phase_of_next_to_nothing_is_not_told() -> None:
     lines["x"] = replace(lines["x"], response=0.004j * lines["y"].response)
     found = sg.identify([lines["y"]], across=[lines["x"], lines["z"]])
     assert not any("out of phase" in note for note in found.notes)
-
-
-def test_another_quantity_is_refused() -> None:
-    records = hit(MODES, 1)
-    others = [replace(record, quantity="velocity") for record in along(records, "z")]
-    with pytest.raises(RecordError, match=r"velocity.*acceleration"):
-        sg.identify(along(records, "y"), across=others)

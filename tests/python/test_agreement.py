@@ -12,26 +12,10 @@ import pytest
 import shapegcode as sg
 from shapegcode.machine.programs import ANY_PRICE
 
-PART = """%
-O1
-G21G17G90G94
-G54G00X0Y0Z5.
-G01Z-1.F300
-X40.F6000
-Y30.
-G03X20.Y50.I-20.J0.
-G00Z5.
-X0Y0
-G01X.5F60
-G00X60.Y0
-G04P200
-G61
-G01X90.F4000
-G64
-G00X0Y0
-M30
-%
-"""
+PART = (
+    "%\nO1\nG21G17G90G94\nG54G00X0Y0Z5.\nG01Z-1.F300\nX40.F6000\nY30.\nG03X20.Y50.I-20.J0.\nG00Z5.\nX0Y0\nG01X.5F60\n"
+    "G00X60.Y0\nG04P200\nG61\nG01X90.F4000\nG64\nG00X0Y0\nM30\n%\n"
+)
 
 
 @pytest.fixture(scope="module")
@@ -196,7 +180,6 @@ def test_contour_says_against_what(emitted: Path, original: Path, machine: sg.Ma
 
 
 def test_every_function_takes_the_path_of_a_file(emitted: Path, original: Path, machine: sg.Machine) -> None:
-    """As text and as a Path, of an ordinary program and of an emitted one."""
     calls: dict[str, Callable[[Any], Any]] = {
         "check": lambda program: sg.check(program, machine),
         "cycle_time": lambda program: sg.cycle_time(program, machine),

@@ -159,8 +159,6 @@ def test_progress_is_told() -> None:
         assert steps == [(k, len(steps)) for k in range(1, len(steps) + 1)]
 
 
-# ---- batch and streaming forms -----------------------------------------------------------------------------
-
 TAPS = st.lists(st.tuples(st.integers(0, 40), st.floats(-2.0, 2.0)), min_size=1, max_size=6, unique_by=lambda t: t[0])
 
 
@@ -236,9 +234,6 @@ def test_results_are_read_only() -> None:
     profile = _core.plan_speed(path, motion_limits(machine))
     with pytest.raises(ValueError, match="read-only"):
         _core.interpolate(path, profile, 0.001)[0, 0] = 1.0
-
-
-# ---- designs -----------------------------------------------------------------------------------------------
 
 
 def test_designs_leave_nothing() -> None:

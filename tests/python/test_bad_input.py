@@ -41,9 +41,6 @@ def refused(done: subprocess.CompletedProcess[str], *parts: str) -> None:
         assert part in lines[0]
 
 
-# ---- programs ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_rejected_program(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -85,8 +82,6 @@ def test_absolute_centres_are_hinted_at() -> None:
     assert caught.value.column > 1
 
 
-# ---- command lines -----------------------------------------------------------------------------------------
-
 REFUSED = [
     ("check no.nc", "no.nc: no such file"),
     ("check good.nc -m vx501", "no built-in machine"),
@@ -125,9 +120,6 @@ def test_what_a_command_cannot_do_is_refused_and_nothing_is_written(folder: Path
     assert (done.returncode, done.stdout) == (2, "")
     assert said in done.stderr.splitlines()[-1]
     assert os.listdir(folder) == ["good.nc"]
-
-
-# ---- files -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -173,9 +165,6 @@ def test_suffix_of_a_failed_output_may_not_hit_the_input(folder: Path) -> None:
     assert (folder / "a.out-of-tolerance").read_text() == GOOD
 
 
-# ---- a disk that is full -----------------------------------------------------------------------------------
-
-
 def test_full_device(folder: Path) -> None:
     refused(run(folder, "convert", "good.nc", "-m", "vx500", "-o", "/dev/full"), "/dev/full", os.strerror(errno.ENOSPC))
     assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
@@ -208,9 +197,6 @@ def test_full_standard_output(folder: Path) -> None:
     assert done.returncode == 2
     assert os.strerror(errno.ENOSPC) in done.stderr
     assert "Traceback" not in done.stderr
-
-
-# ---- machine files and options -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -280,9 +266,6 @@ def test_a_cut_of_months_is_refused(folder: Path) -> None:
     assert not (folder / "out.nc").exists()
 
 
-# ---- anything at all ---------------------------------------------------------------------------------------
-
-
 def survives(data: bytes, machine: sg.Machine) -> str:
     """Read and convert; only the family of expected errors may come out. Returns what happened."""
     try:
@@ -346,13 +329,10 @@ def fuzz(seed: int, count: int) -> None:
     assert seen["converted"] > count / 20
 
 
-def test_changed_bytes_never_crash() -> None:
-    fuzz(seed=1, count=50)
-
-
 @pytest.mark.slow
-def test_many_changed_bytes_never_crash() -> None:
-    fuzz(seed=2, count=100)
+@pytest.mark.parametrize(("seed", "count"), [(1, 50), (2, 100)])
+def test_changed_bytes_never_crash(seed: int, count: int) -> None:
+    fuzz(seed, count)
 
 
 @settings(max_examples=200, suppress_health_check=list(HealthCheck))
@@ -381,8 +361,5 @@ def test_words_at_random_never_crash(words: list[tuple[str, str]]) -> None:
     words_survive(words)
 
 
-@pytest.mark.slow
-@settings(max_examples=200, suppress_health_check=list(HealthCheck))
-@given(WORDS)
-def test_many_words_at_random_never_crash(words: list[tuple[str, str]]) -> None:
-    words_survive(words)
+MANY = settings(max_examples=200, suppress_health_check=list(HealthCheck))
+test_many_words_at_random_never_crash = pytest.mark.slow(MANY(given(WORDS)(words_survive)))

@@ -72,7 +72,6 @@ def contents(*folders: Path) -> dict[str, bytes]:
 
 @pytest.mark.slow
 def test_the_bytes_are_those_of_the_single_command(folder: Path) -> None:
-    """Program, JSON and page; what was refused has its reason and leaves nothing."""
     report = told(folder, "parts", *ONE, "--html", "pages", "--", "--shaper", "zvd")
     ended = {row["program"]: row["ended"] for row in report["rows"]}
     assert ended == {
@@ -94,7 +93,6 @@ def test_the_bytes_are_those_of_the_single_command(folder: Path) -> None:
 
 
 def test_the_summary_has_the_figures_of_the_reports(folder: Path) -> None:
-    """As a spreadsheet reads it; several machines have a folder each."""
     (folder / "mine.toml").write_bytes(sg.Machine.builtin_text("vx500").encode())
     told(folder, "parts/a.nc", "-m", "vx500", "-m", "mine.toml", "-o", "out", code=0)
     rows = list(csv.DictReader((folder / "out" / "summary.csv").read_text().splitlines()))
@@ -176,7 +174,6 @@ def test_what_pages_share_stays(folder: Path) -> None:
 
 
 def test_files_that_cannot_be_read_or_written_are_rows(folder: Path) -> None:
-    """A link that leads nowhere, a name too long, a file where a folder should be; a pipe is no program."""
     (folder / "parts/link.nc").symlink_to("nowhere.nc")
     (folder / "parts" / f"{'n' * 250}.nc").write_text(part(7))
     os.mkfifo(folder / "parts/pipe.nc")
@@ -192,7 +189,6 @@ def test_files_that_cannot_be_read_or_written_are_rows(folder: Path) -> None:
 
 
 def test_rows_from_python(folder: Path) -> None:
-    """They stand in the manifest: the same as a list, in JSON, in pandas, and after a later batch."""
     found = sg.batch(["parts"], ["vx500"], "out", command="time", jobs=1)
     rows = list(found.rows)
     assert [row.program for row in found.rows[1:3]] == ["parts/bad.nc", "parts/caller.nc"]
@@ -206,7 +202,6 @@ def test_rows_from_python(folder: Path) -> None:
 
 
 def test_the_index_lists_more_than_the_terminal(folder: Path) -> None:
-    """Of many programs each has its link."""
     found = sg.batch(["parts/a.nc"], ["vx500"], "out", command="time", jobs=1)
     many = replace(found, rows=(replace(found.rows[0], page="pages/a.nc.html"),) * 30)
     assert (len(many.tables()[0].rows), many.tables()[0].caption) == (20, f"and 10 more: {found.summary}")
@@ -215,7 +210,6 @@ def test_the_index_lists_more_than_the_terminal(folder: Path) -> None:
 
 
 def test_a_run_that_takes_too_long_ends_alone(folder: Path) -> None:
-    """Time and memory; --resume does them again with other limits."""
     (folder / "parts/long.nc").write_text(HEAD + "".join(f"X{k % 100}. Y{k % 7}.\n" for k in range(200_000)) + TAIL)
     words = ["parts/a.nc", "parts/long.nc", *ONE, "--command", "time"]
     a, long = told(folder, *words, "--time-limit", "400ms")["rows"]
@@ -229,7 +223,6 @@ def test_a_run_that_takes_too_long_ends_alone(folder: Path) -> None:
 
 
 def test_a_killed_process_is_a_row(folder: Path) -> None:
-    """Killed from outside while it runs: the next run has a new process."""
     (folder / "parts/long.nc").write_text(HEAD + "".join(f"X{k % 100}. Y{k % 7}.\n" for k in range(100_000)) + TAIL)
     killed: list[int] = []
 
@@ -261,7 +254,6 @@ def parent_of(pid: int) -> int:
 
 
 def test_a_full_disk_stops_it_and_loses_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing half-written, no temporary file; --resume then has the bytes of an undisturbed batch."""
     words = ("parts", *ONE, "--command", "time")
     told(folder, *words)
     whole = contents(folder / "out")
@@ -286,7 +278,6 @@ def test_a_full_disk_stops_it_and_loses_nothing(folder: Path, monkeypatch: pytes
 
 
 def test_ctrl_c_says_how_to_go_on(folder: Path) -> None:
-    """As a process of its own: exit code 130, nothing left running, nothing temporary."""
     (folder / "parts/long.nc").write_text(HEAD + "".join(f"X{k % 100}. Y{k % 7}.\n" for k in range(150_000)) + TAIL)
     words = [COMMAND, "batch", "parts/a.nc", "parts/long.nc", *ONE]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -302,7 +293,6 @@ def test_ctrl_c_says_how_to_go_on(folder: Path) -> None:
 
 
 def test_one_batch_at_a_time(folder: Path) -> None:
-    """In one folder of results."""
     from shapegcode.batching.manifest import Manifest
 
     held = Manifest(folder / "out", resume=True)
@@ -336,7 +326,6 @@ def test_one_batch_at_a_time(folder: Path) -> None:
 def test_what_cannot_be_started(
     folder: Path, words: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Exit code 2, and nothing is written."""
     monkeypatch.setattr("shapegcode.batching.process._WAIT_S", 1)
     (folder / "lib").mkdir()
     (folder / "full").mkdir()
@@ -354,7 +343,6 @@ def test_what_cannot_be_started(
 
 
 def test_programs_are_found(folder: Path) -> None:
-    """Folders, patterns and lists; results of the batch itself are none."""
     (folder / "parts/out").mkdir()
     (folder / "parts/out/z.nc").write_text(part(1))
     (folder / "list.txt").write_text("parts/a.nc  # the first\n\nparts/deep/a.nc\n")
@@ -367,7 +355,6 @@ def test_programs_are_found(folder: Path) -> None:
 
 
 def test_results_of_another_batch_are_no_programs(folder: Path) -> None:
-    """Though they stand below the programs."""
     told(folder, "parts/a.nc", "-m", "vx500", "-o", "parts/done", code=0)
     assert len(find_programs(["parts"], "out")) == 5
     with pytest.raises(sg.ArgumentError, match="no program in it"):
@@ -375,7 +362,6 @@ def test_results_of_another_batch_are_no_programs(folder: Path) -> None:
 
 
 def test_a_file_of_several_programs(folder: Path) -> None:
-    """Its JSON is a list; the row says how it ended."""
     (folder / "memory.nc").write_text(
         part(30).replace("%\n", "") + part(20).replace("%\n", "").replace("O0001", "O0002")
     )
@@ -400,7 +386,6 @@ def test_what_a_program_may_call_travels_with_it(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_on_a_cluster_of_this_machine_the_bytes_are_the_same(folder: Path) -> None:
-    """Inputs and results travel as bytes; no shared folder is used."""
     told(folder, "parts", *ONE)
     whole = contents(folder / "out")
     subprocess.run(["rm", "-r", "out"], check=True)

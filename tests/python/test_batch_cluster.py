@@ -68,7 +68,6 @@ def whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, bytes]:
 def test_a_killed_worker(
     tmp_path: Path, whole: dict[str, bytes], cluster: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
-    """The other one does what it had."""
     address, workers = cluster
     client = subprocess.Popen([COMMAND, *WORDS, "--scheduler", address], stdout=subprocess.PIPE, text=True)
     wait_for(2)
@@ -82,7 +81,6 @@ def test_a_killed_worker(
 def test_a_killed_client(
     tmp_path: Path, whole: dict[str, bytes], cluster: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
-    """A new one goes on; a scheduler that was left alone does nothing twice that stands on the disk."""
     address, _ = cluster
     client = subprocess.Popen([COMMAND, *WORDS, "--scheduler", address], stdout=subprocess.DEVNULL)
     wait_for(2)
@@ -108,7 +106,6 @@ def test_a_worker_of_another_version_is_named(
     tmp_path: Path, whole: dict[str, bytes], cluster: tuple[str, list[subprocess.Popen[bytes]]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    """Nothing is done then."""
     monkeypatch.setattr("shapegcode.batching.process._own_version", lambda: "shapegcode 0.0.0")
     done = run(tmp_path, *WORDS, "--scheduler", cluster[0])
     assert done.returncode == 2

@@ -1,8 +1,5 @@
-"""A batch whose worker or client is killed, or whose disk fills, at random instants: --resume has the same bytes.
-
-Kill -9 is what a power cut or the system's memory killer does: no handler runs. The disk is a real one that is too
-small (a tmpfs); where the system lets nobody mount one, writing fails at random instead.
-"""
+"""A batch whose worker or client is killed (-9), or whose disk fills (a tmpfs, or writes that fail at random where
+nobody may mount one), at random instants: --resume has the same bytes."""
 
 import errno
 import os
@@ -93,7 +90,6 @@ def test_killed_workers(tmp_path: Path, whole: dict[str, bytes]) -> None:
 
 @pytest.mark.slow
 def test_killed_client(tmp_path: Path, whole: dict[str, bytes]) -> None:
-    """Its workers end with it."""
     draw = random.Random(11)
     for _ in range(TIMES):
         client = started()
@@ -123,7 +119,6 @@ def disk() -> Iterator[bool]:
 
 @pytest.mark.slow
 def test_full_disk(tmp_path: Path, whole: dict[str, bytes], disk: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In the middle of a page, of the JSON, of the manifest, of the folder of a run."""
     draw = random.Random(13)
     needed = sum(len(data) for data in whole.values())
     write = batching.write_bytes

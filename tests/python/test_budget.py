@@ -81,9 +81,6 @@ def rates(judged: Judged) -> tuple[float, float]:
     return worst[0] * judged.machine.controller.dnc_bits_per_character, worst[1]
 
 
-# ---- size --------------------------------------------------------------------------------------------------
-
-
 def test_least_gain_per_byte_is_given_up_first() -> None:
     """At every limit at which the choice changes, and one byte below."""
     entries = free().conversion.to_dict()["regions"]
@@ -185,9 +182,6 @@ def test_arcs_with_absolute_centres_cannot_be_given_up() -> None:
 def at_period(ms: int) -> Any:
     """The part on another block period: what several limits are held against."""
     return convert(PART, MACHINE, block_period_s=ms * 1e-3)
-
-
-# ---- line and control --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -308,7 +302,6 @@ def test_sample_under_all_three(name: str) -> None:
 
 
 def test_comments_travel_on_the_line_too() -> None:
-    """A comment is sent with the block behind it."""
     text = HEAD + "G1X10.F600\n(" + "A" * 100 + ")\nY10.\n" + TAIL
     plain = text.replace("A" * 100, "A")
     loads = [budgeted(t, PERIOD, baud=1e9).conversion.to_dict()["budget"]["before"]["baud"] for t in (plain, text)]
@@ -322,9 +315,6 @@ def test_busiest_stretch_is_that_of_every_stretch_tried(blocks: list[tuple[int, 
     window = min(stretch, len(flow))
     tried = max(math.fsum(flow[k : k + window]) for k in range(len(flow) - window + 1)) / window
     assert _core.busiest_per_s(ticks, [amount for _, amount in blocks], stretch) == pytest.approx(tried, abs=1e-12)
-
-
-# ---- none, bad ones, and the command -----------------------------------------------------------------------
 
 
 def test_a_budget_that_is_not_reached_changes_nothing() -> None:

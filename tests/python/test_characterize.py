@@ -55,9 +55,6 @@ def by_name(findings: Sequence[ControllerFact]) -> dict[str, ControllerFact]:
     return {each.quantity: each for each in findings}
 
 
-# ---- the programs ------------------------------------------------------------------------------------------
-
-
 def extremes(text: str) -> tuple[list[float], list[float], list[float]]:
     """Smallest, largest and last place of each axis, by adding up the words: nothing else moves in these programs."""
     at, low, high = [0.0] * 3, [0.0] * 3, [0.0] * 3
@@ -115,16 +112,9 @@ def test_feeds_stay_below_the_limits_of_a_slow_machine(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("block_end", "override"), [("ceil", 1.0), ("ceil", 0.5), ("carry", 1.0), ("carry", 1.2)])
 def test_expected_times_are_those_of_an_independent_controller(block_end: str, override: float) -> None:
-    hidden = Hidden(period_s=0.002, block_end=block_end, block_time_s=0.006, in_position_s=(0.03, 0.04, 0.1))  # type: ignore[arg-type]
-    timing = ControllerTiming(
-        0.002,
-        block_end,  # type: ignore[arg-type]
-        0.006,
-        0.05,
-        dict.fromkeys("XYZ", 0.15),
-        dict.fromkeys("XYZ", 0.0),
-        {"X": 0.03, "Y": 0.04, "Z": 0.1},
-    )
+    hidden = Hidden(period_s=0.002, block_end=block_end, block_time_s=0.006, in_position_s=(0.03, 0.04, 0.1))
+    ramps, bells = dict.fromkeys("XYZ", 0.15), dict.fromkeys("XYZ", 0.0)
+    timing = ControllerTiming(0.002, block_end, 0.006, 0.05, ramps, bells, {"X": 0.03, "Y": 0.04, "Z": 0.1})
     for test in make_tests(MACHINE, AirBox()):
         _, seconds = play(program_text(test, AirBox(), MACHINE), hidden, override, positions=False)
         mine = sum(part_time_s(part, timing, override) for part in test.parts)
@@ -143,8 +133,6 @@ def test_rapids_and_runs_agree_with_the_core(length: float) -> None:
     core = sg._core.block_overlap_time_s(np.full(6, length), np.full(6, 50.0), model)
     assert part_time_s(run, timing) == pytest.approx(core, abs=1e-9)
 
-
-# ---- the figures -------------------------------------------------------------------------------------------
 
 PUBLISHED_LOG = re.compile(r"block time|in-position time|cutting (time constant|bell)|rapid (time constant|bell time)")
 PUBLISHED_WATCH = re.compile(r"block time|in-position time|cutting time constant|rapid time constant [XY]")
@@ -221,9 +209,6 @@ def test_a_control_that_waits_before_a_dwell_is_noticed(folder: Path) -> None:
     assert found["position gain"].value is None
 
 
-# ---- what is not known, and what is wrong ------------------------------------------------------------------
-
-
 def test_few_times_leave_the_rest_unknown(folder: Path) -> None:
     text = (folder / "RESULTS.toml").read_text().replace("reaction_s = 0.1", "reaction_s = 0.0")
     for name, value in (("overhead", 10.3), ("blocks_tiny", 10.4)):
@@ -284,11 +269,8 @@ GOOD_ROWS = "".join(f"{k},{k * 0.01:.3f}\n" for k in range(200))
         ("time_ms,X\n" + GOOD_ROWS.replace("50,0.500", "49,0.500"), ":52: time 49 does not come after 49"),
         ("time_ms,X\n" + GOOD_ROWS.replace("50,0.500", "50,abc"), ":52: column 2 (X) 'abc' is not a finite number"),
         ("time_ms,X\n" + GOOD_ROWS.replace("50,0.500", "50"), ":52: 1 cells, column 2 (X) is missing"),
-        (
-            "time_ms,X\n" + GOOD_ROWS.replace("50,0.500\n", "").replace("51,0.510\n", "").replace("52,0.520\n", ""),
-            "rows are missing",
-        ),
-        ("time_ms,X\n1,0\n2,0\n", "2 rows of numbers: too short; required: at least 100"),
+        ("time_ms,X\n" + re.sub(r"5[012],0\.5[012]0\n", "", GOOD_ROWS), "rows are missing"),
+        ("time_ms,X\n1,0\n2,0\n", "2 rows of numbers: too short; "),
         ("time_s,X\n" + GOOD_ROWS, "from 0.02 to 50 ms"),
         ("time_ms,X\n" + GOOD_ROWS, "no commanded position of Y"),
     ],
@@ -332,9 +314,6 @@ def test_logs_are_read_whatever_their_columns_are_called(
     assert log.command_mm[100, 0] == pytest.approx(1.0)
     assert log.actual_mm is not None and log.actual_mm[100, 0] == pytest.approx(0.9)
     assert np.isnan(log.command_mm[:, 1]).all()
-
-
-# ---- the command -------------------------------------------------------------------------------------------
 
 
 def test_the_command_writes_once_and_fits(tmp_path: Path) -> None:

@@ -107,7 +107,6 @@ def test_a_method_of_our_own_cites_the_program_alone() -> None:
 
 
 def test_what_no_json_holds_is_said(tmp_path: Path) -> None:
-    """Such as which controller simulated a program: refused, not left out."""
     program = ROOT / "python" / "shapegcode" / "data" / "paper_path.nc"
     file = tmp_path / "s.json"
     assert main(["simulate", str(program), "-m", "vx500", "--json", str(file), "-q"]) == 0

@@ -33,9 +33,6 @@ def files(folder: Path) -> list[str]:
     return sorted(os.listdir(folder))
 
 
-# ---- convert -----------------------------------------------------------------------------------------------
-
-
 def test_convert_writes_the_program_of_the_api(folder: Path) -> None:
     done = run_process(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc")
     assert (done.returncode, done.stderr) == (0, "")
@@ -167,7 +164,6 @@ def test_options_that_stand_for_a_key_of_the_machine(words: str, key: str, value
 
 
 def test_an_option_has_one_name_and_one_unit_on_every_command() -> None:
-    """What the same option takes, as its metavar and type say."""
     found: dict[str, set[tuple[object, object]]] = {}
 
     def look(parser: argparse.ArgumentParser) -> None:
@@ -209,9 +205,6 @@ def test_output_goes_through_links_and_keeps_permissions(folder: Path) -> None:
     assert (folder / "real.nc").read_text().startswith("%\nO1\n(SHAPEGCODE")
 
 
-# ---- simulate ----------------------------------------------------------------------------------------------
-
-
 def test_simulate_says_of_a_shaped_program_what_convert_said(folder: Path) -> None:
     converted = run(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--json", "-")
     promised = json.loads(converted.stdout)
@@ -234,9 +227,6 @@ def test_simulate_writes_plots_and_prints_a_table(folder: Path) -> None:
     assert done.stdout.startswith("part.nc takes 0.80 s on VX500, ")
     assert "residual vibration µm" in done.stdout
     assert files(folder) == ["part.nc", "plots"]
-
-
-# ---- machine, demo, the rest -------------------------------------------------------------------------------
 
 
 def test_expand(folder: Path) -> None:

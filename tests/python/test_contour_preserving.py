@@ -78,7 +78,7 @@ def test_the_feed_follows_from_the_tolerance(target: str, tolerance_um: float) -
 
 def test_a_wider_tolerance_is_not_slower() -> None:
     for target in ("off", "command"):
-        times = [within(arcs_and_corners(), target, tolerance)[0].time_s for tolerance in TOLERANCES_UM]
+        times = [within(arcs_and_corners(), target, tolerance)[0].time_s for tolerance in TOLERANCES_UM[::3]]
         assert all(later <= earlier + 1e-9 for earlier, later in itertools.pairwise(times))
 
 

@@ -2,6 +2,7 @@
 
 import functools
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,9 +45,6 @@ def sample(name: str) -> Judged:
     return convert(read_sample(name), machine_with({**CALCULATOR, **SAMPLE_KEYS.get(name, {})}))
 
 
-# ---- the sample programs -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=pytest.mark.slow) if name in ("BOTTLE.NC", "PARALLEL.NC") else name for name in SAMPLES],
@@ -66,7 +64,6 @@ def test_sample_program(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["CONTOUR_R.NC", "TEST_G90.NC"])
 def test_contour_of_whole_sample(name: str) -> None:
-    """Every region's contour error, however long it is."""
     check_figures(sample(name), contour_budget_s=1e9)
 
 
@@ -125,8 +122,6 @@ def test_a_cut_whose_end_its_unit_cannot_name_is_left_unchanged_with_its_reason(
     assert "it ends at X 132.00000 mm, 1.26 um off the increments of G20" in outcomes[1].reason
     assert "limit 0.50 um" in outcomes[1].reason
 
-
-# ---- programs made by hand, each for one thing -------------------------------------------------------------
 
 INCH = HEAD.replace("G21", "G20")
 G91_UNKNOWN = "%\nO1\nG21G17G94\nG91G1X10.F600\nY5.\nG2X5.Y5.I5.\nM30\n%\n"
@@ -387,13 +382,7 @@ def test_original_after_interpolation_is_what_the_judge_plays() -> None:
     """The figures of the original, too, are the judge's: blocks at their feed, smoothed on each axis."""
     keys = {"controller.motion": "after_interpolation", "controller.time_constant_s": 0.05}
     judged = convert(part("G1X20.F900\nG3X40.Y20.R20.\nG1Y40.\n"), machine_with(keys))
-    filtered = Judged(
-        judged.conversion,
-        machine_with({**keys, "controller.shaped_time_constant_s": 0.05}),
-        judged.original,
-        judged.emitted,
-        judged.header_lines,
-    )
+    filtered = replace(judged, machine=machine_with({**keys, "controller.shaped_time_constant_s": 0.05}))
     for programmed, _, entry in judged.regions():
         run = figures(filtered, programmed, programmed, "ceil")
         for axis, ours in zip("xyz", run.residual, strict=True):
@@ -427,9 +416,6 @@ def test_conversion_is_the_same_every_time() -> None:
     assert first.to_dict() == second.to_dict()
 
 
-# ---- programs nobody thought of ----------------------------------------------------------------------------
-
-
 def check_made_up(text: str) -> None:
     judged = convert(text, machine_with())
     whole_periods(judged)
@@ -442,8 +428,5 @@ def test_made_up_program(text: str) -> None:
     check_made_up(text)
 
 
-@pytest.mark.slow
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
-@given(programs())
-def test_many_made_up_programs(text: str) -> None:
-    check_made_up(text)
+MANY = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+test_many_made_up_programs = pytest.mark.slow(MANY(given(programs())(check_made_up)))

@@ -1,7 +1,5 @@
-"""Modes that one axis excites and that move another: the plant, the verdict, shapers, contour compensation.
-
-References: SciPy's `lsim`, and the judge's plant, interpreter and player, which share nothing with the package.
-"""
+"""Modes that one axis excites and that move another: plant, verdict, shapers and contour compensation against SciPy's
+`lsim` and the judge's plant, interpreter and player, which share nothing with the package."""
 
 from typing import Any
 
@@ -140,8 +138,6 @@ def test_what_another_axis_excites_is_ranked_by_what_it_changes() -> None:
     ranked = {row.key for row in sg.convert(program, machine, shape_all=True).parameter_sensitivity}
     assert {f"axes.{letter}.modes.1.damping_ratio" for letter in "xy"} <= ranked
 
-
-# ---- machines at random ----------------------------------------------------------------------------------------------
 
 QUICK = range(4)
 MANY = range(4, 104)

@@ -108,13 +108,10 @@ def test_block_overlap_is_the_moving_average(
     check_block_overlap(case)
 
 
-@pytest.mark.slow
-@settings(max_examples=1000, deadline=None)
-@given(sequences())
-def test_block_overlap_of_10000_sequences_is_the_moving_average(
-    case: tuple[_core.FanucModel, list[Vector], list[tuple[Vector, Vector]]],
-) -> None:
-    check_block_overlap(case)
+MANY = settings(max_examples=1000, deadline=None)
+test_block_overlap_of_10000_sequences_is_the_moving_average = pytest.mark.slow(
+    MANY(given(sequences())(check_block_overlap))
+)
 
 
 @given(st.lists(st.tuples(st.floats(0.01, 50.0), st.floats(0.5, 300.0)), min_size=1, max_size=20), st.integers(1, 100))

@@ -32,8 +32,6 @@ def test_block_skip(name: str, switch: str) -> None:
     compare((DIALECT / f"{name}.nc").read_text(), machine_with({"input.block_skip": switch}), switches=on)
 
 
-# ---- programs at random ----------------------------------------------------------------------------------------------
-
 RANDOM = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 MACHINE = machine_with()
 

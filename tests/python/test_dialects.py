@@ -183,15 +183,8 @@ def test_shaped_rapids_and_no_header(dialect: str, tmp_path: Path) -> None:
     compare(dialect, conversion, READERS[dialect](conversion.text.decode(), tmp_path))
 
 
-REAL = [
-    "CONTOUR_R.NC",
-    "G17_18_19.NC",
-    "TEST_G90.NC",
-    "TEST_G91.NC",
-    "VINT_360arc.NC",
-    "helical_bore.nc",
-    "mixed_ijk_r_planes.nc",
-]
+REAL = ["CONTOUR_R.NC", "G17_18_19.NC", "TEST_G90.NC", "TEST_G91.NC"]
+REAL += ["VINT_360arc.NC", "helical_bore.nc", "mixed_ijk_r_planes.nc"]
 
 
 @pytest.mark.slow
@@ -303,17 +296,7 @@ def test_random_programs_read_back(dialect: str, seeds: range, tmp_path: Path) -
 
 # ---- derived by hand, each from the page named -----------------------------------------------------------------------
 
-UNITS = """G21G90
-G00X1.Y-.5Z5.
-G04P600
-G04X1.5
-G01X2.F500
-G09X3.
-G02X5.Y-2.5R2.
-G64
-G03X3.Y-.5I-2.J0.F50.
-M30
-"""
+UNITS = "G21G90\nG00X1.Y-.5Z5.\nG04P600\nG04X1.5\nG01X2.F500\nG09X3.\nG02X5.Y-2.5R2.\nG64\nG03X3.Y-.5I-2.J0.F50.\nM30\n"
 GOLDEN = {
     # G04 P with a point is seconds: https://pastebin.com/prSjxEWB
     "haas": "G21G90/G00X1.Y-.5Z5./G04P0.6/G04P1.5/G01X2.F500./G09X3./G02X5.Y-2.5R2./G64/G03X3.Y-.5I-2.J0.F50./M30",
@@ -433,19 +416,8 @@ def test_settings_that_a_dialect_cannot_have(keys: dict[str, Any], message: str)
 def test_no_shaper_on_the_blocks_of_a_slow_control(tmp_path: Path) -> None:
     source = tmp_path / "part.nc"
     source.write_text(TEXT)
-    done = run(
-        tmp_path,
-        "convert",
-        "part.nc",
-        "-m",
-        "vx500",
-        "--dialect",
-        "siemens",
-        "-o",
-        "out.nc",
-        "--set",
-        "controller.block_time_s=0.5",
-    )
+    slow = ("--dialect", "siemens", "--set", "controller.block_time_s=0.5")
+    done = run(tmp_path, "convert", "part.nc", "-m", "vx500", *slow, "-o", "out.nc")
     assert done.returncode == 2 and "block time of 500 ms" in done.stderr
     assert [*tmp_path.iterdir()] == [source]
 
@@ -511,9 +483,7 @@ def test_commands_that_write_fanuc_alone(command: str, tmp_path: Path) -> None:
     words = {"sweep": ["sweep", "-o", "out.nc", "--axis", "x"]}.get(command, [command, "part.nc", "-o", "out.nc"])
     words += ["--tool", "t.toml", "--stock", "s.toml"] * (command == "feed")
     done = run(tmp_path, *words, "-m", "vx500", "--set", "emission.dialect=linuxcnc")
-    assert (
-        done.returncode == 2 and "this command writes for FANUC only, and emission.dialect is linuxcnc" in done.stderr
-    )
+    assert done.returncode == 2 and "writes for FANUC only, and emission.dialect is linuxcnc" in done.stderr
 
 
 def test_what_stands_behind_the_end_is_left_out() -> None:

@@ -16,19 +16,9 @@ from edge_writer import MEASURED, edge_document, write_edge
 
 
 def block(counter: int, text: str, tool: int | str = 6) -> dict[str, Any]:
-    return {
-        "HFBlockEvent": {
-            "HFProbeCounter": counter,
-            "Channel": 1,
-            "SeekOffset": 12,
-            "SelectedTool": tool,
-            "ActiveTool": tool,
-            "GCode": text,
-            "IpoGC": "G1",
-            "ipoReadError": None,
-            "laBuf": "3",
-        }
-    }
+    kept = {"Channel": 1, "SeekOffset": 12, "IpoGC": "G1", "ipoReadError": None, "laBuf": "3"}
+    tools = {"SelectedTool": tool, "ActiveTool": tool}
+    return {"HFBlockEvent": {"HFProbeCounter": counter, "GCode": text, **tools, **kept}}
 
 
 @pytest.fixture
@@ -235,9 +225,7 @@ def test_what_is_missing_is_said(document: dict[str, Any], tmp_path: Path) -> No
     ):
         assert part in said
     document["Footer"] = {"ErrorMessages": 7, "FilePathChain": []}
-    assert any(
-        "reports an error: 7" in note for note in sg.read_edge_json(write_edge(tmp_path / "a.json", document)).notes
-    )
+    assert "reports an error: 7" in " ".join(sg.read_edge_json(write_edge(tmp_path / "a.json", document)).notes)
     with pytest.raises(sg.RecordError, match=r"no ENC_POS\|2; recorded of axis 2 \(Y1\) are DES_POS"):
         capture.position(2, actual=True)
     with pytest.raises(sg.RecordError, match=r"no axis 'Q'; the file has 1 \(X1\), 2 \(Y1\)"):

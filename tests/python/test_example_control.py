@@ -125,7 +125,6 @@ def test_spindle_coolant_and_tool_change_come_in_order(session: Run) -> None:
 
 
 def test_set_points_keep_the_limits(session: Run) -> None:
-    """By differences, whatever the operator did."""
     positions = session.columns("{}_mm")
     for order, limit in ((1, MAX_SPEED), (2, MAX_ACCELERATION), (3, MAX_JERK)):
         found = np.abs(np.diff(positions, order, axis=0)).max() / PERIOD_S**order
@@ -216,11 +215,8 @@ def test_probe_and_what_comes_behind_it(built: Path, fast_contour: Path, tmp_pat
     assert "probe at X" in found.said
     positions = found.columns("{}_mm")
     touched = positions[at_second(found, 3.2)]
-    rests = (
-        at_second(found, 3.2)
-        + 1
-        + int(np.flatnonzero(~np.diff(positions[at_second(found, 3.2) :], axis=0).any(axis=1))[0])
-    )
+    begin = at_second(found, 3.2)
+    rests = begin + 1 + int(np.flatnonzero(~np.diff(positions[begin:], axis=0).any(axis=1))[0])
     # Behind the touch: 32 periods or an eighth of the lead, the stop at the limits, and the filters.
     assert np.linalg.norm(positions[rests] - touched) < 100.0 * (0.032 + 0.022 + 0.1)
     assert found.rows["set_point_off_um"][rests] < TOLERANCE_UM

@@ -105,9 +105,6 @@ def test_the_least_that_corrections_ask_for(ratio: float) -> None:
         machine_with({"tolerance.feed_excess_ratio": ratio})
 
 
-# ---- the judge itself ------------------------------------------------------------------------------------------------
-
-
 def circle(turns: int) -> list[Move]:
     lines = "\n".join(["G3I-10."] * turns)
     return interpret(f"G21G90G17G0X10.Y0Z0\nG1X10.001F600.\nG1X10.\n{lines}\nM30").cuts[2:]

@@ -1,8 +1,5 @@
-"""Feed schedules of random programs, held against a judge that shares no code with the scheduler.
-
-The judge computes engagement pointwise from the definition, forces with a tool of discs, and the feed that the machine
-really runs from the blocks of the written text.
-"""
+"""Feed schedules of random programs against a judge that shares no code with the scheduler: engagement from its
+definition, a tool of discs, the feed that the machine really runs from the blocks of the written text."""
 
 import math
 from dataclasses import dataclass

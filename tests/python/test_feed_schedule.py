@@ -38,20 +38,10 @@ corner_radius_mm = 8.0
 wall = "right"
 z_mm = [-15.0, 0.0]
 """
-CORNER = """%
-O1000
-G90 G54 G17 G21
-T1 M06
-S1800 M03
-G00 X-36. Y4. Z5.
-G01 Z-15. F2000.
-X4. F216. (ALONG THE WALL)
-G03 X8. Y8. R4.
-G01 Y38.
-G00 Z50.
-M30
-%
-"""
+CORNER = (
+    "%\nO1000\nG90 G54 G17 G21\nT1 M06\nS1800 M03\nG00 X-36. Y4. Z5.\nG01 Z-15. F2000.\nX4. F216. (ALONG THE WALL)\n"
+    "G03 X8. Y8. R4.\nG01 Y38.\nG00 Z50.\nM30\n%\n"
+)
 BOX = "[box]\nx_mm = [0.0, 30.0]\ny_mm = [-10.0, 10.0]\nz_mm = [-5.0, 0.0]\n"
 STRAIGHT_N = 35.03
 """Peak resultant of the straight cut at 216 mm/min."""

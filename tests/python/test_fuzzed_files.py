@@ -1,7 +1,5 @@
-"""Valid files of every kind with something wrong in them: read, or refused in words; no crash, no wait, no gigabytes.
-
-``python tests/python/test_fuzzed_files.py KIND FOLDER SEED COUNT`` reads one kind in this process and says what broke.
-"""
+"""Valid files with something wrong in them: read, or refused in words; no crash, no wait, no gigabytes. One kind here:
+``python tests/python/test_fuzzed_files.py KIND FOLDER SEED COUNT`` says what broke."""
 
 import gzip
 import io
@@ -294,7 +292,6 @@ def test_every_kind_is_in_the_list() -> None:
 
 
 def test_the_fuzzer_finds_what_it_is_for(tmp_path: Path) -> None:
-    """A reader that fails in each way: its failures are counted."""
     code = f"""
 import sys
 sys.path[:0] = {[str(TESTS / "python"), str(TESTS / "oracles")]!r}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import importlib.metadata
 import inspect
 import re
@@ -151,19 +152,32 @@ def test_headers_are_included_by_their_whole_path() -> None:
     assert offenders(cpp_files("include", "src"), is_short) == []
 
 
-def imported_modules(file: Path) -> set[str]:
-    """Top-level packages a Python file loads, anywhere in it; what is only for types does not count."""
-    found = set()
-    tree = ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
-    for node in ast.walk(tree):
+@functools.cache
+def names_in(file: Path) -> tuple[frozenset[str], frozenset[str], tuple[str, ...]]:
+    """Top-level packages that a Python file loads, own modules that it imports, also for types, and its classes."""
+    loaded, own, classes, for_types = set(), set(), [], set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), filename=str(file))):
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            node.body = []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[0] for alias in node.names}
+            for_types |= {*node.body}
+        elif isinstance(node, ast.ClassDef):
+            classes.append(node.name)
+        elif isinstance(node, ast.Import):
+            names = {alias.name for alias in node.names}
+            own |= names
+            loaded |= set() if node in for_types else names
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            found.add(node.module.split(".")[0])
-    return found
+            own |= {f"{node.module}.{alias.name}" for alias in node.names}
+            loaded |= set() if node in for_types else {node.module}
+    return (
+        frozenset(name.split(".")[0] for name in loaded),
+        frozenset(name for name in own if name.split(".")[0] == "shapegcode"),
+        tuple(classes),
+    )
+
+
+def own_imports(file: Path) -> frozenset[str]:
+    """Full names of the own modules that a Python file imports, anywhere in it."""
+    return names_in(file)[1]
 
 
 # The folders of the package from the bottom up: each may import what stands before it.
@@ -174,17 +188,6 @@ PACKAGE_ORDER = (
 PACKAGE_FOLDERS = PACKAGE_ORDER.split()
 # What stands at the root of the package; `errors` and the extension module may be imported by all.
 ROOT_MODULES = {"__init__", "__main__", "errors", "_core"}
-
-
-def own_imports(file: Path) -> set[str]:
-    """Full names of the own modules that a Python file imports, anywhere in it."""
-    found = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), filename=str(file))):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            found |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return {name for name in found if name.split(".")[0] == "shapegcode"}
 
 
 def test_the_root_of_the_package_stays_small() -> None:
@@ -226,7 +229,7 @@ def test_no_module_imports_itself_through_others() -> None:
 def users_of(package: str) -> set[str]:
     """The files of the package that load another one."""
     files = PACKAGE.rglob("*.py")
-    return {file.relative_to(PACKAGE).as_posix() for file in files if package in imported_modules(file)}
+    return {file.relative_to(PACKAGE).as_posix() for file in files if package in names_in(file)[0]}
 
 
 def test_only_plots_import_matplotlib() -> None:
@@ -420,9 +423,8 @@ def test_no_two_classes_share_a_name() -> None:
     classes = [value for name in sg.__all__ if inspect.isclass(value := getattr(sg, name))]
     homes = {value.__name__: ["core"] for value in classes if value.__module__ == "shapegcode._core"}
     for file in sorted(PACKAGE.rglob("*.py")):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ClassDef):
-                homes.setdefault(node.name, []).append(file.relative_to(PACKAGE).as_posix())
+        for name in names_in(file)[2]:
+            homes.setdefault(name, []).append(file.relative_to(PACKAGE).as_posix())
     assert {name: files for name, files in homes.items() if len(files) > 1} == {}
 
 

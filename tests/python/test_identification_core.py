@@ -66,7 +66,6 @@ def fit_from(force: FloatArray, response: FloatArray, **options: Any) -> _core.M
     return fit
 
 
-# --- Paper 003 -------------------------------------------------------------------------------------------------------
 REFERENCE = (5.0, 20.0, 4000.0)  # kg, N s/m, N/m
 REFERENCE_PERIOD_S = 0.005
 REFERENCE_COUNT = 1024
@@ -158,7 +157,6 @@ def test_equivalent_mass_of_paper_003(impulse: str) -> None:
     assert found.mass_kg == pytest.approx(5.0, rel=2e-3)
 
 
-# --- Against SciPy ---------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("quantity", ["acceleration", "velocity", "displacement"])
 def test_response_equals_lsim(quantity: str) -> None:
     random_force = np.random.default_rng(3).standard_normal(COUNT)
@@ -228,16 +226,8 @@ def test_decay_equals_scipy_least_squares() -> None:
         ]
         return np.asarray(sum(cosines) + own[4])
 
-    truth = np.array(
-        [
-            OMEGA[0],
-            ZETA[0],
-            OMEGA[1],
-            ZETA[1],
-            *np.r_[amplitude[0], 0.2, 0.1, 0.0],
-            *np.r_[amplitude[1], 0.3, -0.2, 0.05],
-        ]
-    )
+    shared = np.column_stack([OMEGA, ZETA]).ravel()
+    truth = np.r_[shared, amplitude[0], 0.2, 0.1, 0.0, amplitude[1], 0.3, -0.2, 0.05]
     records = [model(truth, r) + 0.02 * random.standard_normal(COUNT) for r in (0, 1)]
     starts = _core.poles_to_modes(list(_core.arma_decay(records, 2).poles), PERIOD_S)
     fit = _core.fit_decay(records, PERIOD_S, *starts)
@@ -258,7 +248,6 @@ def test_decay_equals_scipy_least_squares() -> None:
     np.testing.assert_allclose(fit.amplitude[0], np.hypot(other.x[4:8:2], other.x[5:8:2]), rtol=1e-4)
 
 
-# --- Repeated draws --------------------------------------------------------------------------------------------------
 def test_intervals_cover_at_forty_decibels() -> None:
     random = np.random.default_rng(11)
     inside = []
@@ -305,7 +294,6 @@ def test_intervals_hold_for_noise_on_the_force() -> None:
     assert np.mean(np.median(without, axis=0) / spread(draws)) < 0.6
 
 
-# --- Hard cases ------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("frequency_hz", "zeta", "mass_kg"),
     [
@@ -356,16 +344,12 @@ def test_a_mode_too_many_is_told() -> None:
     assert "told apart" in fit.reason
 
 
-# --- Refusals --------------------------------------------------------------------------------------------------------
 def test_refusals_carry_the_numbers() -> None:
     holed = RESPONSE.copy()
     holed[17] = np.nan
     start = (OMEGA, ZETA)
     cases: list[tuple[Any, str]] = [
-        (
-            lambda: _core.fit_modes([FORCE], [holed], PERIOD_S, *start),
-            "response of record 0 is not finite at sample 17",
-        ),
+        (lambda: _core.fit_modes([FORCE], [holed], PERIOD_S, *start), "record 0 is not finite at sample 17"),
         (lambda: _core.fit_modes([FORCE[:-1]], [RESPONSE], PERIOD_S, *start), "1499 samples of force and 1500"),
         (lambda: _core.fit_modes([0.0 * FORCE], [RESPONSE], PERIOD_S, *start), "zero throughout"),
         (lambda: _core.fit_modes([], [], PERIOD_S, *start), "no record"),

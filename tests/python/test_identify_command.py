@@ -272,14 +272,8 @@ def test_band_and_number_of_modes(capsys: pytest.CaptureFixture[str], taps: list
     result = asked(capsys, taps[0], "--modes", "2", "--frequencies", "20:300")
     assert result["order"] == 2
     assert len(result["modes"]) == 2
-    for words in (
-        ["--frequencies", "300:20"],
-        ["--frequencies", "20"],
-        ["--modes", "0"],
-        ["--start", "1"],
-        ["--force-scale", "0"],
-    ):
-        assert main(["identify", taps[0], *words]) == 2
+    for words in ("--frequencies 300:20", "--frequencies 20", "--modes 0", "--start 1", "--force-scale 0"):
+        assert main(["identify", taps[0], *words.split()]) == 2
         assert "must be" in capsys.readouterr().err
 
 

@@ -24,16 +24,7 @@ N01772Q1L1P48
 %
 """
 #: Entered and left along the tangent, as a ball bar's circle is: what is left is what the circle itself shows.
-BALL_BAR = """%
-O0001
-G21G90G17
-G0X-60.Y50.
-G1X0F4000
-G2J-50.
-G1X60.
-M30
-%
-"""
+BALL_BAR = "%\nO0001\nG21G90G17\nG0X-60.Y50.\nG1X0F4000\nG2J-50.\nG1X60.\nM30\n%\n"
 MODE = Mode(46.0, 0.02, 1.0)
 
 

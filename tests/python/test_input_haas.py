@@ -55,9 +55,6 @@ def test_a_program_in_which_nothing_differs_stays_as_it_is() -> None:
     assert program.expanded_text == fanuc.expanded_text == text.encode()
 
 
-# ---- words with a unit -----------------------------------------------------------------------------------------------
-
-
 def test_dwell() -> None:
     """P with a point is seconds, without one milliseconds: the source named in data/control/dialects.toml."""
     assert dwells(read("G04 P1.5\nG04 P500\nG4P.25\nG04 P2.")) == [1.5, 0.5, 0.25, 2.0]
@@ -92,9 +89,6 @@ def test_g10() -> None:
             read(word)
     with pytest.raises(sg.ProgramError, match="the origin of G52"):
         read("G10 L2 P0 X1.")
-
-
-# ---- offsets, subprograms, look-ahead --------------------------------------------------------------------------------
 
 
 def test_additional_work_offsets() -> None:

@@ -96,14 +96,8 @@ def test_random_programs_beside_another_interpreter(seeds: range) -> None:
         assert compare(text, moves_of_interpreter(text), program_of(text)) < 1e-3, seed
 
 
-ROUND_TRIP = [
-    "CONTOUR_R.NC",
-    "G17_18_19.NC",
-    "TEST_G90.NC",
-    "VINT_360arc.NC",
-    "helical_bore.nc",
-    "mixed_ijk_r_planes.nc",
-]
+ROUND_TRIP = ["CONTOUR_R.NC", "G17_18_19.NC", "TEST_G90.NC"]
+ROUND_TRIP += ["VINT_360arc.NC", "helical_bore.nc", "mixed_ijk_r_planes.nc"]
 
 
 def for_siemens(name: str) -> tuple[sg.Program, str]:

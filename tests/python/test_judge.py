@@ -20,9 +20,6 @@ def cuts(body: str, **options: Any) -> list[Move]:
     return interpret(HEAD + body, **options).cuts
 
 
-# ---- interpreter: arcs -------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("plane", ["G17", "G18", "G19"])
 @pytest.mark.parametrize("code", ["G2", "G3"])
 def test_quarter_turn_by_centre_and_by_radius(plane: str, code: str) -> None:
@@ -109,9 +106,6 @@ def test_arc_needs_known_plane_position() -> None:
     move = interpret("G91 G3 X1 Y1 J1 F100").cuts[0]
     assert np.isnan(move.end).all() and move.delta == pytest.approx([1, 1, 0])
     assert move.offsets(1.0)[0] == pytest.approx([1, 1, 0])
-
-
-# ---- interpreter: everything else --------------------------------------------------------------------------
 
 
 def test_decimal_point_notations() -> None:
@@ -203,9 +197,6 @@ def test_tape_format() -> None:
     assert result.lines[2].n_words == (10,)
 
 
-# ---- sample programs ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", SAMPLES)
 def test_sample_programs(name: str) -> None:
     text = read_sample(name)
@@ -232,9 +223,6 @@ def test_absolute_and_incremental_sample_are_the_same_part() -> None:
         # The incremental words are rounded on their own: Y-37.198 stands for a way of 37.199.
         assert other.delta[known] == pytest.approx(one.delta[known], abs=1.001e-3)
         assert one.sweep == pytest.approx(other.sweep)
-
-
-# ---- generator ---------------------------------------------------------------------------------------------
 
 
 @RANDOM

@@ -72,11 +72,7 @@ def test_a_faithful_conversion_is_acquitted(text: str) -> None:
     check_acquittal(text)
 
 
-@pytest.mark.slow
-@RANDOM
-@given(programs())
-def test_many_faithful_conversions_are_acquitted(text: str) -> None:
-    check_acquittal(text)
+test_many_faithful_conversions_are_acquitted = pytest.mark.slow(RANDOM(given(programs())(check_acquittal)))
 
 
 @pytest.mark.parametrize(

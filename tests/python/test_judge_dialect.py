@@ -52,9 +52,6 @@ def test_every_program_is_played() -> None:
                 assert np.allclose(a.end, b.start, atol=1e-9), (name, a, b)
 
 
-# ---- hand-computed places -------------------------------------------------------------------------------
-
-
 def test_bolt_circle() -> None:
     bottoms = [e for e in ends(moves_of("bolt_circle_g65"), "line")]
     assert len(bottoms) == 7
@@ -170,9 +167,6 @@ def test_holes_in_a_row_keep_their_levels() -> None:
     assert holes[-2:] == [(20, 48, -5), (40, 48, -5)]
 
 
-# ---- compensation by brute force ------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("name", "radius"),
     [
@@ -207,9 +201,6 @@ def with_radius_zero(text: str) -> str:
     for line in text.split("\n"):
         lines.append(line.partition("R")[0] + "R0" if line.startswith("G10L1") else line)
     return "\n".join(lines)
-
-
-# ---- alarms ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -33,9 +33,6 @@ def cuts(body: str, **options: Any) -> list[Move]:
     return interpret(HEAD + body, **options).cuts
 
 
-# ---- player ------------------------------------------------------------------------------------------------
-
-
 def test_ceil_blocks_start_on_a_tick() -> None:
     moves = cuts("G1 X1 F6000\nX1.25\nY10 F600")  # 100 mm/s: 10 ticks, 2.5 → 3 ticks; 10 mm/s: 1000 ticks
     points = play(moves)
@@ -92,9 +89,6 @@ def test_player_refuses_what_it_cannot_know() -> None:
         play(interpret(HEAD + "G0 X1").moves[1:])
     with pytest.raises(ValueError, match="not known"):
         play(interpret("G1 X1 F100").cuts)
-
-
-# ---- plant -------------------------------------------------------------------------------------------------
 
 
 def paper_path(speed: float, reduction: float, step_s: float) -> Vector:
@@ -190,9 +184,6 @@ def test_a_table_on_a_circle_swings_outwards() -> None:
     average = radius * (1 - math.sin(100 * half) / (100 * math.sin(half)))
     assert swing + average == pytest.approx(ratio / (1 - ratio) * (radius - average), abs=2e-4)
     assert ratio / (1 - ratio) * radius == pytest.approx(0.0235, abs=1e-4)
-
-
-# ---- contour error -----------------------------------------------------------------------------------------
 
 
 def test_contour_error_of_displaced_points() -> None:

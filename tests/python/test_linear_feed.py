@@ -35,8 +35,6 @@ def converted(form: str, text: str = PATH) -> sg.Conversion:
     return sg.convert(text, machine, shape_all=True)
 
 
-# ---- the law ---------------------------------------------------------------------------------------------------------
-
 SPEEDS = [(10.0, 20.0), (20.0, 10.0), (100.0, 101.0), (50.0, 50.0), (1.0, 200.0), (200.0, 1.0)]
 
 
@@ -64,9 +62,6 @@ def test_positions_of_arcs_and_lines() -> None:
     found = _core.linear_positions_mm(np.zeros(3), [line, arc], times)
     middle = [3.0 + 2.0 * math.sin(math.pi / 4.0), 2.0 - 2.0 * math.cos(math.pi / 4.0), 0.0]
     assert np.allclose(found, [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], middle, [5.0, 2.0, 0.0]], atol=1e-12)
-
-
-# ---- what is written -------------------------------------------------------------------------------------------------
 
 
 def test_fewer_blocks_the_same_command_and_no_vibration() -> None:

@@ -76,7 +76,7 @@ def test_no_maximum_of_the_residual_over_a_band_is_missed() -> None:
     swept = _Band(band, times_s)
     fine = np.linspace(swept.low, swept.high, 20_001)
     random = np.random.default_rng(5)
-    for _ in range(300):
+    for _ in range(100):
         taps = random.dirichlet(np.full(times_s.size, 0.2))
         most = float(np.abs(swept.residual(taps, fine)).max())
         found = float(np.abs(swept.peaks(taps)[1]).max())

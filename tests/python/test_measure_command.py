@@ -10,6 +10,7 @@ import pytest
 
 import shapegcode as sg
 from acceptance import machine_with
+from command import run
 from shapegcode.cli import main
 from shapegcode.results.json import schema
 
@@ -31,6 +32,13 @@ def measured(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> 
     jsonschema.validate(report, schema(sg.Measurement))
     assert report["ok"] is (code == 0)
     return report
+
+
+def told(folder: Path, *words: str, code: int = 0, machine: str = "vx500", width: str = "80") -> str:
+    """What the command prints."""
+    done = run(folder, "measure", *words, "-m", machine, "--tool-diameter", "3mm", COLUMNS=width)
+    assert done.returncode == code, done.stderr
+    return done.stdout
 
 
 def test_json_of_two_programs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -66,13 +74,8 @@ def test_exit_code_says_whether_the_tolerance_is_kept(folder: Path, capsys: pyte
     assert [each["ok"] for each in report["programs"]] == [None, False]
 
 
-def test_table_like_a_measuring_report(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "120")
-    words = ["measure", "part.nc", "shaped.nc", "-m", "vx500", "--tool-diameter", "3mm", "--plots", "plots"]
-    assert main(words) == 0
-    said = capsys.readouterr().out
+def test_table_like_a_measuring_report(folder: Path) -> None:
+    said = told(folder, "part.nc", "shaped.nc", "--plots", "plots", width="120")
     for text in (
         "2 arc R20, line 6", "inside wall mm (deviation µm)", "18.500", "cut-width band left / right µm",
         "Ra left / right µm", "settled to 1 µm X / Y / Z ms", "next: ",
@@ -89,18 +92,15 @@ def test_table_like_a_measuring_report(
     assert "shaped.nc" in picture
 
 
-def test_deviations_along_z_are_above_and_below(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "120")
+def test_deviations_along_z_are_above_and_below(folder: Path) -> None:
     # A mode of Z alone, a cut along X and a ramp: what Z does is neither left nor right.
     (folder / "ramp.nc").write_text("%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X10.F3000\nX20.Z-5.\nX30.\nM30\n%\n")
     modes = [{"frequency_hz": 30.0, "damping_ratio": 0.02}]
     other = sg.Machine.load("vx500").with_values({"axes.z.modes": modes, "axes.x.modes": []})
     (folder / "z.toml").write_text(other.to_toml())
-    words = ["measure", "ramp.nc", "-m", "z.toml", "--tool-diameter", "3mm", "--set", "tolerance.contour_um=500"]
-    assert main([*words, "--json", "z.json"]) == 0
-    said = capsys.readouterr().out
+    said = told(
+        folder, "ramp.nc", "--set", "tolerance.contour_um=500", "--json", "z.json", machine="z.toml", width="120"
+    )
     assert "above / below µm" in said
     assert "peak vibration X / Y / Z µm" in said
     last = json.loads((folder / "z.json").read_text())["programs"][0]["sections"][2]
@@ -112,31 +112,22 @@ def test_deviations_along_z_are_above_and_below(
     assert last["peak_vibration_um"]["z"] > 1.0
 
 
-def test_exit_code_1_is_explained(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["measure", "part.nc", "-m", "vx500", "--tool-diameter", "3mm"]
-    assert main([*words, "--json", "m.json"]) == 1
+def test_exit_code_1_is_explained(folder: Path) -> None:
+    said = told(folder, "part.nc", "--json", "m.json", code=1)
     largest = json.loads((folder / "m.json").read_text())["programs"][0]["contour_error_um"]["response"]["max"]
-    said = capsys.readouterr().out
     assert (
-        f"part.nc: OUT OF TOLERANCE by {largest - 20.0:.2f} µm: deviates from the path by up to {largest:.2f} µm"
-        in said
+        f"part.nc: OUT OF TOLERANCE by {largest - 20.0:.2f} µm: deviates from the path by up to {largest:.2f}" in said
     )
     assert "limit 20 µm (tolerance.contour_um), in section 2 arc R20, line 6" in said
-    assert main(["measure", "part.nc", "shaped.nc", *words[2:], "--plant", "feed-drive"]) == 1
-    said = capsys.readouterr().out
+    said = told(folder, "part.nc", "shaped.nc", "--plant", "feed-drive", code=1)
     assert "shaped.nc: OUT OF TOLERANCE" in said
     assert "part.nc: OUT OF TOLERANCE" not in said
     assert "next: servo lag moves the table" in said
     assert "convert again" not in said
 
 
-def test_summary_has_the_worst_of_each_figure_and_its_place(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "200")
-    words = ["measure", "part.nc", "shaped.nc", "-m", "vx500", "--tool-diameter", "3mm", "--json", "m.json"]
-    assert main(words) == 0
-    said = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ")
+def test_summary_has_the_worst_of_each_figure_and_its_place(folder: Path) -> None:
+    said = told(folder, "part.nc", "shaped.nc", "--json", "m.json", width="200").replace("\N{NO-BREAK SPACE}", " ")
     assert said.index("worst figures on") < said.index("sections measured on")
     rows = {row[0]: row for line in said.splitlines() if len(row := re.split(r"  +", line.strip())) == 3}
     for column, program in enumerate(json.loads((folder / "m.json").read_text())["programs"], start=1):

@@ -10,21 +10,10 @@ from command import run
 
 MACHINE = sg.Machine.load("vx500")
 HEAD = "%\nO0001\nG90 G21 G17 G54\n"
-LATHE = """%
-O0010 (TURN THE SHAFT, Y IS NOT THERE)
-G50 S2500
-T0101
-G96 S200 M03
-G00 X52. Z2. M08
-G71 U2. R1.
-G71 P100 Q200 U0.5 W0.1 F0.3
-N100 G00 X20.
-G01 Z-30. F0.15
-N200 X52.
-G70 P100 Q200
-M30
-%
-"""
+LATHE = (
+    "%\nO0010 (TURN THE SHAFT, Y IS NOT THERE)\nG50 S2500\nT0101\nG96 S200 M03\nG00 X52. Z2. M08\nG71 U2. R1.\n"
+    "G71 P100 Q200 U0.5 W0.1 F0.3\nN100 G00 X20.\nG01 Z-30. F0.15\nN200 X52.\nG70 P100 Q200\nM30\n%\n"
+)
 
 
 def warnings(text: str, **values: object) -> list[str]:

@@ -326,9 +326,6 @@ def test_without_walls_there_is_nothing_to_draw() -> None:
         sg.plot_walls(plunge)
 
 
-# ---- specimens of paper 000: docs/evidence/paper000.md ------------------------------------------------------
-
-
 def specimen(feed: int, name: str) -> MeasuredRegion:
     found: MeasuredRegion = run_page("evidence/paper000.md")["cases"][feed, name]
     return found

@@ -38,9 +38,6 @@ def machine_with(over: str, nominal: float = 46.0, more: str = "") -> Machine:
     return Machine.from_toml(text.replace("# part_mass_kg = ...", more, 1), "m.toml")
 
 
-# --- The machine file -------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("over", [OVER_Z, OVER_MASS])
 def test_a_table_survives_being_written(over: str) -> None:
     machine = machine_with(over)
@@ -75,9 +72,6 @@ def test_bad_tables_are_refused_in_words(over: str, nominal: float, said: str) -
         machine_with(over, nominal)
     assert said in str(caught.value)
     assert "axes.x.modes.1" in str(caught.value)
-
-
-# --- What the tables say ----------------------------------------------------------------------------------------------
 
 
 @given(st.floats(-100.0, 500.0))
@@ -156,9 +150,6 @@ def test_modes_over_two_axes_are_refused() -> None:
         shaper_track(Machine.load("vx500"), 0.005)
 
 
-# --- The plant --------------------------------------------------------------------------------------------------------
-
-
 def test_the_plant_solves_the_varying_equation() -> None:
     """Against SciPy's solution of u'' + 2 zeta w(z) u' + w(z)^2 u = 2 zeta w(z) x' + w(z)^2 x, w at the moving z."""
     tick, count = 0.001, 500
@@ -189,9 +180,6 @@ def test_the_plant_solves_the_varying_equation() -> None:
         largest = max(largest, abs(state[0] - x[k + 1]))
     assert largest > 0.3
     assert worst < 5e-5 * largest  # Z travels at up to 2.6 m/s; the error falls with the square of the tick
-
-
-# --- Filters that vary ------------------------------------------------------------------------------------------------
 
 
 def same_zero() -> list[Fir]:
@@ -250,9 +238,6 @@ def test_varying_filters_by_step_and_by_batch_agree_and_refuse() -> None:
         FollowingFir(varying, 1, [0.0, 2.0, 1.0, 3.0])
 
 
-# --- Tracks -----------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("period_s", [0.002, 0.005])
 @pytest.mark.parametrize("limit", [0.01, 0.003])
 def test_a_track_keeps_its_limit_everywhere(period_s: float, limit: float) -> None:
@@ -304,16 +289,15 @@ def test_tracks_refuse_what_they_cannot_do() -> None:
     moving = [MovingMode(scenario.MODE, scenario.TABLE)]
     with pytest.raises(ArgumentError, match="at least one mode"):
         design_track([], 2, (0.0, 400.0), 0.005)
-    with pytest.raises(ArgumentError, match="must be finite and ascend"):
-        design_track(moving, 2, (400.0, 0.0), 0.005)
-    with pytest.raises(ArgumentError, match="can follow one axis"):
-        design_track(moving, 1, (0.0, 400.0), 0.005)
-    with pytest.raises(ArgumentError, match="must be above 0"):
-        design_track(moving, 2, (0.0, 400.0), 0.005, residual_limit=0.0)
-    with pytest.raises(DesignError, match="more than 4 are not tried"):
-        design_track(moving, 2, (0.0, 400.0), 0.005, residual_limit=1e-4, most_nodes=4)
-    with pytest.raises(DesignError, match="no non-negative design within"):
-        design_track(moving, 2, (0.0, 400.0), 0.005, 0.006)
+    for error, axis, bounds, options, said in (
+        (ArgumentError, 2, (400.0, 0.0), {}, "must be finite and ascend"),
+        (ArgumentError, 1, (0.0, 400.0), {}, "can follow one axis"),
+        (ArgumentError, 2, (0.0, 400.0), {"residual_limit": 0.0}, "must be above 0"),
+        (DesignError, 2, (0.0, 400.0), {"residual_limit": 1e-4, "most_nodes": 4}, "more than 4 are not tried"),
+        (DesignError, 2, (0.0, 400.0), {"max_duration_s": 0.006}, "no non-negative design within"),
+    ):
+        with pytest.raises(error, match=said):
+            design_track(moving, axis, bounds, 0.005, **options)
     single = design_track(moving, 2, (100.0, 100.0), 0.005)
     assert [node.modes for node in single.nodes] == [(Mode(49.0, 0.02),)]
 
@@ -325,9 +309,6 @@ def test_a_machine_gets_its_track() -> None:
     assert [mode.frequency_hz for mode in track.nodes[0].modes] == [52.0, 131.0]
     assert track.worst_residual <= 0.01
     assert track.duration_s < 0.03
-
-
-# --- A program --------------------------------------------------------------------------------------------------------
 
 
 def test_a_zig_zag_along_z_leaves_next_to_nothing_at_its_stops() -> None:

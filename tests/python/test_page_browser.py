@@ -67,7 +67,6 @@ def test_it_forbids_itself_connections_and_foreign_scripts(small: Browser) -> No
 
 
 def test_texts_of_others_stay_texts(small: Browser) -> None:
-    """A comment and a file name that are HTML are read as they stand, and nothing of them runs."""
     assert small.js("return window.broken") is None
     assert NAME in small.one("h1").text
     small.one("[data-show=original]").click()
@@ -201,7 +200,6 @@ def test_curves_say_which_file_they_miss(chrome: Browser, folder: Path, tmp_path
 
 
 def test_on_paper_it_has_four_pages(chrome: Browser, folder: Path) -> None:
-    """The run sheet is one of them, by itself; the path is drawn on another."""
     chrome.open(folder / "large.html", SEEN)
     data = chrome.cdp("Page.printToPDF", preferCSSPageSize=True, printBackground=True)["data"]
     paper = pypdf.PdfReader(io.BytesIO(base64.b64decode(data)))
@@ -240,7 +238,6 @@ def test_dark_colours_by_system_and_by_button(chrome: Browser, folder: Path) -> 
 
 @pytest.mark.parametrize("colours", ["light", "dark"])
 def test_it_has_no_barriers(chrome: Browser, folder: Path, colours: str) -> None:
-    """By axe-core: nothing serious, nothing critical."""
     chrome.open(folder / "small.html", SEEN)
     if colours == "dark":
         chrome.one("#theme").click()

@@ -258,7 +258,6 @@ def test_on_paper_are_the_shaped_cuts(chrome: Browser, folder: Path, page: str) 
 
 @pytest.mark.parametrize("colours", ["light", "dark"])
 def test_it_has_no_barriers(chrome: Browser, folder: Path, colours: str) -> None:
-    """By axe-core, with the calm light; a phone does not scroll sideways."""
     chrome.open(folder / "few.html")
     if colours == "dark":
         chrome.one("#theme").click()

@@ -133,8 +133,6 @@ def test_the_shared_script_is_written_once(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_pictures_of_many_points_stay_small() -> None:
-    """What is dense is drawn as pixels; letters and axes stay lines."""
-
     def noise(ax: Any = None) -> Any:
         panel = axes(ax, title="noise")
         panel.plot(np.random.default_rng(1).normal(size=200_000))

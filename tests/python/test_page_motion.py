@@ -122,7 +122,6 @@ def test_a_click_on_the_path_finds_the_line(small: Browser) -> None:
 
 
 def test_a_click_on_a_line_finds_its_place(small: Browser) -> None:
-    """Of the original and of what was emitted; keys go from line to line."""
     small.one("#magnify").send_keys(Keys.HOME)
     small.click_line("original", DOWN)
     assert marked(small, "original") == (DOWN, LINES[DOWN - 1])
@@ -146,8 +145,6 @@ def test_a_click_on_a_line_finds_its_place(small: Browser) -> None:
 
 
 def test_programs_are_shown_one_or_both(small: Browser) -> None:
-    """In the picture, in the texts and in the figures."""
-
     def colours() -> tuple[int, int]:
         seen = small.pixels("#view")
         orange = (abs(seen - [0xF2, 0x8E, 0x3C]) < 12).all(axis=2)
@@ -171,8 +168,6 @@ def test_programs_are_shown_one_or_both(small: Browser) -> None:
 
 
 def test_deviation_is_drawn_as_large_as_it_says(small: Browser, folder: Path) -> None:
-    """The tip of the corner moves by the factor: the table shoots beyond it."""
-
     def top() -> int:
         small.js("scenePage.stage.marks = []; scenePage.stage.drawNow()")
         # Letters are grey.

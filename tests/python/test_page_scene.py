@@ -104,7 +104,6 @@ def test_the_deviation_is_the_distance_from_the_line(tmp_path: Path) -> None:
 
 
 def test_two_programs_are_measured_against_the_same_path(tmp_path: Path) -> None:
-    """What was emitted is held against the original's path, and its lines are linked with the original's."""
     machine = sg.Machine.load("vx500")
     part = program(tmp_path, machine)
     result = sg.convert(part, machine)
@@ -132,7 +131,6 @@ def unpacked(column: dict[str, float], body: bytes) -> np.ndarray:
 
 
 def test_packed_numbers_come_back() -> None:
-    """Whole numbers exactly, others within half a rank of their range; texts as they are."""
     rng = np.random.default_rng(7)
     count = 301
     xyz = rng.normal(size=(count, 3)) * 100.0

@@ -401,26 +401,8 @@ def test_identify_asks_or_fails(
     assert len(sg.Machine.load(started).axes.y.modes) == 1
 
 
-PART = """%
-O0001
-G21G90G17
-G0X0Y0
-G1X50.F6000
-G3X65.Y15.J15.
-G1Y40.
-M30
-%
-"""
-CIRCLE = """%
-O0001
-G21G90G17
-G0X-60.Y50.
-G1X0F4000
-G2J-50.
-G1X60.
-M30
-%
-"""
+PART = "%\nO0001\nG21G90G17\nG0X0Y0\nG1X50.F6000\nG3X65.Y15.J15.\nG1Y40.\nM30\n%\n"
+CIRCLE = "%\nO0001\nG21G90G17\nG0X-60.Y50.\nG1X0F4000\nG2J-50.\nG1X60.\nM30\n%\n"
 
 
 def unmeasured_machine(keys: dict[str, Any], remarks: dict[str, str]) -> sg.Machine:

@@ -1,8 +1,5 @@
-"""Programs at random, converted by the package and judged by an interpreter, a player and a plant that share nothing
-with it: the same motion, the same figures, the same time, and no more speed than is programmed.
-
-A seed gives one program: `PYTHONPATH=tests/oracles python -c "from judge.draws import draw; print(draw(7).text)"`.
-"""
+"""Programs at random against an interpreter, a player and a plant that share nothing with the package. One of a seed:
+`PYTHONPATH=tests/oracles python -c "from judge.draws import draw; print(draw(7).text)"`."""
 
 import re
 from collections.abc import Callable
@@ -61,8 +58,6 @@ def test_what_is_drawn() -> None:
     sizes = [item.radius for each in drawn for item in play(each.text, work_offsets=offsets) if item.kind == "arc"]
     assert min(sizes) < 0.05 and max(sizes) > 10.0
 
-
-# ---- a wrong text or a wrong report is noticed -----------------------------------------------------------------------
 
 SEED = 3  # lines, arcs, helices and a reversal in inches
 

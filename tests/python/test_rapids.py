@@ -52,18 +52,10 @@ M30
 """
 
 
-CUT_BETWEEN = """G90 G21 G17 G40
-G00 X0. Y0.
-Z50.
-Z2.
-G01 Z-1. F500
-X20. F1000
-G00 Z2.
-X80. Y30.
-G01 Z-1. F500
-X100.
-M30
-"""
+CUT_BETWEEN = (
+    "G90 G21 G17 G40\nG00 X0. Y0.\nZ50.\nZ2.\nG01 Z-1. F500\nX20. F1000\nG00 Z2.\nX80. Y30.\nG01 Z-1. F500\nX100.\n"
+    "M30\n"
+)
 
 
 def with_tables(machine: Machine, **tables: dict[str, Any]) -> Machine:

@@ -1,7 +1,5 @@
-"""Our models of LinuxCNC's and Klipper's planners beside what was recorded of them: residual vibration, block times.
-
-Recordings: tests/benchmarks/data/recorded_planners.npz (its README says of what) and tests/golden/linuxcnc.
-"""
+"""Our models of LinuxCNC's and Klipper's planners beside recordings of them (tests/golden/linuxcnc, and
+tests/benchmarks/data/recorded_planners.npz, whose README says of what): residual vibration, block times."""
 
 import gzip
 import json

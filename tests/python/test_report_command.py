@@ -25,7 +25,6 @@ def converted(folder: Path, *words: str) -> Path:
 
 
 def test_the_page_holds_the_json_and_both_programs(tmp_path: Path) -> None:
-    """The JSON of the page is that of --json; its motion is of both programs."""
     report = converted(tmp_path, "--html", "page.html")
     found = pieces(tmp_path / "page.html")
     assert found["result"] == json.loads(report.read_text())
@@ -41,7 +40,6 @@ def test_the_page_holds_the_json_and_both_programs(tmp_path: Path) -> None:
 
 
 def test_a_page_made_later_is_the_same(tmp_path: Path) -> None:
-    """From the JSON and the programs, wherever they are beside each other, the same motion."""
     converted(tmp_path, "--html", "page.html", "--set", "tolerance.contour_um=15", "--shaper", "zvd")
     done = run(tmp_path, "report", "r.json", "--json", "said.json")
     assert done.returncode == 0, done.stdout + done.stderr
@@ -74,7 +72,6 @@ def test_a_page_made_later_is_the_same(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_what_has_changed_since_is_said_on_the_page_and_here(change: Any, said: str, tmp_path: Path) -> None:
-    """The page is made all the same, says it, and the exit code is 1."""
     converted(tmp_path)
     change(tmp_path)
     done = run(tmp_path, "report", "r.json")
@@ -90,7 +87,6 @@ def edit(file: Path, **values: object) -> None:
 
 
 def test_what_is_no_result_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
-    """A file cut off, one without `provenance`, two pages into one file, a page over its own JSON."""
     file = converted(tmp_path)
     whole = file.read_text()
     (tmp_path / "cut.json").write_text(whole[:500])
@@ -118,7 +114,6 @@ def test_what_is_no_result_is_refused_and_nothing_is_written(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("words", ["simulate", "time", "check", "measure --tool-diameter 10mm"])
 def test_every_command_of_a_program_shows_its_motion(words: str, tmp_path: Path) -> None:
-    """--html of the others: the page has their JSON and the path."""
     (tmp_path / "part.nc").write_text(PART)
     command, *more = words.split()
     done = run(tmp_path, command, "part.nc", "-m", "vx500", *more, "--json", "r.json", "--html", "p.html")
@@ -130,7 +125,6 @@ def test_every_command_of_a_program_shows_its_motion(words: str, tmp_path: Path)
 
 
 def test_programs_of_one_file_have_a_page_each(tmp_path: Path) -> None:
-    """With --program all: one page for each, named after its program; later likewise."""
     second = PART.replace(f"O0001 {COMMENT}", "O0002")
     (tmp_path / "part.nc").write_text(PART.removesuffix("%\n") + second.removeprefix("%\n"))
     words = ("time", "part.nc", "-m", "vx500", "--program", "all", "--json", "r.json", "--html", "p.html")
@@ -141,7 +135,6 @@ def test_programs_of_one_file_have_a_page_each(tmp_path: Path) -> None:
 
 
 def test_the_report_from_python(tmp_path: Path) -> None:
-    """`result.report(path)` writes the page without the command."""
     (tmp_path / "part.nc").write_text(PART)
     result = sg.cycle_time(tmp_path / "part.nc", sg.Machine.load("vx500"))
     assert result.report(tmp_path / "p.html") == [str(tmp_path / "p.html")]

@@ -102,7 +102,6 @@ def test_every_class_of_results_is_found() -> None:
 
 
 def test_a_result_is_what_its_schema_says(shown: Shown, schemas: Path) -> None:
-    """The file of the schema alone, as another program would read it; a key more or less is refused."""
     written = json.loads(shown.json.read_text())
     validator = jsonschema.Draft202012Validator(json.loads((schemas / f"{shown.name}.json").read_text()))
     validator.validate(written)
@@ -111,7 +110,6 @@ def test_a_result_is_what_its_schema_says(shown: Shown, schemas: Path) -> None:
 
 
 def test_a_result_comes_back_from_its_json(shown: Shown) -> None:
-    """The same class, answer and numbers; read from the file alone."""
     written = json.loads(shown.json.read_text())
     beside = {key: written.pop(key) for key in ("provenance", "plots", "output") if key in written}
     assert beside["provenance"]["result"] == shown.name
@@ -127,7 +125,6 @@ def test_a_result_comes_back_from_its_json(shown: Shown) -> None:
 
 
 def test_its_page_holds_its_json(shown: Shown) -> None:
-    """To the last digit."""
     assert pieces(shown.page)["result"] == json.loads(shown.json.read_text())
 
 
@@ -148,7 +145,6 @@ def test_output_fits_80_columns_and_begins_with_the_answer(shown: Shown) -> None
 
 
 def test_what_the_json_does_not_hold_says_so(tmp_path: Path) -> None:
-    """No silent emptiness in place of programs and samples."""
     result: Any = load_result(made(tmp_path, "Conversion"))
     with pytest.raises(NotKeptError, match="placed: the JSON of a result does not contain it"):
         len(result.placed)
@@ -179,14 +175,12 @@ def edited(file: Path, change: Any) -> Path:
     ],
 )  # fmt: skip
 def test_a_json_of_another_kind_names_the_key(change: Any, said: str, tmp_path: Path) -> None:
-    """The file, the key, the value and what it must be."""
     file = edited(made(tmp_path, "CycleTime"), change)
     with pytest.raises(sg.ArgumentError, match=f"r.json: {said}"):
         load_result(file)
 
 
 def test_a_file_that_was_cut_off_says_where(tmp_path: Path) -> None:
-    """A truncated file, an empty one, one of several results, and one of something else."""
     file = made(tmp_path, "CycleTime")
     text = file.read_text()
     file.write_text(text[: len(text) // 2])
@@ -207,7 +201,6 @@ def test_a_file_that_was_cut_off_says_where(tmp_path: Path) -> None:
 
 
 def test_results_for_notebooks_and_tables(tmp_path: Path) -> None:
-    """HTML, pandas and xarray say what the result says."""
     (tmp_path / "a<b>.nc").write_text(PART)
     machine = sg.Machine.load("vx500")
     time = sg.cycle_time(tmp_path / "a<b>.nc", machine)
@@ -262,7 +255,6 @@ def test_keys_of_the_version_before_are_read(kept: Callable[[str], Shown], tmp_p
 
 
 def test_names_of_the_version_before_are_free() -> None:
-    """An old name leads to a field or property that is there, and is none itself."""
     classes = {cls.__name__: cls for cls in with_old_names(OldNames)}
     assert RENAMED.keys() <= classes.keys()
     for name, fields in RENAMED.items():

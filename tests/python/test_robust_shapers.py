@@ -61,9 +61,6 @@ def least_possible(bands: Sequence[ModeBand], period_s: float, last: int) -> flo
     return float((weights / weights.sum() @ matrix).min())
 
 
-# --- the optimum --------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("bands", "period_s", "last"),
     [
@@ -210,9 +207,6 @@ def test_sweep_bound_holds_against_a_dense_sweep() -> None:
         assert dense * (1.0 - 1e-12) <= proven_worst(shaper, bands) <= dense * (1.0 + 2e-4) + 2e-7
 
 
-# --- what is refused ----------------------------------------------------------------------------------------
-
-
 def test_refusal_shows_the_nearest() -> None:
     with pytest.raises(DesignError) as failed:
         minimax_robust(PAPER_BANDS, 0.005, vibration_limit=0.01, max_duration_s=0.02)
@@ -282,9 +276,6 @@ def test_a_solver_that_gives_up_is_asked_again(monkeypatch: pytest.MonkeyPatch) 
         least_worst(PAPER_BANDS, 0.005, 0.03)
 
 
-# --- the block period ---------------------------------------------------------------------------------------
-
-
 def test_robust_grid_compares_the_periods() -> None:
     choice = choose_block_period(PAPER_BANDS, 0.001, 0.002, max_block_period_s=0.008)
     assert [round(each.period_s * 1e3) for each in choice.candidates] == [2, 3, 4, 5, 6, 7, 8]
@@ -335,9 +326,6 @@ def test_family_of_the_registry() -> None:
         design("robust", PAPER_BANDS, DesignOptions(period_s=0.005, max_duration_s=0.02))
     with pytest.raises(DesignError, match=r"no mode has a band to design for .*up to 0\.2 % count as exact"):
         design("robust", [ModeBand(Mode(46.0, 0.02))], options)
-
-
-# --- beside EI shapers --------------------------------------------------------------------------------------
 
 
 def test_better_than_convolved_extra_insensitive_shapers_at_no_greater_duration() -> None:

@@ -34,12 +34,8 @@ def simulated(way: FloatArray, dead_s: float, gain: float, forward: float) -> Fl
     time = np.arange(len(way)) * 1e-4
     way = np.interp(time, time[::20], way[::20])
     late = np.interp(np.arange(len(way)) * 1e-4 - dead_s, np.arange(len(way)) * 1e-4, way)
-    return (
-        np.asarray(
-            lsim(([forward, gain] if forward else [gain], [1.0, gain]), late - way[0], np.arange(len(way)) * 1e-4)[1]
-        )
-        + way[0]
-    )
+    system = ([forward, gain] if forward else [gain], [1.0, gain])
+    return np.asarray(lsim(system, late - way[0], time)[1]) + way[0]
 
 
 def capture(path: Path, axes: dict[int, tuple[FloatArray, FloatArray]], noise: float = 0.0) -> Path:

@@ -45,7 +45,6 @@ def answered(folder: Path, text: str = ANSWERS, name: str = "a.toml", code: int 
 
 
 def test_answers_become_a_short_file_that_says_why(tmp_path: Path) -> None:
-    """What was answered stands in it, what nobody said is a default or marked as assumed."""
     said = answered(tmp_path)
     text = (tmp_path / "m.toml").read_text()
     assert len(text.partition("[origin]")[0].splitlines()) < 45
@@ -67,7 +66,6 @@ def test_answers_become_a_short_file_that_says_why(tmp_path: Path) -> None:
 
 
 def test_a_name_is_an_answer(tmp_path: Path) -> None:
-    """Of a machine of which only the name is said, one value is answered."""
     said = answered(tmp_path, 'name = "A"\n')
     assert json.loads((tmp_path / "r.json").read_text())["answered"] == ["name"]
     assert "1 value answered" in said.splitlines()[0]
@@ -89,7 +87,6 @@ def test_the_short_file_converts_like_the_full_one(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", sg.Machine.builtin_names())
 def test_init_writes_the_short_form_of_the_same_machine(name: str, tmp_path: Path) -> None:
-    """Short and full have the same values and the same origins where something was said."""
     for words in ([], ["--full"]):
         assert run(tmp_path, "machine", "init", name, "-o", f"m{len(words)}.toml", *words).returncode == 0
     short, full = (sg.Machine.load(tmp_path / f"m{count}.toml") for count in (0, 1))
@@ -104,7 +101,6 @@ def test_init_writes_the_short_form_of_the_same_machine(name: str, tmp_path: Pat
 
 
 def test_a_dump_and_a_tap_test_are_read(tmp_path: Path) -> None:
-    """Limits come from the control's parameters, modes from a record; what was said besides goes before the dump."""
     dump = ROOT / "tests" / "golden" / "parameters" / "with_q.txt"
     (tmp_path / "taps").mkdir()
     (tmp_path / "taps" / "CNC-PARA.TXT").write_bytes(dump.read_bytes())
@@ -141,7 +137,6 @@ def test_a_dump_and_a_tap_test_are_read(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_bad_answers_are_refused_and_nothing_is_written(text: str, said: str, tmp_path: Path) -> None:
-    """The question, the value and the limit; exit code 2."""
     assert said in answered(tmp_path, text, code=2)
     assert not (tmp_path / "m.toml").exists()
 
@@ -153,7 +148,6 @@ def test_a_line_of_unknown_speed_is_a_warning(tmp_path: Path) -> None:
 
 
 def test_an_existing_file_stays(tmp_path: Path) -> None:
-    """Also without a terminal the reason is said."""
     (tmp_path / "m.toml").write_text("mine")
     assert "--force overwrites it" in answered(tmp_path, code=2)
     assert (tmp_path / "m.toml").read_text() == "mine"
@@ -172,7 +166,6 @@ def typed() -> Iterator[Any]:
 
 
 def test_the_dialogue_asks_until_the_answers_do(typed: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    """Choices by arrow keys, numbers by typing; a bad one is not taken; each answer is explained."""
     keys = [
         "VMC-3" + ENTER,  # name
         DOWN + ENTER,  # control: fanuc
@@ -298,7 +291,6 @@ def at_a_terminal(folder: Path, *words: str) -> str:
 
 
 def test_giving_up_writes_nothing(typed: Any) -> None:
-    """Ctrl-C ends the dialogue as it ends every command."""
     typed.send_text("VMC-3" + ENTER + "\x03")
     with pytest.raises(KeyboardInterrupt):
         ask_all()
@@ -343,7 +335,6 @@ def test_without_any_mode_the_axis_to_tap_first_is_named(tmp_path: Path) -> None
 
 
 def test_diff_names_what_differs(tmp_path: Path) -> None:
-    """Key, both values with unit, where they come from; exit code 1."""
     answered(tmp_path)
     machine = sg.Machine.load(tmp_path / "m.toml").with_values({"controller.dnc_baud": 19200, "name": "OTHER"})
     (tmp_path / "n.toml").write_text(machine.to_toml(short=True))
@@ -403,7 +394,6 @@ def test_the_schema_takes_what_is_written_and_documented(tmp_path: Path) -> None
 
 
 def test_the_schema_says_unit_and_parameter() -> None:
-    """What an editor shows beside a key."""
     axis = toml_schema(sg.Machine, "")["$defs"]["Axis"]["properties"]
     assert axis["rapid_mm_per_min"]["description"] == "rapid traverse (G00) [mm/min] (FANUC parameter 1420)"
     assert axis["rapid_mm_per_min"]["exclusiveMinimum"] == 0

@@ -47,9 +47,6 @@ designs = st.builds(
 )
 
 
-# --- Pareto front -------------------------------------------------------------------------------------------
-
-
 def dominates(one: Design, other: Design) -> bool:
     if one.period_s is None and other.period_s is not None:
         return False  # it cannot be written on a grid
@@ -76,9 +73,6 @@ def test_pareto_front_of_a_real_comparison() -> None:
     expected = [not any(dominates(one, other) for one in result.designs) for other in result.designs]
     assert [each.pareto for each in result.designs] == expected
     assert pareto_front([]) == []
-
-
-# --- recommendation -----------------------------------------------------------------------------------------
 
 
 @given(st.lists(designs, min_size=1, max_size=12), st.floats(0.005, 0.3), st.floats(0.005, 0.3), st.booleans())
@@ -158,9 +152,6 @@ def test_reasons_say_what_happened() -> None:
     wide = choose([ModeBand(Mode(46.0, 0.02), 0.2)], [0.005], DesignOptions(max_duration_s=0.015), families=FEW)
     assert not wide.ok
     assert "this one has the least" in wide.reason
-
-
-# --- the comparison -----------------------------------------------------------------------------------------
 
 
 def test_every_design_keeps_the_limits_and_says_its_own_figures() -> None:
@@ -257,9 +248,6 @@ def test_bad_questions() -> None:
     partly = choose([ModeBand(Mode(200.0, 0.0))], [0.005, 0.004], families=FEW)
     assert {each.period_s for each in partly.designs} == {0.004}
     assert "200 Hz" in next(each.reason for each in partly.refused if each.period_s == 0.005)
-
-
-# --- what a user asks ---------------------------------------------------------------------------------------
 
 
 def test_modes_as_text_mode_or_band_and_their_own_bands() -> None:

@@ -57,9 +57,6 @@ def options(
     return DesignOptions(period_s, max_duration_s, max_abs_sum, vibration_limit)
 
 
-# --- every family ---------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("zeta", [0.02, *(pytest.param(zeta, marks=pytest.mark.slow) for zeta in (0.0, 0.1))])
 @pytest.mark.parametrize("name", [*EXACT, *TOLERANT])
 def test_one_mode_on_any_times(name: str, zeta: float) -> None:
@@ -107,9 +104,6 @@ def test_every_row_says_what_it_is_and_is_designed_or_refused_as_it_says() -> No
         if not row.on_grid:
             with pytest.raises(ArgumentError, match="omit the period"):
                 design(row.name, [SLOW], options(0.005))
-
-
-# --- conditions on a grid -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("name", "multiplicity"), [("zv", 1), ("zvd", 2), ("zvdd", 3)])
@@ -175,9 +169,6 @@ def test_negative_zv_on_a_grid_is_no_longer_than_the_polynomial_with_such_taps()
         assert shaper.duration_s <= design("zv", [SLOW], options(period_s))[0].duration_s + 1e-12
 
 
-# --- specified insensitivity ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("period_s", [0.002, 0.004])
 def test_no_shorter_design_stays_below_the_limit(period_s: float) -> None:
     """Sampled frequencies and directions relax the problem: where even they forbid it, nothing shorter exists."""
@@ -209,9 +200,6 @@ def test_specified_insensitivity_over_a_zero_band_and_a_wide_one() -> None:
         design("si", [SLOW], options(0.001, vibration_limit=0.0))
 
 
-# --- simultaneous ---------------------------------------------------------------------------------------------
-
-
 def test_simultaneous_of_the_paper() -> None:
     shaper = design("simultaneous", [SLOW, FAST])[0].shaper
     assert shaper.times_s * 1e3 == pytest.approx([0.0, 6.514, 11.326], abs=5e-4)
@@ -241,9 +229,6 @@ def test_simultaneous_of_three_and_four_modes() -> None:
         # no grid of a quarter of a millisecond holds a much shorter one
         assert shaper.duration_s <= shortest_non_negative(modes, 0.00025).duration_s
         assert shaper.duration_s >= shortest_non_negative(modes, 0.00025).duration_s - 0.0006
-
-
-# --- what is refused, and what is said ------------------------------------------------------------------------
 
 
 def test_equal_modes_count_once() -> None:
@@ -296,9 +281,6 @@ def test_a_limit_is_proven_over_its_band() -> None:
     band = ModeBand(Mode(47.5, SLOW.mode.damping_ratio), 12.5 / 47.5)
     shaper = shortest_on_grid(Conditions(bands=(band,), limit=0.1), 0.002, 0.25, title="limit")
     assert worst_residual(shaper, SLOW.mode, 35.0, 60.0).upper_bound <= 0.1
-
-
-# --- given taps -----------------------------------------------------------------------------------------------
 
 
 def test_taps_in_every_form() -> None:
@@ -357,9 +339,6 @@ def test_random_modes_on_random_grids() -> None:
     assert designed > 15
 
 
-# --- figures of the documentation and of the specification ----------------------------------------------------
-
-
 def documented(columns: int) -> list[list[str]]:
     """The rows of the section's table with that many columns: the family, then the others."""
     text = (Path(__file__).resolve().parents[2] / "docs" / "concepts" / "shapers.md").read_text(encoding="utf-8")
@@ -396,9 +375,6 @@ def test_the_table_of_two_modes() -> None:
             assert found.duration_s * 1e3 == pytest.approx(float(lasts), abs=0.051)
         if worst != "–":
             assert found.worst_residual * 100.0 == pytest.approx(float(worst), abs=0.051)
-
-
-# --- mirrored, and bands with two ends ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("text", ["46:0.02", "30:0.1", "30:0.3", "46:0.02±5%", "30:0.1-10%+13%", "46±8%"])

@@ -40,9 +40,6 @@ def is_designable(modes: Sequence[Mode], period_s: float, last: int) -> bool:
     return is_feasible([np.exp(s.real * (t[-1] - t) - 1j * s.imag * t) for s in poles], last)
 
 
-# --- the classes --------------------------------------------------------------------------------------------
-
-
 def test_mode_states_its_values_and_refuses_others() -> None:
     mode = Mode(46.0, 0.02)
     assert (mode.frequency_hz, mode.damping_ratio, mode.participation) == (46.0, 0.02, 1.0)
@@ -101,9 +98,6 @@ def test_shaper_states_its_moments_and_cannot_be_changed() -> None:
 def test_shaper_refuses_what_is_none(times_s: list[float], amplitudes: list[float], message: str) -> None:
     with pytest.raises(ArgumentError, match=message):
         Shaper(times_s, amplitudes)
-
-
-# --- designs of the core ------------------------------------------------------------------------------------
 
 
 @given(st.floats(1.0, 200.0), st.floats(0.0, 0.5), st.floats(1.0, 200.0), st.floats(0.0, 0.5), st.floats(0.0, 0.5))
@@ -202,9 +196,6 @@ def test_grid_polynomial_reference_and_refusal() -> None:
     np.testing.assert_allclose(shaper.amplitudes, [0.20394, 0.16162, 0.31387, 0.15731, 0.16327], atol=5e-6)
     with pytest.raises(DesignError, match=r"mode 200 Hz cannot be cancelled on a 5 ms grid: z = 1\.000"):
         grid_polynomial([Mode(200.0, 0.0)], 0.005)
-
-
-# --- shortest non-negative ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -316,9 +307,6 @@ def test_any_number_of_modes(values: list[tuple[float, float]], period_s: float)
         assume(False)
     for mode in modes:
         assert left_of(shaper, mode) <= LIMIT
-
-
-# --- choice of the block period -----------------------------------------------------------------------------
 
 
 def test_block_period_of_the_machine_is_5_ms() -> None:

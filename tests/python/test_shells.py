@@ -36,7 +36,6 @@ echo "${{COMPREPLY[@]}}"; }}
 
 
 def test_bash(tmp_path: Path) -> None:
-    """Commands, options, and what an option takes."""
     asks = ["shapegcode conv", "shapegcode convert --sha", "shapegcode simulate --plant ", "shapegcode machine di"]
     said = shell("bash", BASH.format(asks="\n".join(f'ask "{line}"' for line in asks)), tmp_path).splitlines()
     assert [set(line.split()) for line in said] == [
@@ -45,7 +44,6 @@ def test_bash(tmp_path: Path) -> None:
 
 
 def test_fish(tmp_path: Path) -> None:
-    """As fish itself lists them."""
     script = "shapegcode completion fish | source\n" + "\n".join(
         f'complete -C "{line}"'
         for line in ("shapegcode conv", "shapegcode convert --sha", "shapegcode simulate --plant ")
@@ -85,7 +83,6 @@ def read_until(terminal: int, pattern: str) -> str:
 
 
 def test_an_unknown_shell_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    """With the shells that there are."""
     from shapegcode.cli import main
 
     assert main(["completion", "cmd"]) == 2

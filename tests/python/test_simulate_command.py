@@ -29,24 +29,10 @@ from shapegcode.simulation.motion import MotionEnvelope
 
 COMMAND = Path(sys.executable).with_name("shapegcode")
 TICK_S = 0.001
-WHOLE = """%
-O1
-G21 G17 G90 G94
-G00 X0. Y0. Z5.
-M06 T1
-G00 X0. Y0. Z5.
-G01 Z-1. F600.
-X30. F6000.
-G03 X40. Y10. R10.
-G01 Y30.
-G04 P250
-G00 Z20.
-X100. Y50.
-G01 X90. F3000.
-Y45.
-M30
-%
-"""
+WHOLE = (
+    "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z5.\nM06 T1\nG00 X0. Y0. Z5.\nG01 Z-1. F600.\nX30. F6000.\n"
+    "G03 X40. Y10. R10.\nG01 Y30.\nG04 P250\nG00 Z20.\nX100. Y50.\nG01 X90. F3000.\nY45.\nM30\n%\n"
+)
 SHORT = "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\nG01 X2. Y.5 F1500.\nG00 X0.\nM30\n%\n"
 CORNER = "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\nG01 X30. F6000.\nY20.\nG04 X2.\nM30\n%\n"
 DRIVE = {
@@ -480,18 +466,9 @@ def test_full_disk_leaves_no_half_file(folder: Path, name: str, existing: bool) 
         assert (folder / "motion").read_text() == "as it was"
 
 
-POCKET = """G21 G90 G17 G40
-G00 X0 Y0 Z5.
-G01 Z-3. F300
-G41 D2 X30. F2500
-Y20.
-X-30.
-Y-20.
-X30.
-Y5.
-G40 X0 Y0
-M30
-"""
+POCKET = (
+    "G21 G90 G17 G40\nG00 X0 Y0 Z5.\nG01 Z-3. F300\nG41 D2 X30. F2500\nY20.\nX-30.\nY-20.\nX30.\nY5.\nG40 X0 Y0\nM30\n"
+)
 
 
 def test_an_original_of_unknown_radius_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

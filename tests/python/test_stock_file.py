@@ -1,7 +1,5 @@
-"""Stock files: what they hold, what is said about a bad one, and the stock that an even allowance leaves.
-
-The shape of an allowance is held against plane geometry: distances from walls and from the centres of arcs, and areas.
-"""
+"""Stock files: what they hold, what is said about a bad one, and the stock that an even allowance leaves, against plane
+geometry: distances from walls and from the centres of arcs, and areas."""
 
 import math
 import re
@@ -69,9 +67,6 @@ def complaint(text: str) -> str:
     return str(caught.value)
 
 
-# --- Plain shapes -----------------------------------------------------------------------------------------------------
-
-
 def test_a_box() -> None:
     (piece,) = stock_polygons(Stock.from_toml("[box]\nx_mm = [1, 5]\ny_mm = [-2, 3]\nz_mm = [-4, 0]\n"), [], RADIUS)
     assert area([piece]).equals(shapely.box(1, -2, 5, 3))
@@ -115,9 +110,6 @@ def test_of_a_roughing_program_the_stock_before_it() -> None:
 @pytest.mark.parametrize("title", STOCK_EXAMPLES)
 def test_examples_load(title: str) -> None:
     assert Stock.from_toml(STOCK_EXAMPLES[title]).kind in {"box", "polygon", "allowance", "program"}
-
-
-# --- The allowance ----------------------------------------------------------------------------------------------------
 
 
 def test_the_corner_of_paper_001() -> None:
@@ -276,9 +268,6 @@ def test_a_thin_wall_between_two_pockets_is_no_stock_inside_either() -> None:
     result = area(stock_polygons(allowance(), [_core.Path(rectangle(40, 20)), _core.Path(second)], RADIUS))
     between = result.intersection(shapely.LineString([(0, 0), (shift, 0)]))
     assert between.length == pytest.approx(4 + 2 * 0.8, abs=NEAR_MM)
-
-
-# --- What does not fit ------------------------------------------------------------------------------------------------
 
 
 LOOP = [line((50, 0), (52, 0)), line((52, 0), (52, 2)), line((52, 2), (50, 2)), line((50, 2), (50, 0))]

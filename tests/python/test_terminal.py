@@ -135,7 +135,6 @@ def test_the_bar_moves_within_one_region(tmp_path: Path) -> None:
 
 
 def test_older_names_of_options_still_work() -> None:
-    """No help shows them."""
     for words, dest in (
         ("convert part.nc -m vx500 -o out.nc --all", "shape_all"),
         ("shaper -m vx500 --all", "verbose"),

@@ -66,9 +66,6 @@ def rapid_s(way_mm: float, rate: float, ramp_s: float, bell_s: float) -> float:
     return 2.0 * ticks(math.sqrt(way_mm / acceleration)) + bell_s
 
 
-# ---- by hand -----------------------------------------------------------------------------------------------
-
-
 def test_a_tiny_program_by_hand() -> None:
     """Rapids .600 + .150 + .030 and 2 * .095 + .030; cuts .600 + .030 + .141, overlapped, and .050 once."""
     time = timed(HAND)
@@ -146,9 +143,6 @@ def test_random_programs_after_the_equations_of_the_paper(constants: tuple[float
     assert sum(block.duration_s for block in time.blocks) == pytest.approx(expected, abs=1e-6)
 
 
-# ---- figures that hold -------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("machine_name", ["vx500", "kimm004"])
 @pytest.mark.parametrize("name", SAMPLES)
 def test_closed_form_and_full_interpolation_agree_on_every_sample(name: str, machine_name: str) -> None:
@@ -208,9 +202,6 @@ def test_a_tool_that_comes_back_is_one_row() -> None:
     time = timed(f"%\nO1\nG21G17G90G94\n{body}M30\n%\n")
     assert [(tool.tool, tool.first_line) for tool in time.tools] == [(1, 5), (2, 8)]
     assert [tool.cutting_s for tool in time.tools] == pytest.approx([1.0 + 3.0, 2.0], abs=1e-9)
-
-
-# ---- the command -------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -349,9 +340,6 @@ def test_short_blocks_that_are_rounded_up_are_named() -> None:
     time = timed(f"%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1F1000.\n{steps}M30\n%\n")
     assert time.cycle_time_s == pytest.approx(2.05, abs=1e-9)
     assert "1.67 times its time by feed" in time.next_step
-
-
-# ---- paper 004 ----------------------------------------------------------------------------------------------
 
 
 def test_the_closed_form_of_half_an_hour_does_not_play_it() -> None:

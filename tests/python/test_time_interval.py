@@ -20,25 +20,10 @@ from shapegcode.timing.cycle_time import TimeInterval, time_interval
 
 NONE = {"cuts_percent": 0.0, "between_cuts_s": 0.0, "runs_percent": 0.0}
 # Two tool changes, three M08; cuts of T1 and T2.
-PROGRAM = """%
-O1
-G21 G17 G90 G94
-T1 M06
-G00 X0. Y0. Z0.
-M08
-G01 X10. F600.
-X20.
-X30.
-T2 M06
-G00 X0. Y0. Z0.
-M08
-G01 X10. F1200.
-Y20.
-X30.
-M08
-M30
-%
-"""
+PROGRAM = (
+    "%\nO1\nG21 G17 G90 G94\nT1 M06\nG00 X0. Y0. Z0.\nM08\nG01 X10. F600.\nX20.\nX30.\nT2 M06\nG00 X0. Y0. Z0.\nM08\n"
+    "G01 X10. F1200.\nY20.\nX30.\nM08\nM30\n%\n"
+)
 
 
 def machine(rows: list[dict[str, object]], scatter: dict[str, float] | None = None, **times: object) -> sg.Machine:

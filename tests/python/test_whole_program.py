@@ -49,9 +49,6 @@ def converted(text: str, machine: sg.Machine, **options: object) -> sg.Conversio
     return sg.convert(sg.Program.from_text(text, machine, source="part.nc"), machine, **options)  # type: ignore[arg-type]
 
 
-# --- one verdict ---------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("tolerance_um", [4.0, 15.0, 30.0])
 @pytest.mark.parametrize(
     "keys", [{}, {"axes.x.modes.1.frequency_uncertainty_percent": 3.0}], ids=["exact modes", "X 3 %"]
@@ -153,9 +150,6 @@ def test_whole_program_figures_are_the_independent_players() -> None:
     assert 0.95 * nearest_um - 0.5 <= reached <= 1.05 * missed + 0.5
 
 
-# --- the price -----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("program_percent", "cut_percent", "tolerance_um"),
     [(2.0, 25.0, 2.0), (5.0, 3.0, 6.0), (10.0, 12.0, 2.0), (10.0, 25.0, 6.0), (0.01, 50.0, 6.0)],
@@ -244,9 +238,6 @@ def test_the_knee_is_where_the_curve_bends() -> None:
     assert knee_of(tolerances, [5.0] * 7) is None
 
 
-# --- the choice of cuts --------------------------------------------------------------------------------------
-
-
 def test_only_and_leave_choose_cuts_by_their_lines(tmp_path: Path) -> None:
     machine = machine_with({"tolerance.contour_um": 15.0})
     free = converted(MIXED, machine)
@@ -270,9 +261,6 @@ def test_verbose_lists_every_cut(tmp_path: Path) -> None:
         done = run(tmp_path, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", *words)
         assert len(re.findall(r"(?m)^\d+-\d+ ", done.stdout)) == listed
         assert ("3 more in --verbose" in done.stdout) == (listed == 12)
-
-
-# --- the recommendation --------------------------------------------------------------------------------------
 
 
 def cut(

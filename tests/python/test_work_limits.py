@@ -1,8 +1,5 @@
-"""Work is bounded before it begins: programs that would play for hours or fill the memory, through every command.
-
-The counting itself is held against hand figures in tests/cpp/test_work_limits.cpp; here the machine's keys, the place
-and the message, and that nothing is written. Nothing is timed: a bound that does not hold would never come back.
-"""
+"""Work is bounded before it begins, through every command: key, place, message, and nothing written (counting itself:
+tests/cpp/test_work_limits.cpp). Nothing is timed: a bound that does not hold would never come back."""
 
 import json
 import math

@@ -37,18 +37,7 @@ UNCERTAIN = {
     "axes.y.modes": [{"frequency_hz": 131.0, "damping_ratio": 0.02, "frequency_uncertainty_percent": 3.0}],
 }
 # The path of paper 000 at 200 mm/s, and a slanting leg behind it.
-PART = """%
-O1
-G21G17G90G94
-G54G00X0.Y0.
-G01X20.F12000
-G03X40.Y20.R20.
-G01Y40.
-X60.Y50.
-G00X0.
-M30
-%
-"""
+PART = "%\nO1\nG21G17G90G94\nG54G00X0.Y0.\nG01X20.F12000\nG03X40.Y20.R20.\nG01Y40.\nX60.Y50.\nG00X0.\nM30\n%\n"
 # Of the vibration only what equal blocks leave with the dial turned is too much.
 STRICT = {
     "tolerance.contour_um": 500.0,

@@ -244,9 +244,6 @@ def _as_nobody(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.CompletedProcess(words, int(code or 98), "", said)
 
 
-# ---- processors and platforms ------------------------------------------------------------------------------------
-
-
 def test_every_pool_is_as_large_as_the_processors_that_may_be_used(monkeypatch: pytest.MonkeyPatch) -> None:
     from shapegcode.program.computer import cores
 
