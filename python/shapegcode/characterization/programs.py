@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
@@ -16,6 +17,7 @@ from shapegcode.characterization import air_tests
 from shapegcode.characterization.result import CharacterisationTests, WrittenTest
 from shapegcode.errors import ArgumentError, FileError, Problem
 from shapegcode.io.data_file import write_text
+from shapegcode.program import decimal
 from shapegcode.settings.keys import Count, Float, InlineTable, Positive, Text, TomlTable, key
 from shapegcode.settings.load import KeyProblem, line_of, parsed, read_text, validated
 
@@ -93,9 +95,7 @@ def program_text(test: air_tests.AirTest, box: air_tests.AirBox, machine: Machin
 
 def _word(address: str, value: float, decimals: int) -> str:
     """Format a word with a decimal point and no zero before it."""
-    text = f"{value:.{decimals}f}".rstrip("0")
-    text = text.replace("-0.", "-.") if text.startswith("-0.") and text != "-0." else text.removeprefix("0")
-    return f"{address}{text}"
+    return address + re.sub(r"^(-?)0\.(?=\d)", r"\1.", decimal(value, decimals))
 
 
 def readme_text(tests: Sequence[air_tests.AirTest], machine: Machine, box: air_tests.AirBox) -> str:

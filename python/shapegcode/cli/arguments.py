@@ -12,7 +12,7 @@ from functools import cache
 from importlib import resources
 from typing import Any, NoReturn
 
-_MAX_OVERRIDE = 2.54
+_MAX_OVERRIDE = 2.54  # of a control
 _SIZE_UNITS = {"": 1, "k": 1024, "M": 1024**2, "G": 1024**3}
 _LENGTH_UNITS = {"um": 1.0, "µm": 1.0, "mm": 1e3}
 _TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
@@ -64,24 +64,32 @@ def count(text: str) -> int:
     return int(match[1]) if match else _refuse(text, "a whole number, 1 or more")
 
 
+def number(text: str) -> float:
+    """A number."""
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+
+
 def _share(text: str) -> float:
     return number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
 
 
-def ratio(text: str) -> float:
-    """A ratio such as ``60%`` or ``0.6``, above 0 and at most 1."""
-    return value if 0.0 < (value := _share(text)) <= 1.0 else _refuse(text, "above 0 and at most 100%")
+def _where(parse: Callable[[str], float], holds: Callable[[float], bool], must: str) -> Callable[[str], float]:
+    """A parser of numbers for which a condition holds."""
+
+    def parsed(text: str) -> float:
+        return value if holds(value := parse(text)) else _refuse(text, must)
+
+    return parsed
 
 
-def share(text: str) -> float:
-    """A ratio such as ``3%`` or ``0.03``, at least 0 and below 1."""
-    return value if 0.0 <= (value := _share(text)) < 1.0 else _refuse(text, "at least 0 and below 100%")
-
-
-def override(text: str) -> float:
-    """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (maximum of a control)."""
-    most = _MAX_OVERRIDE
-    return value if 0.0 < (value := _share(text)) <= most else _refuse(text, f"above 0 and at most {most:.0%}")
+positive = _where(number, lambda value: 0.0 < value < math.inf, "above 0")
+nonzero = _where(number, lambda value: math.isfinite(value) and value != 0.0, "a number other than 0")
+ratio = _where(_share, lambda value: 0.0 < value <= 1.0, "above 0 and at most 100%")  # such as 60% or 0.6
+share = _where(_share, lambda value: 0.0 <= value < 1.0, "at least 0 and below 100%")  # such as 3% or 0.03
+override = _where(_share, lambda value: 0.0 < value <= _MAX_OVERRIDE, f"above 0 and at most {_MAX_OVERRIDE:.0%}")
 
 
 def seconds(text: str) -> float:
@@ -125,24 +133,6 @@ def size(text: str) -> int:
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([kMG]?)", text)
     value = math.floor(float(match[1]) * _SIZE_UNITS[match[2]]) if match else 0
     return value if value >= 1 else _refuse(text, "a number of bytes above 0, for example 65536, 64k or 1M")
-
-
-def positive(text: str) -> float:
-    """A number above 0."""
-    return value if math.isfinite(value := number(text)) and value > 0.0 else _refuse(text, "above 0")
-
-
-def nonzero(text: str) -> float:
-    """A number other than 0."""
-    return value if math.isfinite(value := number(text)) and value != 0.0 else _refuse(text, "a number other than 0")
-
-
-def number(text: str) -> float:
-    """A number."""
-    try:
-        return float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
 
 
 @cache

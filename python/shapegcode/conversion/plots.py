@@ -49,8 +49,7 @@ def plot_tolerance(curve: ToleranceCurve, ax: Axes | None = None) -> Axes:
     panel.set_xscale("log")
     panel.set_xticks(tolerances, [f"{each:.3g}" for each in tolerances])
     panel.minorticks_off()
-    panel.set_xlabel("contour tolerance in µm")
-    panel.set_ylabel("time of the program, increase in %")
+    panel.set(xlabel="contour tolerance in µm", ylabel="time of the program, increase in %")
     return panel
 
 

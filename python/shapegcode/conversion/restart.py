@@ -19,7 +19,7 @@ from shapegcode import _core
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.modes import slowest_excited_hz
-from shapegcode.program import Program, between_increments
+from shapegcode.program import Program, between_increments, decimal
 from shapegcode.program.stamp import whole_lines
 from shapegcode.verdict.figures import Placed
 
@@ -206,12 +206,6 @@ class RestartPlaces:
                 at = float(begins[index])
                 stops.append(index + 1)
         return stops
-
-
-def decimal(value: float, decimals: int) -> str:
-    """A number in FANUC's decimal notation: always with a point, no trailing zeros."""
-    text = f"{value:.{decimals}f}".rstrip("0") if decimals else f"{value:.0f}."
-    return "0." if text in {"-0.", "0."} else text
 
 
 def _why_none(region: _core.Region) -> str:

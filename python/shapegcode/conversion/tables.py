@@ -11,8 +11,9 @@ from pathlib import Path
 
 from shapegcode import _core
 from shapegcode.errors import MachineError
-from shapegcode.machine import Machine
+from shapegcode.machine import AxisMode, Machine
 from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.modes import numbered_modes
 from shapegcode.program import Program
 from shapegcode.results.json import OldNames
 from shapegcode.results.outcome import Pair, Xyz
@@ -220,33 +221,32 @@ def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[
     return tuple(sorted(rows, key=lambda row: -row.tested_um))
 
 
-def _modes(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str, name: str) -> Iterator[tuple[str, int]]:
-    """Yield letter and number of every mode with this value unverified that a moving axis excites."""
-    for axis, (letter, table) in enumerate(zip("xyz", machine.axes.as_tuple(), strict=True)):
-        for number, mode in enumerate(table.modes, start=1):
-            excited = any(share and by in moving for share, by in zip(mode.excitation(axis), "xyz", strict=True))
-            if excited and f"axes.{letter}.modes.{number}.{name}" in unmeasured:
-                yield letter, number
+def _modes(
+    machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str, name: str
+) -> Iterator[tuple[str, AxisMode]]:
+    """Yield key and mode of every mode with this value unverified that a moving axis excites."""
+    for stem, axis, mode in numbered_modes(machine):
+        excited = any(share and by in moving for share, by in zip(mode.excitation(axis), "xyz", strict=True))
+        if excited and f"{stem}.{name}" in unmeasured:
+            yield stem, mode
 
 
 def _frequencies(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
     """Trials of frequencies, up and down; a table over position or mass is scaled as a whole."""
-    for letter, number in _modes(machine, unmeasured, moving, "frequency_hz"):
-        stem = f"axes.{letter}.modes.{number}"
-        stated = getattr(machine.axes, letter).modes[number - 1].frequency_uncertainty_percent
+    for stem, mode in _modes(machine, unmeasured, moving, "frequency_hz"):
+        stated = mode.frequency_uncertainty_percent
         percent = stated if stated is not None else _PERCENT["frequency_hz"]
         sharp = {f"{stem}.frequency_uncertainty_percent": percent, f"{stem}.damping_uncertainty_percent": None}
         other = machine.with_values(sharp)
+        only = stem.removeprefix("axes.").replace(".modes", "")
         for shift in (-1.0, 1.0):
-            only = f"{letter}.{number}"
             yield _Trial(unmeasured[f"{stem}.frequency_hz"], f"{shift * percent:+g} %", other, shift, only)
 
 
 def _shares(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
     """Trials with more residual vibration: less damping, more participation."""
     for name, sign in (("damping_ratio", -1.0), ("participation", 1.0)):
-        for letter, number in _modes(machine, unmeasured, moving, name):
-            mode, stem = getattr(machine.axes, letter).modes[number - 1], f"axes.{letter}.modes.{number}"
+        for stem, mode in _modes(machine, unmeasured, moving, name):
             stated = mode.damping_uncertainty_percent if name == "damping_ratio" else None
             percent = sign * (stated if stated is not None else _PERCENT[name])
             with suppress(MachineError):

@@ -20,7 +20,7 @@ from shapegcode.machine.dialects import dialect_of
 from shapegcode.machine.programs import Emission
 from shapegcode.model.machine_model import MachineModel, OwnFilter, command_planner, planned_jerk_mm_s3
 from shapegcode.model.modes import NO_OFFSET, Offset, excited_modes
-from shapegcode.program import MM_PER_INCH, Program, between_increments, written_increment_mm
+from shapegcode.program import MM_PER_INCH, Program, between_increments, decimal, written_increment_mm
 from shapegcode.program.stamp import REGION_MARK
 from shapegcode.shaping.grid import Grid
 
@@ -433,7 +433,7 @@ def _lines(lines: Sequence[str], writer: _core.WriterOptions) -> bytes:
 def feed_word(feed: float) -> str:
     """F with a point, below 10 with a decimal, so that it is never a one-digit feed code."""
     whole = len(str(int(feed))) if feed >= 1.0 else 0
-    text = restart.decimal(feed, max(0, 8 - whole))  # a word has eight digits
+    text = decimal(feed, max(0, 8 - whole))  # a word has eight digits
     return f"F{text}0" if feed < 10.0 and text.endswith(".") else f"F{text}"
 
 
@@ -449,7 +449,7 @@ def _safe_line(
     words = [f"G{entry.plane}", "G91" if region.incremental else "G90", "G94", "G40", "G64", "G01"]
     if not region.incremental:
         words += [
-            f"{letter}{restart.decimal(value * 10.0**-decimals, decimals)}"
+            f"{letter}{decimal(value * 10.0**-decimals, decimals)}"
             for letter, value, is_known, rests in zip("XYZ", start, entry.known, resting, strict=True)
             if is_known and not rests
         ]
@@ -483,7 +483,7 @@ def linear_lines(
         label = _LABEL.match(lines[numbers[block.first]])
         out = written[numbers[block.first]]
         if block.sets_feed:
-            out.append(f"{'FNORM ' if is_linear else ''}F{restart.decimal(block.start_feed_mm_per_min, 2)}")
+            out.append(f"{'FNORM ' if is_linear else ''}F{decimal(block.start_feed_mm_per_min, 2)}")
             is_linear = False
         change = "" if block.is_linear == is_linear else "FLIN " if block.is_linear else "FNORM "
         is_linear = block.is_linear
@@ -491,9 +491,9 @@ def linear_lines(
         words = "" if motion == code else f"{motion} "
         code = motion
         moved = np.abs(np.round(block.end_mm, decimals) - np.round(start, decimals)) > 0.5 * 10.0**-decimals
-        words += "".join(f"{'XYZ'[k]}{restart.decimal(float(block.end_mm[k]), decimals)}" for k in range(3) if moved[k])
-        words += f"CR={restart.decimal(block.radius_mm, 3)}" if block.sweep_rad else ""
-        out.append(f"{change}{words}F{restart.decimal(block.feed_mm_per_min, 2 if block.is_linear else 4)}")
+        words += "".join(f"{'XYZ'[k]}{decimal(float(block.end_mm[k]), decimals)}" for k in range(3) if moved[k])
+        words += f"CR={decimal(block.radius_mm, 3)}" if block.sweep_rad else ""
+        out.append(f"{change}{words}F{decimal(block.feed_mm_per_min, 2 if block.is_linear else 4)}")
         if label is not None:
             out[0] = f"{label[0]} {out[0]}"
         start = block.end_mm

@@ -37,6 +37,7 @@ _MARGIN = 0.03  # around the part, of its longer side
 _GROUND = 300  # cells of the background along the longer side
 _ALWAYS = ("peak_resultant_n", "mean_resultant_n")
 _NO_WALL = "#c9c9c9"
+_ALONG_PATH = "distance along the cutting path in mm"
 
 
 def plots_of(schedule: FeedSchedule) -> dict[str, Plot]:
@@ -84,7 +85,7 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
     loads = [name for name in LOADS if name in _ALWAYS or np.isfinite(traces.limit[name]).any()]
     panels = plot.column(
         ax, 3 + len(loads), size_inch=(11.0, 1.2 + 1.55 * (3 + len(loads))),
-        title="Feed and force along the cutting path", part=_summary(schedule),
+        title="Feed and force along the cutting path", part=_summary(schedule), xlabel=_ALONG_PATH,
     )  # fmt: skip
     along = _Along(traces, groups(traces.distance_mm, _BANDS))
     along.draw(panels[0], traces.radial_depth_mm, plot.COLOURS[2], "radial depth", filled=True)
@@ -107,7 +108,6 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
         panel.set_ylim(bottom=0.0)
         panel.set_ylabel(f"{words}\nin {unit}")
         plot.legend_above(panel)
-    panels[-1].set_xlabel("distance along the cutting path in mm")
     for panel in panels:
         panel.margins(x=0.01)
     return plot.aligned(panels)
@@ -116,8 +116,7 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
 def _feed_axis(panel: Axes, feeds: Vector) -> None:
     least, largest = float(feeds.min()), float(feeds.max())
     if least > 0.0 and largest > _LOGARITHMIC * least:
-        panel.set_yscale("log")
-        panel.set_ylim(0.7 * least, 1.4 * largest)
+        panel.set(yscale="log", ylim=(0.7 * least, 1.4 * largest))
         panel.yaxis.set_major_formatter("{x:g}")
         panel.yaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:g}"[0] in _MINOR else "")
     else:
@@ -190,12 +189,8 @@ def plot_force_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     for panel, name, force in zip(panels, ("before", "after"), forces, strict=True):
         _ground(panel, material, low, high)
         coloured = _coloured_path(panel, traces, force, norm)
-        panel.set_xlim(low[0], high[0])
-        panel.set_ylim(low[1], high[1])
-        panel.set_aspect("equal")
+        panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="X in mm", ylabel="Y in mm")
         panel.set_title(f"{name}: up to {plot.number(max(float(force.max()), 0.0))} N", loc="left", fontsize=10)
-        panel.set_xlabel("X in mm")
-        panel.set_ylabel("Y in mm")
     whole: Any = panels[0].figure
     bar = whole.colorbar(coloured, ax=panels, shrink=0.85, pad=0.02, extend="max" if limited else "neither")
     bar.set_label("peak resultant in N" + (f"; red: above the limit, {plot.number(limits[0], 4)} N" if limited else ""))
@@ -265,7 +260,7 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     high = high if high > low else low + 1e-3
     both = _both_sides(low, high)
     panels = plot.column(
-        ax, 3, size_inch=(11.0, 7.0), part=_summary(schedule),
+        ax, 3, size_inch=(11.0, 7.0), part=_summary(schedule), xlabel=_ALONG_PATH,
         title="Form error of the wall; +: material remains",
     )  # fmt: skip
     step = walls.height_mm[1] - walls.height_mm[0]
@@ -277,8 +272,7 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
         mesh = panel.pcolormesh(
             walls.edges_mm, levels, np.ma.masked_invalid(values.T), cmap=both, vmin=low, vmax=high, rasterized=True,
         )  # fmt: skip
-        panel.set_ylim(levels[0], levels[-1])
-        panel.set_ylabel("height above\nthe tip in mm")
+        panel.set(ylim=(levels[0], levels[-1]), ylabel="height above\nthe tip in mm")
         worst = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0
         panel.set_title(f"{name}: up to {plot.number(worst)} µm", loc="left", fontsize=10)
     whole: Any = panels[0].figure
@@ -292,7 +286,6 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     last.set_ylim(bottom=0.0)
     last.margins(x=0.0)
     last.set_ylabel("largest over\nthe height in µm")
-    last.set_xlabel("distance along the cutting path in mm")
     plot.legend_above(last)
     return plot.aligned(panels)
 

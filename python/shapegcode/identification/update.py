@@ -352,7 +352,7 @@ class ModeTables:
     def _put(self, entries: list[edit.Entry], values: Mapping[str, tuple[Any, str]]) -> None:
         """Set values in place of a table's keys or commented keys, else after them."""
         below = next((n for n, (_, item) in enumerate(entries) if isinstance(item, Table)), len(entries))
-        places = {edit.commented_key(entry): place for place, entry in enumerate(entries[:below])}
+        places = {edit.commented(entry, edit.COMMENTED_KEY): place for place, entry in enumerate(entries[:below])}
         places |= {key.key: place for place, (key, _) in enumerate(entries[:below]) if key is not None}
         added = []
         for key, (value, remark) in values.items():
@@ -411,9 +411,9 @@ class ModeTables:
         entries = self.home.value.body
         modes = (SingleKey("modes"), AoT(added, "modes", parsed=True))
         for place, entry in enumerate(entries):
-            if edit.commented_table(entry) == self.name:
+            if edit.commented(entry, edit.COMMENTED_TABLE) == self.name:
                 end = place + 1
-                while end < len(entries) and edit.commented_key(entries[end]):
+                while end < len(entries) and edit.commented(entries[end], edit.COMMENTED_KEY):
                     end += 1
                 entries[place:end] = [modes]
                 return

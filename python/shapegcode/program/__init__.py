@@ -5,6 +5,7 @@ from shapegcode.io.units import MM_PER_INCH
 from shapegcode.program.program import (
     Program,
     between_increments,
+    decimal,
     end_off_grid_mm,
     given_program,
     least_increment_mm,
@@ -16,6 +17,7 @@ __all__ = [
     "MM_PER_INCH",
     "Program",
     "between_increments",
+    "decimal",
     "end_off_grid_mm",
     "given_program",
     "least_increment_mm",

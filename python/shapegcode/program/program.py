@@ -457,6 +457,12 @@ def written_increment_mm(machine: Machine, units: int) -> float:
     return 10.0 ** -(decimals + 1) * MM_PER_INCH if units == 20 else 10.0**-decimals
 
 
+def decimal(value: float, decimals: int) -> str:
+    """A number in FANUC's decimal notation: always with a point, no trailing zeros."""
+    text = f"{value:.{decimals}f}".rstrip("0") if decimals else f"{value:.0f}."
+    return "0." if text in {"-0.", "0."} else text
+
+
 _ON_INCREMENT = 1e-6  # in increments: tolerance of a position on the grid
 
 

@@ -72,9 +72,11 @@ def grid(
     return [list(row) for row in found]
 
 
-def column(ax: Axes | None, rows: int, *, sharex: bool = True, **options: Any) -> list[Axes]:
-    """Stacked panels; options as in `grid`."""
-    return [row[0] for row in grid(ax, rows, 1, sharex=sharex, **options)]
+def column(ax: Axes | None, rows: int, *, sharex: bool = True, xlabel: str = "", **options: Any) -> list[Axes]:
+    """Stacked panels, the last one with a label of the axis; options as in `grid`."""
+    panels = [row[0] for row in grid(ax, rows, 1, sharex=sharex, **options)]
+    panels[-1].set_xlabel(xlabel)
+    return panels
 
 
 def _style(panel: Axes) -> None:

@@ -20,8 +20,8 @@ from shapegcode.settings.keys import ORIGIN, ORIGIN_TEXT, ORIGIN_WORDS, lines_of
 Entry = tuple[Key | None, Item]
 
 _HEADER = re.compile(r"^[ \t]*\[+[ \t]*([^\[\]\n]*?)[ \t]*\]", re.MULTILINE)
-_COMMENTED_KEY = re.compile(r"#\s*([A-Za-z0-9_-]+)\s*=\s*\.\.\.")
-_COMMENTED_TABLE = re.compile(r"#\s*\[\[\s*([^\[\]]+?)\s*\]\]")
+COMMENTED_KEY = re.compile(r"#\s*([A-Za-z0-9_-]+)\s*=\s*\.\.\.")
+COMMENTED_TABLE = re.compile(r"#\s*\[\[\s*([^\[\]]+?)\s*\]\]")
 
 
 def parse_exactly(text: str, file: str) -> tomlkit.TOMLDocument:
@@ -40,17 +40,9 @@ def entry_of(line: str) -> Entry:
     return tomlkit.parse(line).body[0]
 
 
-def commented_key(entry: Entry) -> str:
-    """The name in a comment ``# name = ...`` for a missing key; empty for everything else."""
-    return _commented(entry, _COMMENTED_KEY)
-
-
-def commented_table(entry: Entry) -> str:
-    """The name in a comment ``# [[name]]`` for a list without tables; empty for everything else."""
-    return _commented(entry, _COMMENTED_TABLE)
-
-
-def _commented(entry: Entry, pattern: re.Pattern[str]) -> str:
+def commented(entry: Entry, pattern: re.Pattern[str]) -> str:
+    """The name in a comment ``# name = ...`` for a missing key, or ``# [[name]]`` for a list without tables; else
+    empty."""
     match = pattern.match(entry[1].trivia.comment) if isinstance(entry[1], Comment) else None
     return match[1] if match else ""
 
@@ -59,9 +51,9 @@ def own_end(entries: list[Entry]) -> int:
     """Index after the last key and the commented keys that follow it; later entries belong to other tables."""
     end = max((index + 1 for index, (key, _) in enumerate(entries) if key is not None), default=0)
     for index in range(end, len(entries)):
-        if not isinstance(entries[index][1], Comment) or commented_table(entries[index]):
+        if not isinstance(entries[index][1], Comment) or commented(entries[index], COMMENTED_TABLE):
             break
-        if commented_key(entries[index]):
+        if commented(entries[index], COMMENTED_KEY):
             end = index + 1
     return end
 

@@ -21,18 +21,10 @@ from shapegcode.machine import Machine
 from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
+from shapegcode.studies import varied as varying
 from shapegcode.studies.replay import SHARE, Replay, SamplesJob, simulate_all
 from shapegcode.studies.result import Candidate, ChosenValue, Optimum
 from shapegcode.studies.study import check_ends, check_probability, within
-from shapegcode.studies.varied import (
-    MAX_DRAWS,
-    Vary,
-    check_keys,
-    listed,
-    sampled_columns,
-    sampled_machine,
-    varied_values,
-)
 
 USUAL_DRAWS = 256  # Default number of machines per combination
 USUAL_CONVERSIONS = 300  # Default maximum of conversions
@@ -45,7 +37,7 @@ _NO_TEXT_S = 1e9
 def optimize(
     program: Program | str | Path,
     machine: Machine | str | Path,
-    vary: Vary,
+    vary: varying.Vary,
     *,
     choose: Choices | None = None,
     probability: float = 0.95,
@@ -86,15 +78,15 @@ def optimize(
     check_probability("probability", probability)
     if isinstance(most, bool) or not isinstance(most, int) or most < 1:
         raise ArgumentError(f"most = {most!r}: must be a whole number of conversions, 1 or more")
-    varied = varied_values(machine, vary)
+    varied = varying.varied_values(machine, vary)
     choices = checked_choices(usual_choices(machine) if choose is None else choose, [each.key for each in varied])
     for each in varied:
         if each.known:
             raise ArgumentError(f"vary: {each.key}: the converter reads it: put it into choose")
-    samples = [sampled_columns(varied, n, "sobol", seed, indices=False)]
-    if n > (largest := MAX_DRAWS // _FRESH):
+    samples = [varying.sampled_columns(varied, n, "sobol", seed, indices=False)]
+    if n > (largest := varying.MAX_DRAWS // _FRESH):
         raise ArgumentError(f"n = {n}: must be at most {largest}: {_FRESH} times as many confirm a choice")
-    samples.append(sampled_columns(varied, _FRESH * n, "sobol", seed + 1, indices=False))
+    samples.append(varying.sampled_columns(varied, _FRESH * n, "sobol", seed + 1, indices=False))
     keys, rows = [each.key for each in varied], []
     for columns in samples:
         check_ends(machine, varied, columns)
@@ -110,8 +102,8 @@ def optimize(
         on_progress(min(1.0, len(run.candidates) / min(most, combinations)))
     best = run.best()
     name = program.source if isinstance(program, Program) else str(program)
-    listed = sorted(run.candidates.values(), key=lambda each: math.inf if each.time_s is None else each.time_s)
-    return Optimum(name, machine.name, probability, n, best, run.as_it_is(), tuple(listed), combinations)
+    ranked = sorted(run.candidates.values(), key=lambda each: math.inf if each.time_s is None else each.time_s)
+    return Optimum(name, machine.name, probability, n, best, run.as_it_is(), tuple(ranked), combinations)
 
 
 def _check_values(machine: Machine, choices: Choices) -> None:
@@ -120,7 +112,7 @@ def _check_values(machine: Machine, choices: Choices) -> None:
         problems = []
         for value in values:
             try:
-                sampled_machine(machine, {key: value}, "choose")
+                varying.sampled_machine(machine, {key: value}, "choose")
             except MachineError as wrong:
                 problems.append(wrong)
         if problems and len(problems) == len(values):
@@ -140,10 +132,10 @@ class _Choosing:
 
     def converted(self, ranks: Ranks) -> Candidate:
         if ranks not in self.candidates:
-            values = {key: listed[rank] for (key, listed), rank in zip(self._choices.items(), ranks, strict=True)}
+            values = {key: among[rank] for (key, among), rank in zip(self._choices.items(), ranks, strict=True)}
             chosen = tuple(ChosenValue(key, toml(value)) for key, value in values.items())
             try:
-                machine = sampled_machine(self._machine, values, "choose")
+                machine = varying.sampled_machine(self._machine, values, "choose")
                 replay = Replay.of(self._program, machine, self._machine, shape_all=self._shape_all, is_whole=True)
                 self._replays[ranks] = replay
                 self.candidates[ranks] = Candidate(chosen, replay.time_s)
@@ -215,11 +207,11 @@ def checked_choices(choices: Choices, varied: Sequence[str]) -> Choices:
     """Validate the choices."""
     if not choices:
         raise ArgumentError("choose: nothing to choose: give a list of values for one key or more")
-    check_keys("choose", choices)
+    varying.check_keys("choose", choices)
     checked = {}
     for key, values in choices.items():
         try:
-            checked[key] = listed(values).values
+            checked[key] = varying.listed(values).values
         except ArgumentError:
             raise ArgumentError(f"choose: {key} = {values!r}: must be a list of one value or more") from None
         if key in varied:

@@ -6,7 +6,7 @@ import shlex
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -129,8 +129,6 @@ class MachineStudy(Result):
         limits_um: smallest limit of each measure that has one.
         draws: values by key and measures by name, one row per sample.
     """
-
-    json_extra: ClassVar[dict[str, Any]] = dict(Result.json_extra)
 
     program: str
     machine: str

@@ -21,6 +21,7 @@ from shapegcode.identification.sweep_program import plain_name
 from shapegcode.io.data_file import write_text
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
+from shapegcode.program import decimal
 from shapegcode.program.stamp import OVERRIDE
 from shapegcode.results.json import to_text
 from shapegcode.testcut import cut as cuts
@@ -357,16 +358,10 @@ def _program_text(design: CutDesign, number: int) -> str:
     writer = _Writer(design)
     lines = ["%", f"O{number:04d}({_TITLES[design.cut.kind]})", *(f"({line})" for line in writer.head())]
     lines += ["G21 G17 G90 G94 G64 G40 G49 G80", "G54"]
-    lines += [f"S{design.cut.spindle_rev_per_min:g} M03", "G04 P3000", f"G00 Z{_text(_CLEAR_Z_MM)}"]
+    lines += [f"S{design.cut.spindle_rev_per_min:g} M03", "G04 P3000", f"G00 Z{decimal(_CLEAR_Z_MM, 3)}"]
     for k in range(len(design.cut.passes)):
         lines += writer.passes(k)
     return "\n".join([*lines, "M05", "M30", "%"]) + "\n"
-
-
-def _text(value: float, decimals: int = 3) -> str:
-    """Format a number with its decimal point."""
-    text = f"{value:.{decimals}f}".rstrip("0")
-    return "0." if text in ("-0.", "0.") else text
 
 
 class _Writer:
@@ -404,21 +399,21 @@ class _Writer:
         yield f"(PASS {k + 1}: MILL THE EDGE)"
         for offset in self._offsets(self.walls[k - 1] if k else -_RAW_MM, wall):
             yield from self._edge(path, wall, offset, min(feed for _, feed in each.feeds))
-        yield f"G00 Z{_text(_CLEAR_Z_MM)}"
+        yield f"G00 Z{decimal(_CLEAR_Z_MM, 3)}"
         yield f"M00 (START RECORD {k + 1}: {each.name})"
         yield f"S{self.cut.spindle_rev_per_min:g} M03"  # The control may have stopped the spindle
         yield "G04 P3000"
         yield from self._begin(each.start_mm, self.side * (wall - self.radius), each.feed_mm_per_min)
         for end, feed in each.feeds:
-            yield f"G01 X{_text(end, self.decimals)} F{_text(feed, 1)}"
-        yield f"G00 Z{_text(_CLEAR_Z_MM)}"
+            yield f"G01 X{decimal(end, self.decimals)} F{decimal(feed, 1)}"
+        yield f"G00 Z{decimal(_CLEAR_Z_MM, 3)}"
         yield f"M00 (STOP RECORD {k + 1})"
         yield f"S{self.cut.spindle_rev_per_min:g} M03"
 
     def _begin(self, x: float, y: float, feed: float) -> Iterator[str]:
-        yield f"G00 X{_text(x, self.decimals)} Y{_text(y, self.decimals)}"
-        yield f"Z{_text(_NEAR_Z_MM)}"
-        yield f"G01 Z{_text(-self.cut.axial_depth_mm, self.decimals)} F{_text(max(feed, 100.0), 1)}"
+        yield f"G00 X{decimal(x, self.decimals)} Y{decimal(y, self.decimals)}"
+        yield f"Z{decimal(_NEAR_Z_MM, 3)}"
+        yield f"G01 Z{decimal(-self.cut.axial_depth_mm, self.decimals)} F{decimal(max(feed, 100.0), 1)}"
 
     def _edge(self, path: Edge, wall: float, offset: float, feed: float) -> Iterator[str]:
         """Lines of one cut along the edge, with an outward offset."""
@@ -427,11 +422,11 @@ class _Writer:
         block_s = max(self.controller.block_time_s, self.controller.interpolation_period_s)
         feed = max(min(feed, shortest / (_BLOCKS_OF_EDGE * block_s) * _PER_MINUTE), 1.0)
         yield from self._begin(float(path.x_mm[0]), self.side * float(y[0]), feed)
-        first = f" F{_text(math.floor(feed * 10.0) / 10.0, 1)}"
+        first = f" F{decimal(math.floor(feed * 10.0) / 10.0, 1)}"
         for px, py in zip(path.x_mm[1:], y[1:], strict=True):
-            yield f"G01 X{_text(float(px), self.decimals)} Y{_text(self.side * float(py), self.decimals)}{first}"
+            yield f"G01 X{decimal(float(px), self.decimals)} Y{decimal(self.side * float(py), self.decimals)}{first}"
             first = ""
-        yield f"G00 Z{_text(_NEAR_Z_MM)}"
+        yield f"G00 Z{decimal(_NEAR_Z_MM, 3)}"
 
     def _offsets(self, before: float, wall: float) -> list[float]:
         """Offset of each cut outside the edge: small depths, and a very small last one with little deflection."""

@@ -30,8 +30,8 @@ def plots_of(result: TaperResult | CornerResult | IntervalResult) -> Mapping[str
     return {"testcut-interval": partial(plot_interval, result)}
 
 
-def _column(ax: Axes | None, rows: int, height: float, title: str, width: float = 8.0) -> list[Axes]:
-    panels = plot.column(ax, rows, size_inch=(width, height), title=title)
+def _column(ax: Axes | None, rows: int, height: float, title: str, xlabel: str, width: float = 8.0) -> list[Axes]:
+    panels = plot.column(ax, rows, size_inch=(width, height), title=title, xlabel=xlabel)
     for panel in panels:
         panel.margins(x=0.01)
     return panels
@@ -49,7 +49,7 @@ def plot_taper(result: TaperResult, ax: Axes | None = None) -> Axes:
     """
     data, fit = result.data, result.fit
     title = f"Mean force on the tool, measured (points) and fitted, residual {fit.rms_percent:.1f} %"
-    panels = _column(ax, 2, 5.6, title)
+    panels = _column(ax, 2, 5.6, title, "radial depth in mm")
     for axis, panel in enumerate(panels):
         for group in np.unique(data.group):
             at = np.flatnonzero(data.group == group)
@@ -63,7 +63,6 @@ def plot_taper(result: TaperResult, ax: Axes | None = None) -> Axes:
         if out.any():
             panel.plot(data.met.radial_depth_mm[out], data.force_n[out, axis], "x", color="black", label="ignored")
         panel.set_ylabel(("along the feed in N", "to its left in N")[axis])
-    panels[-1].set_xlabel("radial depth in mm")
     plot.legend_above(panels[0])
     return panels[0]
 
@@ -79,7 +78,7 @@ def plot_coefficients(result: TaperResult, ax: Axes | None = None) -> Axes:
         The upper panel: k1.
     """
     chip = np.geomspace(result.chip_mm.min, result.chip_mm.max, 60)
-    panels = _column(ax, 2, 5.0, "Coefficients of the cutting force", 6.4)
+    panels = _column(ax, 2, 5.0, "Coefficients of the cutting force", "mean chip thickness in µm", 6.4)
     for name, law, colour, style in (
         ("before", result.cut.tool.cutting, _MEASURED, "--"),
         ("fitted", result.cutting, _EXPECTED, "-"),
@@ -89,7 +88,6 @@ def plot_coefficients(result: TaperResult, ax: Axes | None = None) -> Axes:
             panel.plot(1e3 * chip, curve, style, color=colour, label=name)
     for panel, label in zip(panels, ("k1 in N/mm²", "k2"), strict=True):
         panel.set_ylabel(label)
-    panels[-1].set_xlabel("mean chip thickness in µm")
     plot.legend_above(panels[0])
     return panels[0]
 
@@ -104,7 +102,8 @@ def plot_corner(result: CornerResult, ax: Axes | None = None) -> Axes:
     Returns:
         The panel of the first pass.
     """
-    panels = _column(ax, len(result.peaks), 1.4 + 2.4 * len(result.peaks), "Resultant in the unrolled corner")
+    title, xlabel = "Resultant in the unrolled corner", "X of the tool's axis in mm"
+    panels = _column(ax, len(result.peaks), 1.4 + 2.4 * len(result.peaks), title, xlabel)
     for panel, each in zip(panels, result.peaks, strict=True):
         record, forecast = each.record, each.forecast
         panel.plot(record.x_mm, record.resultant_n, color=_MEASURED, linewidth=2.0, label="measured, mean")
@@ -112,7 +111,6 @@ def plot_corner(result: CornerResult, ax: Axes | None = None) -> Axes:
         panel.plot(forecast.x_mm, forecast.mean_resultant_n, color=_EXPECTED, linewidth=1.4, label="expected, mean")
         panel.plot(forecast.x_mm, forecast.peak_resultant_n, color=_EXPECTED, linewidth=0.8, label="expected, peak")
         panel.set_ylabel(f"pass {each.number} in N")
-    panels[-1].set_xlabel("X of the tool's axis in mm")
     plot.legend_above(panels[0])
     return panels[0]
 
@@ -128,7 +126,7 @@ def plot_interval(result: IntervalResult, ax: Axes | None = None) -> Axes:
         The panel of the shortest interval.
     """
     title = "Mean resultant with changing feed"
-    panels = _column(ax, len(result.passes), 1.4 + 2.2 * len(result.passes), title)
+    panels = _column(ax, len(result.passes), 1.4 + 2.2 * len(result.passes), title, "time in s")
     for panel, each in zip(panels, result.passes, strict=True):
         panel.plot(each.time_s, each.force_n, color=_MEASURED, linewidth=2.0, label="measured")
         panel.plot(each.time_s, each.immediate_n, color=_EXPECTED, linewidth=1.1, label="feed as commanded")
@@ -136,5 +134,4 @@ def plot_interval(result: IntervalResult, ax: Axes | None = None) -> Axes:
         panel.plot(each.time_s, each.lagging_n, "--", color=_LAGGING, linewidth=1.1, label=label)
         panel.set_ylabel(f"{each.interval_mm:g} mm: N")
         plot.legend_above(panel)
-    panels[-1].set_xlabel("time in s")
     return panels[0]

@@ -45,6 +45,7 @@ def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
         ax, len(heights), sharex=False, height_ratios=heights,
         size_inch=(9.0, 1.8 + 0.32 * sum(heights) + 0.5 * len(heights)),
         title=f"Parts of the time: {time.cycle_time_s:.1f} s on {time.machine}", part=Path(time.program).name,
+        xlabel="time in s",
     )  # fmt: skip
     used = [part for part in PARTS if getattr(time, part) > 0.0]
     _bars(panels[0], [tool_name(tool.tool) for tool in tools], [vars(tool) for tool in tools], used)
@@ -55,7 +56,6 @@ def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
         names = ["lines {} to {}, {}".format(*region.lines, tool_name(region.tool)) for region in regions]
         _bars(panels[1], names, [vars(region) for region in regions], used)
         panels[1].set_title(f"the {len(regions)} longest regions", loc="left", fontsize=10)
-    panels[-1].set_xlabel("time in s")
     return panels[0]
 
 

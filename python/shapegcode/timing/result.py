@@ -18,28 +18,18 @@ from shapegcode.results.table import Column, Table, share_percent
 AGREEMENT_PERCENT = 0.5  # Largest difference at which closed form and full interpolation agree
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class TimeParts:
-    """Parts of a duration; they add up to the whole.
+    """Parts of a duration; they add up to the whole."""
 
-    Attributes:
-        cutting_s: cutting blocks at their feed.
-        rapid_s: rapids at their rate.
-        in_position_s: in-position waits after rapids and exact stops.
-        dwell_s: G04, and the dwells of drilling cycles.
-        acceleration_s: time added by acceleration to cutting blocks and rapids; with look-ahead also by the limits at
-            corners and on arcs.
-        tool_change_s: M06.
-        function_s: every other M code.
-    """
-
-    cutting_s: float
-    rapid_s: float
-    in_position_s: float
-    dwell_s: float
+    cutting_s: float  # cutting blocks at their feed
+    rapid_s: float  # rapids at their rate
+    in_position_s: float  # in-position waits after rapids and exact stops
+    dwell_s: float  # G04, and the dwells of drilling cycles
+    # time added by acceleration to cutting blocks and rapids; with look-ahead also by the limits at corners and on arcs
     acceleration_s: float
-    tool_change_s: float
-    function_s: float
+    tool_change_s: float  # M06
+    function_s: float  # every other M code
 
 
 PARTS = tuple(field.name for field in fields(TimeParts))  # names of the parts, in display order
@@ -157,9 +147,6 @@ class CycleTime(TimeParts, Result):
     shaped_regions: int
     warnings: tuple[str, ...]
     simulated: SimulatedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
-
-    __eq__ = Result.__eq__
-    __hash__ = Result.__hash__
 
     @property
     def methods(self) -> tuple[str, ...]:

@@ -64,7 +64,6 @@ def plot_cycle_time_calibration(found: CycleTimeCalibration, ax: Axes | None = N
         [f"{run.name}{' (not fitted)' if run.use == 'test' else ''}\n{run.measured_s:.1f} s" for run in runs],
         fontsize=8,
     )
-    panel.set_ylim(len(runs) - 0.5, -0.5)
-    panel.set_xlabel("predicted over measured, %")
+    panel.set(ylim=(len(runs) - 0.5, -0.5), xlabel="predicted over measured, %")
     plot.legend_below(panel)
     return panel
