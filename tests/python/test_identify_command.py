@@ -232,7 +232,7 @@ def test_nothing_supported(capsys: pytest.CaptureFixture[str], tmp_path: Path, m
     ("columns", "message"),
     [
         ({"time [s]": "t", "force [N]": "0", "acc [m/s^2]": "a"}, "zero force"),
-        ({"time [s]": "t", "force [N]": "f"}, "needed"),
+        ({"time [s]": "t", "force [N]": "f"}, "required: an acceleration"),
         ({"time [s]": "t", "force [N]": "f", "acc [m/s^2]": "short"}, "short"),
     ],
 )
