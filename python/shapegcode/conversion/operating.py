@@ -19,7 +19,7 @@ from shapegcode.machine.dialects import dialect_of
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import slowest_excited_hz
 from shapegcode.program import Program
-from shapegcode.program.stamp import FEED_HOLD, FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK, no_room, whole_lines
+from shapegcode.program.stamp import FEED_HOLD, FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK, no_room
 from shapegcode.results.table import Column, Table
 from shapegcode.verdict.figures import Placed, ProgramFigures
 
@@ -28,6 +28,7 @@ _SHOWN_POINTS = 12
 _SINGLE_BLOCKS = 200  # number of the fastest blocks that are simulated
 _PRESSES_PER_S = 2.0
 _FAST_RATIO, _FAST_BLOCKS = 0.5, 4000  # least ratio to the highest feed; largest number used
+_CHUNK = 1 << 16  # bytes
 _TAPE_CHARACTERS_PER_M = 1000.0 / 2.54  # a row of holes every tenth of an inch
 
 
@@ -215,8 +216,13 @@ def _restart_lines(emitted: Program, placed: Sequence[Placed]) -> str:
 
 def _lines_from(emitted: Program, number: int) -> Iterator[bytes]:
     """Yield the lines of a program from a line number on, chunk by chunk."""
-    for chunk in whole_lines(emitted.core):
-        count = chunk.count(b"\n")
-        if number <= count:
-            yield from chunk.split(b"\n")[number - 1 : count]
-        number = max(1, number - count)
+    passed, rest = 1, b""
+    for begin in range(0, emitted.size, _CHUNK):
+        chunk = emitted.text_slice(begin, min(begin + _CHUNK, emitted.size))
+        if passed + chunk.count(b"\n") < number:
+            passed += chunk.count(b"\n")
+            continue
+        *lines, rest = (rest + chunk).split(b"\n")
+        yield from lines[number - passed :]
+        passed = number
+    yield rest
