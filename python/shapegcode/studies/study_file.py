@@ -26,8 +26,8 @@ from pydantic import BeforeValidator, ConfigDict, Field, Strict, model_validator
 from shapegcode.errors import ArgumentError, FileError, Problem
 from shapegcode.machine import Machine
 from shapegcode.settings.describe import keys_schema, toml_schema
-from shapegcode.settings.keys import Bool, Float, InlineTable, Positive, Text, TomlTable, key, table_type
-from shapegcode.settings.load import KeyProblem, field_of, parsed, read_text, validated
+from shapegcode.settings.keys import Bool, Float, InlineTable, Positive, Text, TomlTable, item_type, key, table_type
+from shapegcode.settings.load import KeyProblem, parsed, read_text, validated
 from shapegcode.studies.optimize import USUAL_CONVERSIONS, USUAL_DRAWS
 from shapegcode.studies.replay import DEFAULT_MEASURES, MEASURES
 from shapegcode.studies.varied import MAX_DRAWS, Distribution, listed, lognormal, normal, uniform
@@ -111,8 +111,19 @@ def _flat(given: Mapping[str, object], above: tuple[str, ...] = ()) -> Iterator[
 
 def _is_value(parts: Sequence[str]) -> bool:
     """True if these are the parts of a key of the machine file that is not a table."""
-    field = field_of(Machine, [int(part) if part.isdigit() else part for part in parts])
-    return field is not None and table_type(field) is None and get_origin(field.annotation) is not dict
+    table: type[TomlTable] | None = Machine
+    field = None
+    for part in parts:
+        if field is not None and item_type(field) is not None and part.isdigit():
+            field = None
+            continue
+        field = None if table is None else table.model_fields.get(part)
+        if field is None:
+            return False
+        table = table_type(field)
+        if table is None and get_origin(field.annotation) is dict:
+            return False
+    return table is None
 
 
 Values = Annotated[dict[str, Annotated[DrawnValue, BeforeValidator(_as_table)]], Field(min_length=1)]
