@@ -45,7 +45,7 @@ SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 .PHONY: help demo test test-all lint bench bench-full bench-realtime coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
-        build-packages test-packages package dev fetched lint-package lint-others tidy tidy-all release plain sanitize threads wheel stub-check \
+        build-packages test-packages package dev fetched lint-package lint-others tidy tidy-all release trials plain sanitize threads wheel stub-check \
         test-all-core test-all-python test-linuxcnc fuzz-parameters fuzz-merge
 
 help:
@@ -94,9 +94,8 @@ test-all:
 	$(MAKE) docs
 	$(BIN)/python tests/tools/full_pass.py write
 
-test-all-core: export SHAPEGCODE_ALL_TRIALS := 1
 test-all-core:
-	ctest --preset release -L trials $(CTEST_FLAGS)
+	$(MAKE) trials
 	$(MAKE) plain
 	$(MAKE) sanitize
 	$(MAKE) threads
@@ -148,10 +147,7 @@ bench-realtime: build-packages
 	cmake --build build/bench --target realtime
 	build/bench/realtime $(REALTIME)
 
-coverage: test-packages dev
-	tests/tools/fetch_rs274.sh
-	tests/tools/fetch_peers.sh
-	tests/tools/fetch_axe.sh
+coverage: test-packages dev fetched
 	tests/tools/coverage.sh -m 'not slow'
 
 # New inputs go to build/, so that the kept corpus grows only by `fuzz-merge`, which adds what covers more.
@@ -276,12 +272,18 @@ sanitize: test-packages
 	cmake --build --preset $@
 	ctest --preset $@ $(CTEST_FLAGS)
 
+# All random trials of the C++ tests, of which `release` runs half.
+trials: test-packages .venv/.runtime
+	$(CONFIGURE_RELEASE)
+	cmake --build --preset release --target core_tests
+	SHAPEGCODE_ALL_TRIALS=1 ctest --preset release -L trials $(CTEST_FLAGS)
+
 # The controller with a thread for each of its parts, and LinuxCNC's component as it is unloaded, under ThreadSanitizer.
 threads: test-packages .venv/.runtime
 	$(CONFIGURE_RELEASE)
 	cmake --build --preset release --target thread_tests hal_thread_tests
 	TSAN_OPTIONS=halt_on_error=1 build/release/tests/cpp/thread_tests
-	TSAN_OPTIONS=halt_on_error=1 build/release/tests/cpp/hal_thread_tests --source-file='*test_linuxcnc_shaper.cpp'
+	SHAPEGCODE_ALL_TRIALS=1 TSAN_OPTIONS=halt_on_error=1 build/release/tests/cpp/hal_thread_tests --source-file='*test_linuxcnc_shaper.cpp'
 
 # Each source and public header by itself, with Clang's warnings as errors: read, not compiled, as GCC compiles them all.
 plain: .venv/.runtime

@@ -13,7 +13,8 @@
 
 namespace shapegcode::bindings {
 
-/// Calls back into Python, which gives (name, bytes) or None, from a reading that has let go of the interpreter lock.
+/// Calls back into Python, which gives (name, bytes) or None, from a reading that has let go of the interpreter lock. A
+/// file's name may hold what is no UTF-8: that is escaped, as by `shown_name` in Python.
 template <class Key>
 std::function<std::optional<SourceText>(Key)> source_loader(pybind11::object loader) {
   if (loader.is_none()) return {};
@@ -26,8 +27,9 @@ std::function<std::optional<SourceText>(Key)> source_loader(pybind11::object loa
     const pybind11::gil_scoped_acquire acquire;
     const pybind11::object result = (*callable)(key);
     if (result.is_none()) return std::nullopt;
-    const auto pair = result.cast<std::pair<std::string, pybind11::bytes>>();
-    return SourceText{pair.first, static_cast<std::string>(pair.second)};
+    const auto [name, text] = result.cast<std::pair<pybind11::str, pybind11::bytes>>();
+    const pybind11::bytes shown = name.attr("encode")("utf-8", "backslashreplace");
+    return SourceText{static_cast<std::string>(shown), static_cast<std::string>(text)};
   };
 }
 

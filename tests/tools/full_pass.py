@@ -1,11 +1,10 @@
-"""What changed since `make test-all` last passed: `full_pass.py write [core] | changed [core|python] | files`.
+"""What changed since `make test-all` last passed: `full_pass.py write | changed [core|python] | files`.
 
 `write` puts a hash of each group of files that the long checks guard into tests/full_pass.txt, which is committed: a
-folder of cpp/, or all of another place; `write core` of those only that `make test-all-core tidy-all` guards.
-`changed` prints what must run again (core, python) because a file of it is new, gone or another one; nothing: all of it
-passed as it is. `files` prints the sources and headers of the core's folders that changed or include a header of one
-that did, for clang-tidy, which reads a folder as one and finds in the others what it found before. A change of the core
-counts for the Python tests too.
+folder of cpp/, or all of another place. `changed` prints what must run again (core, python) because a file of it is
+new, gone or another one; nothing: all of it passed as it is. `files` prints the sources and headers of the core's
+folders that changed or include a header of one that did, for clang-tidy, which reads a folder as one and finds in the
+others what it found before. A change of the core counts for the Python tests too.
 """
 
 from __future__ import annotations
@@ -103,14 +102,11 @@ def main() -> None:
     command = sys.argv[1]
     groups = guarded()
     now = {group: mark_of(names) for group, names in groups.items()}
-    lines = STAMP.read_text(encoding="utf-8").splitlines() if STAMP.is_file() else []
-    then = {group: mark for mark, group in (line.split(" ", 1) for line in lines)}
     if command == "write":
-        if "core" in sys.argv[2:]:
-            now = {group: mark for group, mark in now.items() if group.startswith(CORE)}
-            now |= {group: mark for group, mark in then.items() if not group.startswith(CORE)}
         STAMP.write_text("".join(f"{mark} {group}\n" for group, mark in sorted(now.items())), encoding="utf-8")
         return
+    lines = STAMP.read_text(encoding="utf-8").splitlines() if STAMP.is_file() else []
+    then = {group: mark for mark, group in (line.split(" ", 1) for line in lines)}
     changed = {group for group in now.keys() | then.keys() if now.get(group) != then.get(group)}
     if command == "files":
         folders = core_folders(groups, changed)

@@ -26,7 +26,6 @@ from shapegcode.program.foreign.read import (
     ForeignSettings,
     program_folders,
     refuse_words_behind_semicolon,
-    shown_name,
 )
 from shapegcode.settings.keys import toml
 
@@ -198,7 +197,7 @@ class Reading:
                 text = foreign.called_text(text.decode("latin-1"), file).encode("latin-1")
             elif foreign is None and not self.emitted:
                 refuse_words_behind_semicolon(text, file)
-            self.called[number] = shown_name(file), text
+            self.called[number] = file, text
         return self.called.get(number)
 
     def differences(self, machine: Machine) -> list[str]:

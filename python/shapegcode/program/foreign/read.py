@@ -85,7 +85,7 @@ def program_folders(machine: Machine, folder: Path | None) -> list[Path]:
 def called_program(path: Path, machine: Machine) -> tuple[str, bytes]:
     """Read a called program, within the size limit: its name and text."""
     most = min(_MAX_CALLED_BYTES, machine.controller.max_program_bytes)
-    return shown_name(str(path)), read_file(path, most).removeprefix(BOM_UTF8)
+    return str(path), read_file(path, most).removeprefix(BOM_UTF8)
 
 
 def shown_name(file: str) -> str:

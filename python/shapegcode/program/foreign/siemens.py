@@ -66,7 +66,7 @@ def _finder(machine: Machine, folder: Path | None) -> Callable[[str], tuple[str,
         path = next((files[file] for file in known if file in files), None)
         if path is None:
             return None
-        shown, text = read.called_program(path, machine)
-        return shown, text.decode("utf-8", "replace").encode()
+        file, text = read.called_program(path, machine)
+        return file, text.decode("utf-8", "replace").encode()
 
     return find
