@@ -103,7 +103,7 @@ TEST_CASE("a new override acts behind the section that is being run") {
 
 TEST_CASE("a window that is hardly longer than the braking distance costs 2 % at most") {
   // From 200 mm/s within 1000 mm/s2 and 50 000 mm/s3: 22 mm, 110 blocks.
-  ControllerSettings settings = limited_to(114);
+  ControllerSettings settings = limited_to(112);
   settings.smoothing_time_s = 0.0;
   std::vector<Segment> row;
   constexpr int blocks = 1500;

@@ -26,10 +26,11 @@ constexpr double stops_ahead = 2.0;
 // window than that, or of the stations where these are too few for the window.
 constexpr double stations_for_new = 16.0;
 constexpr double renewed_share = 0.25;
-// In a window that holds the braking distance but no long section besides, sections are the shortest and plans are
-// made more often: what a section takes of the window, the motion has less to brake in. Only where plans are small: so
-// many stations for each period of a section, which take some tenths of it.
-constexpr double stations_for_new_if_tight = 32.0;
+// In a window that holds the braking distance but no long section besides, sections are shorter and plans are made more
+// often: what a section takes of the window, the motion has less to brake in. Only where plans are small: so many
+// stations for each period of a section, which take some tenths of it.
+constexpr std::size_t section_if_tight = 6;
+constexpr double stations_for_new_if_tight = 64.0;
 constexpr std::size_t stations_of_period = 32;
 // What is tried while the motion is under way, by its speed; and how often from rest, with less each time.
 constexpr std::array<double, 4> slower{no_limit, 0.9, 0.6, 0.0};
@@ -447,8 +448,8 @@ void OnlinePlanner::give_out(Section& section, const PathPoint& from, std::uint6
   section.runs_out = motion_.at_end() && at_end && section.done == pushed && !entry.segment.stop_at_end;
   fixed_ = std::max(fixed_, plan_.fix(from.segment, rest.point.segment, rest.point.offset, published_ + 1));
   const double periods = periods_share * static_cast<double>(section.whole_count - section.count);
-  const std::size_t shortest =
-      std::max(shortest_section, static_cast<std::size_t>(rules_.lead_periods) / sections_ahead);
+  const std::size_t shortest = std::max(is_tight() ? section_if_tight : shortest_section,
+                                        static_cast<std::size_t>(rules_.lead_periods) / sections_ahead);
   const std::size_t longest = is_tight() ? shortest : std::max(shortest, longest_section);
   length_ = std::clamp(static_cast<std::size_t>(periods), shortest, longest);
   has_motion_ = true;

@@ -394,7 +394,7 @@ ControllableSet ControllableSets::before(const Station& station, const PlannedSe
   for (std::size_t i = 0; i < rows.count; ++i) bounds.add(rows.rows[i], no_coefficient, polygon);
   for (std::size_t i = 0; i < next.count; ++i) bounds.add(edge_row(next, i, length), 0.0, polygon);
   bounds.cut(polygon);
-  polygon.simplify(ControllableSet::max_corners);
+  polygon.simplify(making.corners);
   return polygon.set();
 }
 

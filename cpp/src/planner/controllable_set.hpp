@@ -61,6 +61,7 @@ struct Stretch {
 struct Making {
   double cap = 0.0, b_begin = 0.0, b_end = 0.0;
   double least_acceleration = -no_limit;
+  std::size_t corners = ControllableSet::max_corners;  ///< that it keeps
 };
 
 class ControllableSets {

@@ -8,13 +8,15 @@ namespace shapegcode {
 namespace {
 
 // Rounds of the plan after the first; more have no significant effect.
-constexpr int rounds = 4;
+constexpr int rounds = 3;
 // Stations that are made room for at first, where they may become more.
 constexpr std::size_t first_capacity = 1024;
 // The jerk limit is J / sqrt(b), of which a set has a tangent. It may lie too high better than too low: there its bound
 // comes down to nothing at three times the square of the speed where it was laid.
 constexpr double tangent_on_lines = 1.1;
 constexpr double tangent_on_curves = 1.3;
+// Corners of a set where the path turns: each costs there what all limits of all axes do.
+constexpr std::size_t corners_on_curves = 8;
 // As near to where the motion is expected as that is near enough: what it costs grows with its square.
 constexpr double near_share = 0.02;
 // Motions that differ by less, as a share of the square of their speed, are one.
@@ -26,7 +28,7 @@ constexpr double slow_share = 0.01;
 // Where keeping sets was of no use, because nearly all of them depend on the end, so many plans are made without.
 constexpr int plans_anew = 16;
 // Rounds in which each valley is tried; what makes one worth while, and all of them, as a share of the time.
-constexpr int valley_rounds = 2;
+constexpr int valley_rounds = 3;
 constexpr double least_gain_s = 1e-5;
 constexpr double least_gain = 0.001;
 // Of an interval at rest, mm/s.
@@ -178,6 +180,7 @@ bool PathPlan::make_set(std::size_t index) noexcept {
   Course& course = courses_[index];
   const Course& next = courses_[index + 1];
   Making making = making_of(index);
+  if (!here.straight) making.corners = corners_on_curves;
   if (here.valley) making.cap = std::min(making.cap, best_passing(index));
   course.approaches = is_approach(index);
   if (course.approaches) {
