@@ -268,7 +268,7 @@ class LogFacts(Facts):
 
     @property
     def fine_s(self) -> float:
-        """Longest second moving average that may merely be interpolation between unknown periods."""
+        """Longest second time constant that may come from sampling alone, and so does not count as a bell time."""
         if self.bent and self.period:
             return _FINE_BENT * self.period
         return 0.0 if self.held else _FINE * max(self.period or 0.0, 2.0 * self.sampling)
@@ -330,7 +330,7 @@ def _cutting_fits(facts: LogFacts, stops: list[moves.PartLog]) -> dict[str, list
 
 @dataclass(frozen=True)
 class _Rapid:
-    """Fit of one part of rapids; values with their half-widths, s."""
+    """Fit to the rapids of one part of a test; values with their half-widths, s."""
 
     long: bool  # the rate is reached
     ramp: _Interval

@@ -165,7 +165,7 @@ def _written(plan: FeedPlan, load: PathLoad) -> Vector:
 
 
 def groups(distance_mm: Vector, most: int) -> npt.NDArray[np.intp]:
-    """First stations of at most *most* groups of about equal length, which contain every station."""
+    """Divide the stations into *most* groups of about equal length, or fewer: index of each group's first station."""
     if len(distance_mm) <= most:
         return np.arange(len(distance_mm))
     edges = np.linspace(0.0, float(distance_mm[-1]), most + 1)[:-1]

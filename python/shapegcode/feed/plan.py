@@ -60,7 +60,7 @@ class Mover:
         return 0.5 * self.period_s * sum(filter_.duration_samples for filter_ in self.filters)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
-        """Travel of a path made of `along`, with stations along its length; feeds are averaged over the window."""
+        """Simulate `path`, a cut with other feeds; its speed at stations along `along`, mean over the window."""
         raise NotImplementedError
 
 

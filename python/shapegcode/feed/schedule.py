@@ -59,7 +59,7 @@ def schedule_feed(
         stock: stock before the first block.
         motion: motion at the new feeds; None: the controller's own, as for an ordinary program.
         margin: safety margin to each limit, as a ratio.
-        resolution_mm: grid of the material; None: a hundredth of the tool's diameter.
+        resolution_mm: grid spacing of the simulated material; None: a hundredth of the tool's diameter.
         on_progress: called with the completed fraction, 0 to 1.
 
     Returns:

@@ -148,7 +148,7 @@ class KindCount:
 
     @property
     def changed(self) -> int:
-        """How many of the original are missing or different; those that only the other program has, if none are."""
+        """How many of the original are missing or different; if none is, how many the other program has in addition."""
         return self.original - self.unchanged or self.emitted - self.unchanged
 
 

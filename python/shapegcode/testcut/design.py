@@ -429,7 +429,7 @@ class _Writer:
         yield f"G00 Z{decimal(_NEAR_Z_MM, 3)}"
 
     def _offsets(self, before: float, wall: float) -> list[float]:
-        """Offset of each cut outside the edge: small depths, and a very small last one with little deflection."""
+        """Distance of each cut from the edge: equal small depths, and a thin last cut that hardly bends the tool."""
         more = (
             float(np.max(wall - self.design.edge.at(np.linspace(0.0, self.design.stock_mm, 200)) - before)) - _SKIM_MM
         )

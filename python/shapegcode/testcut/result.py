@@ -1,4 +1,4 @@
-"""Designs of test cuts, and results of their records: coefficients, forces, the followed feed."""
+"""Designs of test cuts, and results of their records: coefficients, forces, and how the control follows the feed."""
 
 from __future__ import annotations
 

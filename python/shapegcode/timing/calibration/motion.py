@@ -504,7 +504,7 @@ def _names(runs: Sequence[ObservedRun]) -> list[str]:
 
 
 def _spans(run: ObservedRun) -> list[_Span]:
-    """Spans: from a reading to the next across a function, from cut to cut, and at start and end of the run."""
+    """Times between logged lines with M, S or T functions in between: between cuts, at start and end of the run."""
     line, time_s, function = run.line, run.time_s, run.timed.function
     spans = []
 
