@@ -208,7 +208,7 @@ def _feed_steps(facts: LogFacts, parts: list[moves.PartLog]) -> None:
     followed = [d for d in depths if all(depths[e] >= _FOLLOWED for e in depths if e >= d)]
     shown = ", ".join(f"{d:g} mm {max(0.0, min(1.0, depths[d])) * 100:.0f} %" for d in sorted(depths))
     if not followed:
-        facts.add_unknown(name, f"none of the distances in the box is followed: {shown}", "mm")
+        facts.add_unknown(name, f"the speed follows over none of the distances in the box: {shown}", "mm")
         return
     best = min(followed)
     below = max((d for d in depths if d < best), default=0.0)

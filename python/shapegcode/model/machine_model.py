@@ -419,8 +419,8 @@ def ini_lines(
         more = "" if worst.largest_ratio < _MOST_KINK_RATIO else ", the highest accepted value"
         yield "kink_ratio", worst.line, (
             f"LinuxCNC slows where {kinks} of {blocks} shaped blocks meet: {worst.speed_mm_per_s:.0f} mm/s turn by "
-            f"{worst.angle_rad * 1e3:.2f} mrad within {rules.period_s * 1e3:g} ms, {worst.largest_ratio:.2f} of the "
-            f"acceleration, and {rules.kink_ratio:g} is allowed; INI file: [TRAJ] ARC_BLEND_KINK_RATIO = "
+            f"{worst.angle_rad * 1e3:.2f} mrad within {rules.period_s * 1e3:g} ms, which takes {worst.largest_ratio:.2f} "
+            f"of the acceleration, and {rules.kink_ratio:g} is allowed; INI file: [TRAJ] ARC_BLEND_KINK_RATIO = "
             f"{ratio:g}{more}"
         )  # fmt: skip
     if ramps := sum(each.ramps for each in found):
