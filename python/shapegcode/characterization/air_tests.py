@@ -181,7 +181,7 @@ class _Maker:
         return Part(pattern, axis, count, length, self.feed / slower, dwell_s=dwell if pattern == "dwell" else 0.0)
 
     def run(self, axis: str, count: int, duration_s: float, side: int = 0) -> Part:
-        """Continuous moves of one length back and forth, over as much of the box as holds a whole number of them."""
+        """Continuous moves of one length back and forth, as many in one direction as fit into the box."""
         length = self._length(axis, duration_s, self.feed, side)
         stride = min(int((abs(self._box.travel_mm(axis)) + 1e-9) / abs(length)), count // 2)
         turns = max(1, round(count / (2 * stride)))

@@ -406,7 +406,7 @@ Progress = Callable[[str, float, int], None]
 
 @dataclass(frozen=True)
 class CutChoice:
-    """Choices of the caller."""
+    """What the caller chose: cuts not to shape, and what else to do."""
 
     not_shaped: dict[int, str]  # reason not to shape a cut, by its index
     shape_all: bool  # shape whatever can be shaped

@@ -189,7 +189,7 @@ class WallMaps:
 def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTraces) -> WallMaps | None:
     """Walls along the cutting path; None: no walls.
 
-    A column represents an interval of the path, at its largest original peak resultant.
+    A column is the wall where the peak resultant of the original is largest in an interval of the path.
 
     Source: the error of a wall is from Kim and Ko, 2001 (paper 001), section 2.3; its map is this project's.
     """

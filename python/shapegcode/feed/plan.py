@@ -238,7 +238,7 @@ def goes_on(track: _core.EngagementTrack) -> npt.NDArray[np.bool_]:
 
 
 def _stepped(limit: Vector, programmed: Vector) -> Vector:
-    """Feeds rounded down in steps of half a percent from the programmed feed; those above it, from the largest."""
+    """Round feeds down, in steps of half a percent: below the programmed feed from that, above it from the largest."""
     top = np.where(limit > programmed, limit.max(initial=0.0), programmed)
     steps = np.ceil(np.log(top / limit) / math.log1p(_STEP) - 1e-9)
     return np.asarray(top * (1.0 + _STEP) ** -steps)

@@ -328,7 +328,7 @@ class Walk:
             )
 
     def sweep_region(self, material: _core.Material, index: int) -> SurveyedRegion:
-        """A region."""
+        """Sweep a region, and store its engagement."""
         region = self._program.regions[index]
         tool = self._tool
         kept = why_not_swept(region, self.zero)

@@ -201,7 +201,7 @@ class SimulatedController:
         return _core.simulate_blocks(path, against or path, block_end or self.model.block_end, self._override, options)
 
     def stream(self, path: _core.Path, options: _core.SimulationOptions, rest_s: float) -> _core.SimulationStream:
-        """Simulate the same motion piece by piece, and the plant for a while after its end."""
+        """Simulate the motion of `simulate` piece by piece, and the plant for a while after its end."""
         options.axis_filters = self.filters
         planned = self._planned(path)
         if planned is not None:
@@ -419,9 +419,9 @@ def ini_lines(
         more = "" if worst.largest_ratio < _MOST_KINK_RATIO else ", the highest accepted value"
         yield "kink_ratio", worst.line, (
             f"LinuxCNC slows where {kinks} of {blocks} shaped blocks meet: {worst.speed_mm_per_s:.0f} mm/s turn by "
-            f"{worst.angle_rad * 1e3:.2f} mrad within {rules.period_s * 1e3:g} ms, which takes {worst.largest_ratio:.2f} "
-            f"of the acceleration, and {rules.kink_ratio:g} is allowed; INI file: [TRAJ] ARC_BLEND_KINK_RATIO = "
-            f"{ratio:g}{more}"
+            f"{worst.angle_rad * 1e3:.2f} mrad within {rules.period_s * 1e3:g} ms, which takes "
+            f"{worst.largest_ratio:.2f} of the acceleration, and {rules.kink_ratio:g} is allowed; INI file: "
+            f"[TRAJ] ARC_BLEND_KINK_RATIO = {ratio:g}{more}"
         )  # fmt: skip
     if ramps := sum(each.ramps for each in found):
         yield "ramp_frequency", 0, (

@@ -9,7 +9,7 @@ Its cautions, each a sentence and a comment, are also used in reports, pages, te
 (BLOCK PERIOD 5 MS SHAPER 20 MS ZVD)
 (SET FEED OVERRIDE 100 PCT)
 (NO SINGLE BLOCK IN SHAPED CUTS)
-(RESTART ONLY AFTER A SHAPED COMMENT OR AT A LISTED N)
+(RESTART ONLY AFTER A SHAPED COMMENT OR AT N OF THE REPORT)
 (FIRST RUN ABOVE THE PART WITHOUT TOOL)
 (TIME CONSTANT AFTER INTERPOLATION 0 MS)
 
@@ -68,7 +68,7 @@ FEED_HOLD = Habit(
 )
 RESTART = Habit(
     "restart",
-    "RESTART ONLY AFTER A SHAPED COMMENT OR AT A LISTED N",
+    "RESTART ONLY AFTER A SHAPED COMMENT OR AT N OF THE REPORT",
     "restart only where a cut begins, or at a restart point: other blocks of a shaped cut are not valid restart points",
 )
 FIRST_RUN = Habit(

@@ -300,7 +300,7 @@ def _blocks(
 
 
 def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[FloatArray, FloatArray]:
-    """Distance along the corner's path from the start of S2, and the radial depth until it is constant again."""
+    """Distance along the path from the start of section S2 (paper 001), and the radial depth until it is constant."""
     allowance, rough, finish = sizes
     before = 2.0 * (rough + finish)
     cut = _core.CornerCut(given.tool.radius_mm, rough, finish, allowance, before_mm=before, after_mm=before)
