@@ -79,7 +79,7 @@ class OrdinaryMotion(Mover):
 def travel_emitted(
     blocks: _core.Path, path: _core.Path, machine: Machine, stations_mm: Vector, window_s: float
 ) -> Travelled:
-    """Travel of simulated shaped blocks along the programmed path; else as `Mover.travel`."""
+    """Simulate shaped blocks; their speed at stations along the programmed path, mean over the window."""
     model = MachineModel(machine)
     return Travelled.of(
         _core.travel_blocks(blocks, path, model.own_rule, stations_mm, model.period_s, model.shaped.filters, window_s)

@@ -330,7 +330,7 @@ def _resultant(loads: Sequence[Load]) -> result.ResultantForce:
 
 
 def _peak(column: str, loads: Sequence[tuple[Callable[[int], str], PathLoad]]) -> result.PeakLoad:
-    """Largest value of a column before and after, with the location of the latter; *loads*: locating function, load."""
+    """Largest value of a column before and after, and where; *loads*: each with a function that locates a station."""
     original, emitted, place = 0.0, 0.0, ""
     for place_of, load in loads:
         was, now = getattr(load.original, column), getattr(load.emitted, column)

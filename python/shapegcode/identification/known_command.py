@@ -436,7 +436,7 @@ class _Clock:
 
 
 def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
-    """Used parts: the clear ones, and others in time with the program if significant or between used ones."""
+    """Parts to use: clear ones, and others at their time in the program if they are significant or lie between."""
     lags = np.linspace(-_AWAY_S, _AWAY_S, 401)
     crossed = spectra.response * np.conj(spectra.command)
     height = np.abs(crossed @ np.exp(spectra.turn[:, None] * lags))
