@@ -112,8 +112,9 @@ def test_time_is_that_of_the_words(machine: sg.Machine, tmp_path: Path) -> None:
         lambda text: re.sub(rb"(?m)^X", b" X ", text).replace(b"O1\n", b"O0777(COPY)\n"),
         lambda text: text.replace(b"M30", b"(THE END)\nM30"),
         lambda text: text.replace(b"%\n", b""),
+        lambda text: text.replace(b"(CHECKSUM ", b"(TEXT "),
     ],
-    ids=["CR LF", "LF CR CR", "N words", "blanks and O", "a comment", "without %"],
+    ids=["CR LF", "LF CR CR", "N words", "blanks and O", "a comment", "without %", "an older header"],
 )
 def test_what_a_control_changes_in_passing_is_no_edit(
     change: Callable[[bytes], bytes], conversion: sg.Conversion, original: Path, machine: sg.Machine, tmp_path: Path

@@ -108,4 +108,4 @@ def test_warnings_and_modes_reach_the_report_and_the_header() -> None:
     for warnings in (sg.convert(program, heavy).warnings, sg.simulate(program, heavy).warnings):
         assert any("lies outside the table" in warning for warning in warnings)
     moving = machine_with(OVER_Z)
-    assert b"SHAPERS FOLLOW Z)" in sg.convert(Program.from_text(zig_zag(4, 4.0), moving), moving).text
+    assert b"(SHAPER CHANGES WITH Z POSITION)" in sg.convert(Program.from_text(zig_zag(4, 4.0), moving), moving).text

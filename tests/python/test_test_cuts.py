@@ -466,7 +466,7 @@ def test_where_no_interval_is_followed_none_is_proposed(tmp_path: Path, capsys: 
     report = fitted(tmp_path, *interval_files(tmp_path, 0.4), code=1)
     assert report["interval_mm"] is None
     assert report["lag_interval_mm"] > 0.6
-    assert "no measured interval is followed" in capsys.readouterr().out
+    assert "the control follows none of the measured intervals" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

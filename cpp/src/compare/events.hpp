@@ -13,7 +13,7 @@
 
 namespace shapegcode::detail {
 
-/// Modes at the begin of a cut that no event of their own tells.
+/// Modes at the start of a cut that no event of their own tells.
 struct CutModes {
   int plane = 17;
   int distance = 90;

@@ -92,7 +92,7 @@ double rounded_down(double feed, const FeedScheduleOptions& options) {
   return whole > 0.0 ? whole : feed;
 }
 
-// Where a run of blocks may change its feed, its begin and end included.
+// Where a run of blocks may change its feed, its start and end included.
 std::vector<double> border_candidates(double begin_mm, std::span<const FeedBlock> run, double least_mm) {
   std::vector<double> borders = {begin_mm};
   for (const FeedBlock& block : run) {
@@ -112,7 +112,7 @@ std::vector<double> border_candidates(double begin_mm, std::span<const FeedBlock
   return borders;
 }
 
-// Borders of the sections of one run: the cheapest ones from its begin to its end.
+// Borders of the sections of one run: the cheapest ones from its start to its end.
 void schedule_run(const std::vector<double>& borders, LowestFeed& lowest, const FeedScheduleOptions& options,
                   std::vector<FeedStretch>& sections) {
   const std::size_t count = borders.size();

@@ -301,7 +301,7 @@ class Fitter {
   std::uint32_t left_ = 0;  // likewise, at the end
   std::size_t break_ = 0;
   std::uint32_t looked_until_ = 0;  // end of the block that would be written were it not for equal ones
-  std::uint32_t free_from_ = 0;     // where it is far from its begin
+  std::uint32_t free_from_ = 0;     // where it is far from its start
 };
 
 // Time that was lent from before is rest in front of the command.

@@ -90,7 +90,7 @@ class ModalRounder {
 
   std::vector<ModeStep> modes_;
   double decay_ = 0.0;                              // of the most damped mode over a period
-  std::vector<std::complex<double>> state_;         // per mode, at the begin of the next section
+  std::vector<std::complex<double>> state_;         // per mode, at the start of the next section
   std::vector<std::complex<double>> chosen_state_;  // at the end of the section last chosen
   Choices kept_;
   Choices grown_;

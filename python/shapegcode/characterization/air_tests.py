@@ -166,7 +166,7 @@ class _Maker:
         return math.copysign(length, travel)
 
     def _length(self, axis: str, duration_s: float, feed: float, side: int) -> float:
-        """Signed length for a duration; *side* -1 and +1: just below or just above it, for any increment."""
+        """Signed length for a duration; *side* -1, +1: rounded to increments below or above it."""
         exact = duration_s * feed / _PER_MINUTE
         margin = max(self._step, 0.0005 * exact) if side else 0.0
         increments = round((exact + side * margin) / self._step)
@@ -181,7 +181,7 @@ class _Maker:
         return Part(pattern, axis, count, length, self.feed / slower, dwell_s=dwell if pattern == "dwell" else 0.0)
 
     def run(self, axis: str, count: int, duration_s: float, side: int = 0) -> Part:
-        """Continuous moves back and forth, over as much of the box as they fill evenly."""
+        """Continuous moves of one length back and forth, as many in one direction as fit into the box."""
         length = self._length(axis, duration_s, self.feed, side)
         stride = min(int((abs(self._box.travel_mm(axis)) + 1e-9) / abs(length)), count // 2)
         turns = max(1, round(count / (2 * stride)))
@@ -192,7 +192,7 @@ class _Maker:
         return Part("rapid", axis, count, self._signed(axis, increments), self.rapid[axis])
 
     def rate_is_reached(self, axis: str) -> bool:
-        """Whether rapids over the box reach their rate; otherwise each gives only bounds, so more are used."""
+        """Whether rapids over the box reach their rate; otherwise each only bounds a time, so more are run."""
         return abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / _PER_MINUTE
 
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:

@@ -208,7 +208,7 @@ def _feed_steps(facts: LogFacts, parts: list[moves.PartLog]) -> None:
     followed = [d for d in depths if all(depths[e] >= _FOLLOWED for e in depths if e >= d)]
     shown = ", ".join(f"{d:g} mm {max(0.0, min(1.0, depths[d])) * 100:.0f} %" for d in sorted(depths))
     if not followed:
-        facts.add_unknown(name, f"none of the distances in the box is followed: {shown}", "mm")
+        facts.add_unknown(name, f"the speed follows over none of the distances in the box: {shown}", "mm")
         return
     best = min(followed)
     below = max((d for d in depths if d < best), default=0.0)
@@ -268,7 +268,7 @@ class LogFacts(Facts):
 
     @property
     def fine_s(self) -> float:
-        """Longest second moving average that may merely be interpolation between unknown periods."""
+        """Longest second time constant that may come from sampling alone, and so does not count as a bell time."""
         if self.bent and self.period:
             return _FINE_BENT * self.period
         return 0.0 if self.held else _FINE * max(self.period or 0.0, 2.0 * self.sampling)
@@ -330,7 +330,7 @@ def _cutting_fits(facts: LogFacts, stops: list[moves.PartLog]) -> dict[str, list
 
 @dataclass(frozen=True)
 class _Rapid:
-    """Fit of one part of rapids; values with their half-widths, s."""
+    """Fit to the rapids of one part of a test; values with their half-widths, s."""
 
     long: bool  # the rate is reached
     ramp: _Interval

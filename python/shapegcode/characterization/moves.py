@@ -38,7 +38,7 @@ def held_samples(log: ServoLog) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class _Bends:
-    """Fraction of a command's curvature at every count-th sample and its successor."""
+    """Where the speed of a command changes: how much of that at every count-th sample and the one after it."""
 
     share: float  # fraction of all curvature
     first: int  # index of the first such sample

@@ -69,7 +69,7 @@ class Facts:
         self.found.append(ControllerFact(quantity, value, low, high, unit, key, self.source, note))
 
     def add_word(self, quantity: str, word: str, key: str = "", note: str = "") -> None:
-        """A word."""
+        """Add a quantity whose value is a word."""
         self.found.append(ControllerFact(quantity, word, None, None, "", key, self.source, note))
 
     def add_unknown(self, quantity: str, why: str, unit: str = "s", high: float | None = None) -> None:

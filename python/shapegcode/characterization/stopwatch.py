@@ -1,6 +1,6 @@
 """Fits controller parameters to stopwatch times of the test programs; method: this project.
 
-Each time is one equation. For every usual period and both block-end rules the others are fitted by least squares; a
+Each time is one equation. For every usual period and both rules of block timing the other parameters are fitted; a
 period or rule is known only if the alternatives fit clearly worse. Rapids are fitted last, for every time constant.
 """
 

@@ -1,6 +1,6 @@
-"""Find what a controller would refuse in a program, by the reader, and where it would not run it as programmed.
+"""Find what a controller would refuse in a program (on reading it), and where it would not run it as programmed.
 
-The latter is computed from the time of each block at its feed.
+The latter follows from the time of each block at its feed.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),
     Command("identify", "find vibration modes in a tap test or decay, and write them to the machine file"),
     Command("sweep", "write a program that shakes an axis, to find modes without a hammer (identify --sweep)"),
-    Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
+    Command("testcut", "write test cuts as programs, and fit cutting-force coefficients to their measured forces"),
     Command("batch", "run a command over many programs and machines, and resume where it stopped"),
     Command("study", "simulate a program on sampled machines (Monte Carlo): probability of staying within tolerance"),
     Command(

@@ -121,7 +121,7 @@ def _study(args: argparse.Namespace) -> int:
 
 STUDY = Interface(
     "Converts a program once and simulates it on sampled machines (Monte Carlo): probability of staying "
-    "within tolerance, quantiles, most influential value. Exit code 1 if the probability is below at_least.",
+    "within tolerance, quantiles, most influential value. Exit code 1 if the probability is below the file's at_least.",
     (
         *_study_options("program, machine, varied parameters", "number of samples"),
         ("--csv", "FILE", None, "write one line per sample; -: standard output"),

@@ -224,13 +224,13 @@ _SHAPE = (
 )
 _TAPER = (
     ("-F --feeds", "F,F,...", _list, "feeds in mm/min; a single one is used at half, full and double value", NEEDED),
-    ("--radial-depth", "MM:MM", _pair, "radial depth at begin and end of the stock (default: 0.05 to 0.35 D)"),
+    ("--radial-depth", "MM:MM", _pair, "radial depth at start and end of the stock (default: 0.05 to 0.35 D)"),
     ("--length", "MM", positive, "length of the stock along X (default: %(default)s)", 60.0),
 )
 _CORNER = (("--interval", "MM", positive, "length of a block (default: feed_control.interval_mm)", None),)
 _INTERVAL = (
     ("--intervals", "MM,MM,...", _list, "lengths of the blocks, one pass each (default: 0.2,0.4,0.6)", (0.2, 0.4, 0.6)),
-    ("--feeds", "F,F,...", _list, "feeds of the blocks, the same for every pass (default: the corner's by equation 7)"),
+    ("--feeds", "F,F,...", _list, "feeds of the blocks, the same for every pass (default: those of `corner`)"),
 )
 _FIT = (
     ("files", "CSV", {"nargs": "+"},
@@ -255,7 +255,7 @@ TESTCUT = Interface(
         "taper": (
             "increasing radial depth: for the coefficients of the cutting force (figure 4)",
             Interface(
-                "Mills a tapered edge, then passes along it with one feed each: for k1 and k2.",
+                "Mills a tapered edge, then makes passes along it, each at one feed: for k1 and k2 of the force.",
                 (*_CUT, *_TAPER, *_END), _write_cut,
             ),
         ),
@@ -263,13 +263,13 @@ TESTCUT = Interface(
             "a corner mapped to a straight edge: constant feed, then modified (figure 7)",
             Interface(
                 "Mills an edge on which a straight pass meets the radial depth of a corner, and cuts it with "
-                "constant feed, then with the feed of equation 7.", (*_CUT, *_SHAPE, *_CORNER, *_END), _write_cut,
+                "constant feed, then at constant mean resultant.", (*_CUT, *_SHAPE, *_CORNER, *_END), _write_cut,
             ),
         ),
         "interval": (
-            "feeds that change every 0.2, 0.4 and 0.6 mm: shortest interval that is followed (figure 8)",
+            "feeds that change every 0.2, 0.4 and 0.6 mm: shortest interval that the control follows (figure 8)",
             Interface(
-                "Passes of constant radial depth whose feed changes as in a corner, each with another interval.",
+                "Passes of constant radial depth whose feed changes as in a corner, each at other intervals.",
                 (*_CUT, *_SHAPE, *_INTERVAL, *_END), _write_cut,
             ),
         ),

@@ -94,7 +94,7 @@ def cutting(*, required: bool) -> tuple[Row, ...]:
          "stock file: shape of the workpiece before the first block (docs/reference/tool_files.md)"),
         ("--margin", "RATIO", share, "safety margin kept to each limit of the tool, for example 3%% (default: 1.5%%)"),
         ("--resolution", "LENGTH", micrometres,
-         "grid of the material, for example 50um (default: a hundredth of the tool's diameter)"),
+         "grid spacing of the simulated material, for example 50um (default: a hundredth of the tool's diameter)"),
     )  # fmt: skip
 
 

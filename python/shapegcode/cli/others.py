@@ -52,7 +52,7 @@ def _shaper(args: argparse.Namespace) -> int:
 
 SHAPER = Interface(
     "Designs every family of input shapers for some vibration modes and compares them: duration, residual "
-    "vibration at other frequencies, contour cost, negative impulses; and recommends one. "
+    "vibration at other frequencies, contour cost (error on arcs), negative impulses; and recommends one. "
     "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input.",
     (
         ("--mode", "HZ[:DAMPING][±BAND]", [None],
@@ -65,7 +65,7 @@ SHAPER = Interface(
          "block period on which the impulses must lie, such as 5ms; may be repeated (default: the machine's, or the "
          "best few)", []),
         ("--continuous", None, bool,
-         "design in continuous time, with --block-period on its grids too (default: without -m and --block-period)"),
+         "design in continuous time, too (default if neither -m nor --block-period is given: only in continuous time)"),
         ("--family", "NAME", {"action": "extend", "nargs": "+"},
          f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"),
         ("--list-families", None, bool, "list the families with meaning and source, and exit"),
@@ -193,7 +193,7 @@ DEMO = Interface(
     "documentation: docs/evidence/figures.md. Exit code 1 if a statement of the paper differs for an unknown reason.",
     (
         ("name", "NAME", {"type": _name, "choices": ("path",)},
-         "path: line, arc, line at both feeds and reductions: Ko, Lim and Hong, 2023 (paper 000)"),
+         "path: line, arc, line, at two feeds and two feed reductions: Ko, Lim and Hong, 2023 (paper 000)"),
         plots("folder for the pictures, if there are any (PNG and SVG)"),
         *RESULT,
     ),
@@ -218,8 +218,8 @@ def complete() -> None:
 
 
 COMPLETION = Interface(
-    "Prints the shell completion script for commands, options, their values and files. Put into "
-    '~/.bashrc or ~/.zshrc:\n\n  eval "$(shapegcode completion bash)"\n\nor zsh instead of bash; into '
+    "Prints the shell completion script for commands, options, their values and files. Line for "
+    '~/.bashrc (for ~/.zshrc with zsh instead of bash):\n\n  eval "$(shapegcode completion bash)"\n\nand for '
     "~/.config/fish/config.fish:\n\n  shapegcode completion fish | source",
     (("shell", None, ("bash", "zsh", "fish"), "your shell"),),
     _completion,

@@ -150,7 +150,7 @@ def _measure(args: argparse.Namespace) -> int:
 MEASURE = Interface(
     "Simulates programs on the machine's model and measures the response like a part: for each section of the path "
     "vibration and settling time, contour error, fitted radius, the walls that the tool leaves, their roughness "
-    "and waviness. Programs written by shapegcode are measured against the first one if that was not. "
+    "and waviness. Programs written by shapegcode are measured against the first program if it did not write that. "
     "Exit code 0; 1: the response of a program leaves the path by more than tolerance.contour_um (of shaped "
     "programs with their original only the shaped ones count); 2: bad input.",
     (

@@ -100,9 +100,9 @@ class Aims:
         """Plan cuts beyond their contour tolerance more tightly, so that they are slower. False if there are none.
 
         The bound on the feed treats corners and arcs one by one, but those within one shaper duration add up. If the
-        feed was searched for a target, tightening starts from the planned deviation (a looser bound would change
-        nothing). A cut gets its former plan back if tightening does not help, or if it is within the limit at 100 %
-        override but, after one attempt, not at other overrides.
+        planned deviation of a cut is below its tolerance, tightening starts from that deviation (a bound above it
+        would change nothing). A cut gets its former plan back if tightening does not help, or if it is within the
+        limit at 100 % override but, after one attempt, not at other overrides.
         """
         room_um = self.room_um
         tightened = False
@@ -127,7 +127,7 @@ class Aims:
         return tightened
 
     def keep_cut_price(self, written: Written, keepable: Callable[[int], bool], attempts_left: int) -> bool:
-        """Loosen the tolerance of cuts above the price of one cut; leave those unchanged that exceed it at any."""
+        """Loosen the tolerance of cuts above the price of one cut; leave a cut unchanged if no tolerance helps."""
         percent = self._machine.price.cut_time_percent
         changed = False
         for place in written.placed:
@@ -209,7 +209,7 @@ class Aims:
         if original_um > asked:
             wanted.append(("the original's contour error", original_um))
         loosest = max(asked, *(self._curve_of(index).planned_um[-1] / _MARGIN for index in cuts))
-        wanted.append(("no slowing", loosest))
+        wanted.append(("cuts not slowed", loosest))
         points = [self._point(name, um, cuts, original_s) for name, um in sorted(wanted, key=lambda each: each[1])]
         tolerances, times = [each.tolerance_um for each in points], [each.time_s for each in points]
         knee = knee_of(tolerances, times)
@@ -287,7 +287,7 @@ class CutCurve:
 class TolerancePoint:
     """The program at one contour tolerance."""
 
-    name: str  # "as asked", "1.5 times", "the original's contour error", "no slowing"
+    name: str  # "as asked", "1.5 times", "the original's contour error", "cuts not slowed"
     tolerance_um: float  # planned tolerance; without slowing: the deviation reached
     time_s: float  # of the program
     time_increase_percent: float  # over the original
@@ -406,7 +406,7 @@ Progress = Callable[[str, float, int], None]
 
 @dataclass(frozen=True)
 class CutChoice:
-    """Choices of the caller."""
+    """What the caller chose: cuts not to shape, and what else to do."""
 
     not_shaped: dict[int, str]  # reason not to shape a cut, by its index
     shape_all: bool  # shape whatever can be shaped

@@ -72,7 +72,7 @@ class RestartPoint:
 
 
 class FreeNumbers:
-    """N numbers for restart points that are free in a program."""
+    """Unused N numbers of a program, for its restart points."""
 
     def __init__(self, program: Program) -> None:
         self._program = program

@@ -24,7 +24,7 @@ from shapegcode.io.units import MM_PER_INCH
 from shapegcode.machine import Machine
 from shapegcode.machine.dialects import CODE, Dialect, code_name, dialect_of, fanuc_meaning
 from shapegcode.program import Program, located_error, written_increment_mm
-from shapegcode.program.stamp import plain_comment, text_mark
+from shapegcode.program.stamp import MARK_PENDING, plain_comment, text_mark
 
 Converted = TypeVar("Converted", bound=Conversion)
 
@@ -43,7 +43,7 @@ _CYCLES = {"G73", "G81", "G82", "G83", "G85"}
 _GROUPS = ({"G20", "G21"}, {"G93", "G94", "G95"}, {"G61", "G64"}, {f"G{code}" for code in range(54, 60)})
 _WITH_AXES = {"G10", "G27", "G28", "G29", "G30", "G31", "G52", "G53", "G92"}
 _COORDINATE = re.compile(rf"(?<![A-Z])([XYZ])({_NUMBER})")
-_MARK_LINE = re.compile(r"\(TEXT [0-9A-F]{8}\)")
+_MARK_LINE = re.compile(r"\(CHECKSUM [0-9A-F]{8}\)")
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,8 @@ def translate(
         out += writer.opening("")
     end = "\r\n" if program.core.line_end == "\r\n" else "\n"
     text = (end.join(out) + (end if has_end else "")).encode("latin-1")
-    if b"(TEXT 00000000)" in text:
-        text = text.replace(b"(TEXT 00000000)", f"(TEXT {text_mark(text)})".encode(), 1)
+    if MARK_PENDING in text:
+        text = text.replace(MARK_PENDING, f"(CHECKSUM {text_mark(text)})".encode(), 1)
     return Translation(text, numbers, writer.state.added, tuple(writer.cautions.values()))
 
 
@@ -321,7 +321,7 @@ class _Translator:
     def _frame(self, body: str, comments: Sequence[str], line: str) -> list[str]:
         dialect = self._dialect
         if _MARK_LINE.fullmatch(line.strip()):
-            return ["(TEXT 00000000)"] if dialect.comment == "(" else []
+            return [MARK_PENDING.decode()] if dialect.comment == "(" else []
         shown = [self._comment(text) for text in comments]
         if body.startswith("%"):
             self.state.percents += 1

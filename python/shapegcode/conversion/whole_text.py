@@ -313,7 +313,7 @@ class TextWriter:
         from shapegcode import __version__
 
         grid = self.grid
-        notes = [f"{len(grid.track.nodes)} SHAPERS FOLLOW {'XYZ'[grid.track.axis]}"] if grid.track else []
+        notes = [f"SHAPER CHANGES WITH {'XYZ'[grid.track.axis]} POSITION"] if grid.track else []
         stamp = replace(
             stamp_of_machine(self._machine, version=__version__),
             block_period_ms=f"{grid.block_period_s * 1e3:g}",

@@ -90,7 +90,7 @@ class TransferLoad:
 
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
-    """The data rate of a shaped cut over windows of the shaper's duration, the shortest in which it can change."""
+    """Measure the data rate of a shaped cut, averaged over the shaper's duration, in which it hardly changes."""
     durations = np.concatenate(shaped.block_periods, dtype=np.float64)
     durations *= grid.block_period_s
     window_s = max(grid.duration_s, grid.block_period_s)

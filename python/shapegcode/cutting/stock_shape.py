@@ -378,7 +378,7 @@ def build_material(
 
 
 def _fewer(borders_mm: Sequence[float]) -> list[float]:
-    """Limit the number of heights by merging the closest ones, as in a surface milled in 3-D."""
+    """Limit the number of heights by merging the closest ones: a surface milled in 3-D has very many."""
     borders = list(borders_mm)
     least_mm = (borders[-1] - borders[0]) / (4.0 * _MAX_LAYERS)
     while len(borders) > _MAX_LAYERS + 1:

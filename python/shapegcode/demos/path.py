@@ -91,7 +91,7 @@ class PathDemo(Result):
         remark: how to read the differences.
         warnings: usually none.
         machine: name of the machine.
-        conditions: both feeds at both reductions.
+        conditions: two feeds, each at two reductions.
     """
 
     published: ClassVar[tuple[str, ...]] = ("path of paper 000",)
@@ -172,7 +172,7 @@ def ideal_command(path: _core.Path, machine: Machine, arc_feed_ratio: float) -> 
 
 
 def path_demo(on_progress: Callable[[float], None] = lambda _: None) -> PathDemo:
-    """Compare ideal command, emitted program and the paper's figures, at both feeds and both reductions.
+    """Compare ideal command, emitted program and the paper's figures, at two feeds and two feed reductions.
 
     Args:
         on_progress: called with the completed fraction, 0 to 1.

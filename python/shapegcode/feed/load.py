@@ -165,7 +165,7 @@ def _written(plan: FeedPlan, load: PathLoad) -> Vector:
 
 
 def groups(distance_mm: Vector, most: int) -> npt.NDArray[np.intp]:
-    """First stations of at most *most* groups of about equal length, which contain every station."""
+    """Divide the stations into *most* groups of about equal length, or fewer: index of each group's first station."""
     if len(distance_mm) <= most:
         return np.arange(len(distance_mm))
     edges = np.linspace(0.0, float(distance_mm[-1]), most + 1)[:-1]
@@ -189,7 +189,7 @@ class WallMaps:
 def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTraces) -> WallMaps | None:
     """Walls along the cutting path; None: no walls.
 
-    A column represents an interval of the path, at its largest original peak resultant.
+    A column is the wall where the peak resultant of the original is largest in an interval of the path.
 
     Source: the error of a wall is from Kim and Ko, 2001 (paper 001), section 2.3; its map is this project's.
     """

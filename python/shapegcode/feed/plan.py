@@ -60,7 +60,7 @@ class Mover:
         return 0.5 * self.period_s * sum(filter_.duration_samples for filter_ in self.filters)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
-        """Travel of a path made of `along`, with stations along its length; feeds are averaged over the window."""
+        """Simulate `path`, a cut with other feeds; its speed at stations along `along`, mean over the window."""
         raise NotImplementedError
 
 
@@ -79,7 +79,7 @@ class OrdinaryMotion(Mover):
 def travel_emitted(
     blocks: _core.Path, path: _core.Path, machine: Machine, stations_mm: Vector, window_s: float
 ) -> Travelled:
-    """Travel of simulated shaped blocks along the programmed path; else as `Mover.travel`."""
+    """Simulate shaped blocks; their speed at stations along the programmed path, mean over the window."""
     model = MachineModel(machine)
     return Travelled.of(
         _core.travel_blocks(blocks, path, model.own_rule, stations_mm, model.period_s, model.shaped.filters, window_s)
@@ -238,7 +238,7 @@ def goes_on(track: _core.EngagementTrack) -> npt.NDArray[np.bool_]:
 
 
 def _stepped(limit: Vector, programmed: Vector) -> Vector:
-    """Feeds rounded down in steps of half a percent from the programmed feed; those above it, from the largest."""
+    """Round feeds down, in steps of half a percent: below the programmed feed from that, above it from the largest."""
     top = np.where(limit > programmed, limit.max(initial=0.0), programmed)
     steps = np.ceil(np.log(top / limit) / math.log1p(_STEP) - 1e-9)
     return np.asarray(top * (1.0 + _STEP) ** -steps)

@@ -59,7 +59,7 @@ def schedule_feed(
         stock: stock before the first block.
         motion: motion at the new feeds; None: the controller's own, as for an ordinary program.
         margin: safety margin to each limit, as a ratio.
-        resolution_mm: grid of the material; None: a hundredth of the tool's diameter.
+        resolution_mm: grid spacing of the simulated material; None: a hundredth of the tool's diameter.
         on_progress: called with the completed fraction, 0 to 1.
 
     Returns:
@@ -330,7 +330,7 @@ def _resultant(loads: Sequence[Load]) -> result.ResultantForce:
 
 
 def _peak(column: str, loads: Sequence[tuple[Callable[[int], str], PathLoad]]) -> result.PeakLoad:
-    """Largest value of a column before and after, with the location of the latter; *loads*: locating function, load."""
+    """Largest value of a column before and after, and where; *loads*: each with a function that locates a station."""
     original, emitted, place = 0.0, 0.0, ""
     for place_of, load in loads:
         was, now = getattr(load.original, column), getattr(load.emitted, column)

@@ -66,7 +66,7 @@ def survey(
         machine: machine whose controller runs it.
         tools: the cutting tools; several need their T numbers.
         stock: stock before the first block.
-        resolution_mm: grid of the material; None: a hundredth of the smallest tool's diameter.
+        resolution_mm: grid spacing of the simulated material; None: a hundredth of the smallest tool's diameter.
         on_progress: called with completed and total steps.
 
     Returns:
@@ -328,7 +328,7 @@ class Walk:
             )
 
     def sweep_region(self, material: _core.Material, index: int) -> SurveyedRegion:
-        """A region."""
+        """Sweep a region, and store its engagement."""
         region = self._program.regions[index]
         tool = self._tool
         kept = why_not_swept(region, self.zero)

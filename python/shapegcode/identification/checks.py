@@ -314,7 +314,7 @@ def is_clipped(values: FloatArray) -> bool:
 
 
 def _is_flat_topped(signal: FloatArray) -> bool:
-    """Whether the highest lobe is clipped under noise: half of its upper half is above 95 %, 30 % of a smooth one's"""
+    """Whether the highest lobe is clipped, also under noise: much of its upper half is above 95 % of the maximum."""
     top, crest = float(np.max(signal)), int(np.argmax(signal))
     lobes = (label(signal > share * top)[0] for share in (_NEARLY_TOP, 0.5))
     high, half = (np.count_nonzero(lobe == lobe[crest]) for lobe in lobes)

@@ -319,7 +319,7 @@ def _inside(lines: Lines, measured: _Measured) -> npt.NDArray[np.bool_]:
 
 
 def _share_left(parts: Sequence[Lines], left: Sequence[ComplexArray], inside: Sequence[npt.NDArray[np.bool_]]) -> float:
-    """Root of the power of weighted residuals over that of the response, in some lines of each."""
+    """Weighted residual relative to the weighted response (RMS), over the lines `inside` of each response."""
     rest = sum(float(np.sum(np.abs(each[near]) ** 2)) for each, near in zip(left, inside, strict=True))
     pairs = zip(parts, inside, strict=True)
     total = sum(float(np.sum(np.abs((lines.weight * lines.response)[near]) ** 2)) for lines, near in pairs)

@@ -54,7 +54,7 @@ class Lines:
         return self.weighted(self.background)
 
     def weighted(self, columns: ComplexArray) -> FloatArray:
-        """(2n, k) weighted columns."""
+        """(2n, k) columns times the weights of the lines, real parts above imaginary ones."""
         found = np.empty((2 * len(columns), columns.shape[1]))
         np.multiply(columns.real, self.weight[:, None], out=found[: len(columns)])
         np.multiply(columns.imag, self.weight[:, None], out=found[len(columns) :])

@@ -191,7 +191,7 @@ def cut(lines: Lines, low: float, high: float, complex_modes: bool, degree: int 
 
 
 def residues_of(fit: ModalFit) -> ComplexArray:
-    """(responses, m) residues; real ones include the phase of each response's delay."""
+    """(responses, m) residues; those of real modes are turned by the phase of each response's fitted delay."""
     if fit.complex_modes:
         return fit.residues
     delay_s = -np.array([factors[-1:] for factors in fit.background])

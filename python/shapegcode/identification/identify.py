@@ -69,10 +69,10 @@ def identify(
         modes: number of modes; None: by information criterion.
         band_hz: lowest and highest frequency of interest; None: all.
         start_s: time at which a decay begins; None: found automatically.
-        stops: the records are of an ordinary run: every stop after which the machine rests is a decay, the 20
-            strongest of each. Motion slower than 10 Hz, or than the lower end of `band_hz` is no vibration.
-        accepted_percent: a mode is refused if half its 95 % interval of damping is wider (of a fit over time its
-            stiffness too); None: 5 % over time, 50 % over frequency.
+        stops: the records are of an ordinary run: every stop after which the machine rests is a decay; the 20
+            strongest of a record are used. Motion below 10 Hz, or the lower end of `band_hz`, is no vibration.
+        accepted_percent: largest half of the 95 % interval of damping (in a fit over time also of stiffness); a mode
+            beyond it is refused; None: 5 % over time, 50 % over frequency.
         sweep: the program that ran during the record and moves one axis, as from `write_sweep`: its command takes the
             place of the force, the logger's start and clock error are found from the record.
         machine: the machine whose controller ran it.

@@ -136,7 +136,7 @@ class Spectra:
 
     @property
     def turn(self) -> ComplexArray:
-        """(n,) i omega."""
+        """Factor i*omega of a time derivative at each line, (n,)."""
         return np.asarray(2j * np.pi * self.hertz)
 
     @cached_property
@@ -332,7 +332,7 @@ def part_of(record: Record, begin: int, end: int, name: str = "") -> Record:
 
 
 def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
-    """One record for each stop after which the machine rests, least motion first, at most 20."""
+    """One record for each of the 20 strongest stops after which the machine rests, least motion first."""
     quiet = _without_median(record)
     period = 1.0 / ((lowest_hz or _LOWEST_HZ) * record.period_s)
     envelope = _envelope(quiet, period, _ENVELOPE_PERIODS * period)

@@ -397,7 +397,7 @@ class ModeTables:
         return tables.body[0]
 
     def _insert(self, stay: list[Table], added: list[Table], left: list[edit.Entry]) -> None:
-        """Insert new tables after the last remaining one, at the first one's place, or at the end of the axis."""
+        """Insert new tables: after those that stay, else in place of the old or commented ones, else after the axis."""
         for table in added:
             table.trivia.indent = self.newline
         if self.tables:

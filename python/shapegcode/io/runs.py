@@ -281,7 +281,7 @@ def _compare_clocks(part: RunPart, runtime: Signal | None, notes: FileNotes) -> 
 
 
 def _best(part: RunPart, tracks: Sequence[Track], role: Role, notes: FileNotes) -> Signal | None:
-    """The signal of the item with the best name, then with most values; others are noted."""
+    """Of several items with a role: the one of preferred name, then with most values; the others are noted."""
     found = [
         (track.item.rank, -len(signal), index, signal)
         for index, track in enumerate(tracks)

@@ -450,7 +450,7 @@ class TextTable:
                     )
 
     def _refuse_points(self) -> None:
-        """Refuse thousands points, or both kinds of numbers: with decimal commas points are invalid."""
+        """Refuse decimal points in a file with decimal commas, where a point may only separate thousands."""
         pieces = (piece for piece in self._pieces() if b"." in piece[1])
         for number, text in (line for piece in pieces for line in self._lines(*piece)):
             cells = cells_of(text, self.layout.delimiter)

@@ -59,7 +59,7 @@ class Dialect:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Topics without a source."""
+        """Topics whose rule is assumed, because no page or recording states it."""
         return tuple(topic for topic, fact in self.facts.items() if not fact.source)
 
 

@@ -338,7 +338,7 @@ class Draft:
         self.missing.append(MissingParameter(str(number), line, why))
 
     def assume(self, key: str, value: Value, why: str) -> None:
-        """Note an assumed value; it is in the machine already, or in no key."""
+        """Note an assumed value that is set already, or that has no key."""
         self.assumed.append(AssumedValue(key, value, why))
 
     def assume_key(self, key: str, value: Value, why: str) -> None:

@@ -220,7 +220,7 @@ class Machine(TomlTable):
 
     @property
     def dial_positions(self) -> tuple[float, ...]:
-        """Feed overrides, in steps of 10 %, for which override-tolerant blocks are made: verdict's, or 70 to 120 %."""
+        """Feed overrides, in steps of 10 %, for which override-tolerant blocks are made: [verdict], or 70 to 120 %."""
         low, high = self.verdict.override_percent
         if low == high == 100.0:
             low, high = _USUAL_DIAL_PERCENT

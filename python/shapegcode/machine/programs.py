@@ -283,7 +283,7 @@ class Emission(TomlTable):
 
     @property
     def unlocking(self) -> tuple[str, ...]:
-        """Lines that switch the feed override on again, likewise."""
+        """Lines that switch the feed override on again, in the dialect's words; empty if it is not locked."""
         return self._override_lines(1, self.unlock_lines)
 
     def _override_lines(self, rank: int, stated: tuple[str, ...]) -> tuple[str, ...]:
@@ -345,9 +345,9 @@ class Shaping(TomlTable):
         "feed in arcs relative to the programmed feed, reached before the arc begins; 1: no reduction", default=1.0
     )
     contour: Literal["response", "command", "off"] = key(
-        'what contour compensation keeps within tolerance.contour_um of the path at the highest feed. "response": the '
-        'machine table with its modes, so the part; "command": the set-points; "off": nothing; a lower feed instead '
-        "keeps the command within the tolerance",
+        'path that contour compensation holds within tolerance.contour_um, at the highest possible feed. "response": '
+        'that of the machine table with its modes, hence of the part; "command": that of the set-points; "off": no '
+        "compensation: a lower feed keeps the set-points within the tolerance",
         default="response",
     )
     planner: Literal["auto", "look-ahead", "optimal"] = key(

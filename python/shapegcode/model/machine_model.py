@@ -201,7 +201,7 @@ class SimulatedController:
         return _core.simulate_blocks(path, against or path, block_end or self.model.block_end, self._override, options)
 
     def stream(self, path: _core.Path, options: _core.SimulationOptions, rest_s: float) -> _core.SimulationStream:
-        """Simulate the same motion piece by piece, and the plant for a while after its end."""
+        """Simulate the motion of `simulate` piece by piece, and the plant for a while after its end."""
         options.axis_filters = self.filters
         planned = self._planned(path)
         if planned is not None:
@@ -281,7 +281,7 @@ class MachineModel:
 
     @cached_property
     def bounds_deviations(self) -> bool:
-        """True if deviations at other overrides are cheap to bound: no filter, constant modes, equal sides."""
+        """True if deviations at other overrides are cheap to bound: no filter, constant modes, no material side."""
         moves = modes.moving_axis(self.machine) is not None
         plain = self.machine.verdict.plant == "modal" and not self.shaped.filters and not moves
         return plain and not self.always_plans and self.machine.input.material_side is None
@@ -419,9 +419,9 @@ def ini_lines(
         more = "" if worst.largest_ratio < _MOST_KINK_RATIO else ", the highest accepted value"
         yield "kink_ratio", worst.line, (
             f"LinuxCNC slows where {kinks} of {blocks} shaped blocks meet: {worst.speed_mm_per_s:.0f} mm/s turn by "
-            f"{worst.angle_rad * 1e3:.2f} mrad within {rules.period_s * 1e3:g} ms, {worst.largest_ratio:.2f} of the "
-            f"acceleration, and {rules.kink_ratio:g} is allowed; INI file: [TRAJ] ARC_BLEND_KINK_RATIO = "
-            f"{ratio:g}{more}"
+            f"{worst.angle_rad * 1e3:.2f} mrad within {rules.period_s * 1e3:g} ms, which takes "
+            f"{worst.largest_ratio:.2f} of the acceleration, and {rules.kink_ratio:g} is allowed; INI file: "
+            f"[TRAJ] ARC_BLEND_KINK_RATIO = {ratio:g}{more}"
         )  # fmt: skip
     if ramps := sum(each.ramps for each in found):
         yield "ramp_frequency", 0, (

@@ -72,8 +72,8 @@ def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]
     found = {}
     if (mark := text_mark(program.own_text)) != stamp.mark:
         found["edited"] = (
-            f"the program was changed since it was shaped (mark in its header: {stamp.mark}, computed: {mark}): the "
-            "verdict in its header is not valid; convert the original again"
+            f"the program was changed since it was shaped (checksum in its header: {stamp.mark}, computed: {mark}): "
+            "the verdict in its header is not valid; convert the original again"
         )
     if difference := stamp.difference(stamp_of_machine(machine)):
         why = f"shaped for another machine ({difference}): it does not reduce this machine's vibration"

@@ -42,7 +42,7 @@ KINDS = {
     "modal": "plane, G90 or G91, G94, G61 and the like at the start of a cut; exact stops in it",
     "feeds": "feeds of cuts and drilling cycles",
     "blocks": "number of blocks of a cut; the lines of emission.* around the cuts of a shaped program",
-    "order": "the same, but at another position in the program",
+    "order": "an item that both programs have, at another position in the sequence",
     "shaped-rapids": "rapids as cutting moves, marked (SHAPED RAPID)",
     "compensation": "G41 and G42 expanded: the control's offset has no effect",
     "units": "G20 or G21",
@@ -148,7 +148,7 @@ class KindCount:
 
     @property
     def changed(self) -> int:
-        """How many of the original are missing or different; those that only the other program has, if none are."""
+        """How many of the original are missing or different; if none is, how many the other program has in addition."""
         return self.original - self.unchanged or self.emitted - self.unchanged
 
 

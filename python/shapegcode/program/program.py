@@ -242,7 +242,7 @@ class Program:
         return self.core.slice(begin, end) if self.unexpanded is None else self.unexpanded[begin:end]
 
     def with_verdict(self, *, good: bool, better: bool = False) -> Program:
-        """Write verdict and mark into the header; a long text is changed in place, not copied.
+        """Write verdict and checksum into the header; a long text is changed in place, not copied.
 
         Args:
             good: False: the program should not be run.
@@ -258,7 +258,7 @@ class Program:
 
     @cached_property
     def mark(self) -> str:
-        """Check value of the expanded program, which an emitted program has in its header."""
+        """Checksum of the expanded program, as in the header of an emitted program."""
         return mark_of(self.core)
 
     @property

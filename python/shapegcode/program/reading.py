@@ -111,7 +111,7 @@ def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
 
 
 def called_from(text: bytes, index: int, kept: Iterable[int]) -> tuple[ProgramPlace, ...]:
-    """Programs of a file needed by one of them on the control, because calls were not expanded."""
+    """Programs of a file that one of them still calls on the control, since these calls were not expanded."""
     entries, places = _core.list_programs(text), programs_of(text)
     found: set[int] = set()
     waiting = [(index, number) for number in kept]

@@ -4,12 +4,12 @@ Its cautions, each a sentence and a comment, are also used in reports, pages, te
 
 (SHAPEGCODE 0.1.0 MACHINE VX500)
 (VERDICT WITHIN TOLERANCE       )    or (BETTER - TOLERANCE NOT MET     )
-(TEXT 8A1F00C3)
+(CHECKSUM 8A1F00C3)
 (MODE X 46 HZ 0.02)
 (BLOCK PERIOD 5 MS SHAPER 20 MS ZVD)
 (SET FEED OVERRIDE 100 PCT)
 (NO SINGLE BLOCK IN SHAPED CUTS)
-(RESTART ONLY AFTER A SHAPED COMMENT OR AT A LISTED N)
+(RESTART ONLY AFTER A SHAPED COMMENT OR AT N OF THE REPORT)
 (FIRST RUN ABOVE THE PART WITHOUT TOOL)
 (TIME CONSTANT AFTER INTERPOLATION 0 MS)
 
@@ -68,7 +68,7 @@ FEED_HOLD = Habit(
 )
 RESTART = Habit(
     "restart",
-    "RESTART ONLY AFTER A SHAPED COMMENT OR AT A LISTED N",
+    "RESTART ONLY AFTER A SHAPED COMMENT OR AT N OF THE REPORT",
     "restart only where a cut begins, or at a restart point: other blocks of a shaped cut are not valid restart points",
 )
 FIRST_RUN = Habit(
@@ -91,7 +91,7 @@ RAPID_MARK = "(SHAPED RAPID)"  # comment before shaped blocks that replace a rap
 STAMP_BEGIN = b"(SHAPEGCODE "  # start of the header
 
 _WIDTH = 60
-# Equal lengths, so that the verdict and the mark of the text can be replaced in place.
+# Equal lengths, so that the verdict can be replaced in place; so can the checksum.
 _PENDING, _GOOD, _BETTER, _BAD = (
     b"(VERDICT PENDING                )",
     b"(VERDICT WITHIN TOLERANCE       )",
@@ -99,7 +99,7 @@ _PENDING, _GOOD, _BETTER, _BAD = (
     b"(OUT OF TOLERANCE - DO NOT RUN  )",
 )
 _NO_MARK = "0" * 8
-_MARK_PENDING = f"(TEXT {_NO_MARK})".encode()
+MARK_PENDING = f"(CHECKSUM {_NO_MARK})".encode()
 _COMMENT = re.compile(rb"\(([^()\r\n]*)\)[ \t]*[\r\n]*")
 # Parts that a control or editor may change without effect: comments, blanks, %; then N and O words.
 _ANY_COMMENT = re.compile(rb"\([^()\r\n]*\)")
@@ -120,7 +120,7 @@ class Stamp:
     shaper_ms: str  # duration of the shaper
     family: str  # family of the shaper; empty: not stated
     own_filter: str  # the control's own filter for shaped blocks, such as "24 MS" or "48 MS BELL 24 MS"
-    mark: str = _NO_MARK  # check value of the text, see `text_mark`; eight zeros: not yet known
+    mark: str = _NO_MARK  # checksum of the program, see `text_mark`; eight zeros: not yet known
     override: str = "ask"  # key of `OVERRIDES` for the text
     notes: tuple[str, ...] = ()  # further lines
 
@@ -130,7 +130,7 @@ class Stamp:
             f"({plain_comment(line)[:_WIDTH]})"
             for line in (
                 f"SHAPEGCODE {self.version} MACHINE {self.machine}",
-                f"TEXT {self.mark}",
+                f"CHECKSUM {self.mark}",
                 *(f"MODE {mode}" for mode in self.modes),
                 f"BLOCK PERIOD {self.block_period_ms} MS SHAPER {self.shaper_ms} MS {self.family}".rstrip(),
                 *self.notes,
@@ -180,7 +180,7 @@ def stamp_of(text: bytes) -> Stamp | None:
     period = found(r"BLOCK PERIOD (\S+) MS SHAPER (\S+) MS ?(.*)")
     if not head or not period:
         return None
-    mark, constant = found(r"TEXT ([0-9A-F]{8})"), found(r"TIME CONSTANT AFTER INTERPOLATION (.*)")
+    mark, constant = found(r"(?:CHECKSUM|TEXT) ([0-9A-F]{8})"), found(r"TIME CONSTANT AFTER INTERPOLATION (.*)")
     return Stamp(
         version=head[0][1],
         machine=head[0][2],
@@ -194,7 +194,7 @@ def stamp_of(text: bytes) -> Stamp | None:
 
 
 def text_mark(text: bytes) -> str:
-    """Eight digits: a hash of the motion and functions of a program.
+    """Checksum of the motion and functions of a program: eight hexadecimal digits.
 
     Comments, blanks, kinds of line end, N words, the program's number and `%` are ignored, as a control or an
     editor may change them.
@@ -203,7 +203,7 @@ def text_mark(text: bytes) -> str:
 
 
 def _mark_of(chunks: Iterable[bytes]) -> str:
-    """Mark of a text in chunks of whole lines; ignored parts never span a line end."""
+    """Checksum of a text in chunks of whole lines; ignored parts never span a line end."""
     mark, is_first = 0, True
     for chunk in chunks:
         kept = _what_counts(chunk)
@@ -237,7 +237,7 @@ def _one_end(text: bytes) -> bytes:
 
 
 def text_with_verdict(text: bytes, *, good: bool, better: bool = False) -> bytes:
-    """Write verdict and mark into the header of an emitted program."""
+    """Write verdict and checksum into the header of an emitted program."""
     changes = _changes(text.find, text_mark(text), good=good, better=better)
     if not changes:
         return text
@@ -248,12 +248,12 @@ def text_with_verdict(text: bytes, *, good: bool, better: bool = False) -> bytes
 
 
 def mark_of(program: _core.ProgramText) -> str:
-    """Mark of a program read; see `text_mark`."""
+    """Checksum of a program read; see `text_mark`."""
     return _mark_of(whole_lines(program))
 
 
 def write_verdict(program: _core.ProgramText, mark: str, *, good: bool, better: bool = False) -> None:
-    """Write verdict and mark into the text of a program read, in place."""
+    """Write verdict and checksum into the text of a program read, in place."""
     for begin, after in _changes(program.find, mark, good=good, better=better):
         program.overwrite(begin, after)
 
@@ -262,7 +262,7 @@ def _changes(find: Callable[[bytes], int], mark: str, *, good: bool, better: boo
     """Positions and new bytes of changes in the header, each of the replaced length."""
     open_ones = (_PENDING,) if good else (_PENDING, _GOOD, _BETTER)
     verdicts = [(before, _BAD if not good else _BETTER if better else _GOOD) for before in open_ones]
-    wanted = [*verdicts, (_MARK_PENDING, f"(TEXT {mark})".encode())]
+    wanted = [*verdicts, (MARK_PENDING, f"(CHECKSUM {mark})".encode())]
     return [(begin, after) for before, after in wanted if (begin := find(before)) >= 0]
 
 

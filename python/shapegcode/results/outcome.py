@@ -261,7 +261,7 @@ CONTOURS = {"command": "contour error of the command", "response": "contour erro
 
 @dataclass(frozen=True)
 class Tracks(Generic[T]):
-    """A figure of both tracks of a machine."""
+    """A figure of both paths that a machine has: of its command and of its table."""
 
     command: T  # of the set-points
     response: T  # of the table
@@ -269,7 +269,7 @@ class Tracks(Generic[T]):
 
 @dataclass(frozen=True)
 class Deviation:
-    """Deviation of a track from the programmed path."""
+    """Deviation of one of both (command or table) from the programmed path."""
 
     largest_mm: float  # distance, either side; corners that the track cuts short count too
     left_mm: float  # to the left of the travel, or above
@@ -295,7 +295,7 @@ class Deviation:
 
 @dataclass(frozen=True)
 class ContourError:
-    """Deviation of a track from the programmed path, µm."""
+    """Deviation of command or table from the programmed path, µm."""
 
     max: float  # distance, either side; corners that the track cuts short count too
     rms: float  # root mean square over all samples

@@ -358,7 +358,7 @@ class _Scene:
 
     @classmethod
     def of(cls, simulated: SimulatedRegion) -> _Scene:
-        """All of a short region; of a long one the worst position and the stop, if there is one."""
+        """Select the whole of a short region, or the worst position and the stop (if any) of a long one."""
         traces, programmed = simulated.traces, polyline_of(simulated.path)
         if max(len(trace.command_mm) * trace.period_s for trace in traces) <= _WHOLE_S:
             return cls((View(traces),), simulated.part, traces, simulated.part, programmed)

@@ -27,7 +27,7 @@ _MOST_PIVOTS = 20  # per unknown and condition; about 1 is usual
 
 
 class _Quiet(highspy.Highs):
-    """HiGHS without callbacks: they take as long as a small program, and 1.16 prints a notice."""
+    """HiGHS without callbacks: these take as long as a small linear program, and version 1.16 prints a notice."""
 
     def __init__(self) -> None:
         super(highspy.Highs, self).__init__()
@@ -35,7 +35,7 @@ class _Quiet(highspy.Highs):
 
 
 _FREE: list[_Quiet] = []
-"""Free solvers for reuse: creating one takes a third of the time of a small program."""
+"""Free solvers for reuse: creating one takes a third of the time of a small linear program."""
 
 
 def _solver() -> _Quiet:

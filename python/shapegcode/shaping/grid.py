@@ -170,7 +170,7 @@ def _choice(chosen: BlockPeriodCandidate, candidates: tuple[BlockPeriodCandidate
 def _candidate(
     bands: Sequence[ModeBand], period_s: float, max_duration_s: float, limit: float, *, least_cost: bool = False
 ) -> BlockPeriodCandidate:
-    """Shortest design on a grid; a refusal is without the search for hints."""
+    """Shortest design on a grid, or why there is none (without the search for a remedy)."""
     if not any(band.uncertainty for band in bands):
         try:
             shaper = shortest_non_negative([band.mode for band in bands], period_s, max_duration_s)

@@ -59,8 +59,8 @@ def least_worst(
     """Design taps on a grid with the smallest worst residual over the bands, for a given duration.
 
     The optimum is proven to 0.1 %: `worst_residual` is at most that much above `least_possible` (a residual below
-    1e-6 counts as zero). The exception is a damped mode whose optimum ends with periods without taps:
-    the residual is taken from the last tap, so the shaper is then shorter, or a last tap of 0.001 marks the end.
+    1e-6 counts as zero). The exception is a damped mode whose optimum has no taps in its last periods:
+    the residual counts from the last tap on, so the shaper is then shorter, or gets a last tap of 0.001.
 
     Source: this project.
     """

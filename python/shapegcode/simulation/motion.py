@@ -200,7 +200,7 @@ def _header(stream: object, dtype: np.dtype[np.generic], shape: tuple[int, ...])
 
 @contextlib.contextmanager
 def csv_file(path: str | Path) -> Iterator[WriteMotion]:
-    """A CSV file of `kind` and `Chunk.columns`, with a header, shortest numbers; ``-`` is standard output."""
+    """Open a CSV file for `kind` and `Chunk.columns`, with a header; ``-`` is standard output."""
     if path == "-":
         yield _csv(sys.stdout.buffer)
         sys.stdout.buffer.flush()

@@ -273,7 +273,7 @@ def interval_of(good: int, count: int) -> tuple[float, float]:
 
 
 def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple[results.BinQuantiles, ...]:
-    """Quantiles of a measure over a varied value: in ten bins with equal numbers of samples, or by choice."""
+    """Quantiles of a measure over a varied value: in ten bins of equally many samples, or at each listed value."""
     if isinstance(each.distribution, Listed):
         groups = [
             (rank, str(choice), [index for index, value in enumerate(column) if value == choice])

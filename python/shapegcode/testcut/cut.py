@@ -1,4 +1,4 @@
-"""A test cut: tool, cutting conditions and measuring passes, and the side file with them for the fit.
+"""A test cut: tool, cutting conditions and measuring passes, and its side file, from which the fit reads them.
 
 A pass moves along +X at constant Y; the height of the stock edge above the finished wall is known over X.
 """

@@ -300,7 +300,7 @@ def _blocks(
 
 
 def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[FloatArray, FloatArray]:
-    """Distance along the corner's path from the start of S2, and the radial depth until it is constant again."""
+    """Distance along the path from the start of section S2 (paper 001), and the radial depth until it is constant."""
     allowance, rough, finish = sizes
     before = 2.0 * (rough + finish)
     cut = _core.CornerCut(given.tool.radius_mm, rough, finish, allowance, before_mm=before, after_mm=before)
@@ -429,7 +429,7 @@ class _Writer:
         yield f"G00 Z{decimal(_NEAR_Z_MM, 3)}"
 
     def _offsets(self, before: float, wall: float) -> list[float]:
-        """Offset of each cut outside the edge: small depths, and a very small last one with little deflection."""
+        """Distance of each cut from the edge: equal small depths, and a thin last cut that hardly bends the tool."""
         more = (
             float(np.max(wall - self.design.edge.at(np.linspace(0.0, self.design.stock_mm, 200)) - before)) - _SKIM_MM
         )

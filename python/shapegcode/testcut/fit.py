@@ -1,4 +1,4 @@
-"""Evaluates records of test cuts: coefficients of a taper, resultant in a corner, shortest followed interval."""
+"""Evaluates records of test cuts: coefficients of a taper, resultant in a corner, shortest interval of feed changes."""
 
 from __future__ import annotations
 

@@ -251,7 +251,7 @@ def _contact(record: ForceRecord, samples: float) -> tuple[int, int]:
 
 
 def _without_offset(force: FloatArray, begin: int, end: int, guard: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Force minus a straight line through the air before and after; also offset and drift."""
+    """Subtract the straight line through the force in air before and after the cut; also returns offset and drift."""
     air = (0, max(begin - guard, 1)), (min(end + guard, len(force) - 1), len(force))
     first, second = (0.5 * (low + high) for low, high in air)
     before, after = (force[low:high].mean(axis=0) for low, high in air)

@@ -1,4 +1,4 @@
-"""Designs of test cuts, and results of their records: coefficients, forces, the followed feed."""
+"""Designs of test cuts, and results of their records: coefficients, forces, and how the control follows the feed."""
 
 from __future__ import annotations
 
@@ -333,7 +333,7 @@ class IntervalResult(Result):
 
     @property
     def ok(self) -> bool:
-        """True if an interval is followed."""
+        """True if the control follows one of the intervals."""
         return self.interval_mm is not None
 
     @property
@@ -341,8 +341,8 @@ class IntervalResult(Result):
         """The interval, or the travel that a step needs."""
         if self.interval_mm is None:
             needed = f"90 % of a step need about {self.lag_interval_mm:.2f} mm at the largest feed"
-            return f"no measured interval is followed; {needed}"
-        return f"the controller follows from {self.interval_mm:g} mm on"
+            return f"the control follows none of the measured intervals; {needed}"
+        return f"the control follows feed changes every {self.interval_mm:g} mm or more"
 
     @property
     def next_step(self) -> str:
@@ -361,7 +361,7 @@ class IntervalResult(Result):
             Column("lag", "ms", lambda each: f"{1e3 * each.lag_s:.0f}"),
             Column("follows", value=lambda each: "yes" if each.ok else "no"),
         )
-        return [Table("how the feed is followed", columns, self.passes)]
+        return [Table("how the control follows the feed", columns, self.passes)]
 
     def plots(self) -> Mapping[str, Plot]:
         """`testcut-interval`: resultant over time, measured, at the commanded feeds and with the lag."""

@@ -1,7 +1,7 @@
 """Cycle time of a program on a machine and its parts: in closed form, and by full interpolation.
 
-The closed form is of Lee, Ro, Song and Oh, 2022 (paper 004) for acceleration after interpolation, of the planner in
-look-ahead; full interpolation checks it.
+The closed form is by Lee, Ro, Song and Oh, 2022 (paper 004) for acceleration after interpolation; with look-ahead it
+is the planner's. Full interpolation checks it.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ class GridTaps:
 
 @dataclass(frozen=True)
 class FollowingShapers:
-    """Shapers along an axis, with which modes vary."""
+    """Shapers for several positions of the axis over which the modes vary."""
 
     axis: str  # "x", "y" or "z"
     position_mm: tuple[float, ...]  # position at which each is exact (machine coordinates)

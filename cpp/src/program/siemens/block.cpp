@@ -128,7 +128,7 @@ Word address_word(Scanner& scan, ExpressionPool& pool, std::size_t begin, const 
     if (!is_digits(digits)) throw scan.error(fmt::format("G{}: a G code must be a whole number", digits), begin);
     return named_word(fmt::format("G{}", without_zeros(digits)), scan.column(begin));
   }
-  // Zeros at the begin of it count: L1 is not L01.
+  // Zeros at the start of it count: L1 is not L01.
   if (letter == 'L') return named_word(fmt::format("L{}", digits), scan.column(begin));
   Word word = named_word(std::string(1, letter), scan.column(begin));
   const bool has_sign = digits[0] == '-' || digits[0] == '+';

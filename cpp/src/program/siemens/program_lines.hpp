@@ -39,7 +39,7 @@ class ProgramLines {
   [[nodiscard]] std::optional<StructureError> find_structure();
   /// The next of IF, ELSE and its end, or of a loop and its end.
   [[nodiscard]] std::size_t partner(std::size_t index) const { return structure_[index].partner; }
-  /// The begin of the structure that a line ends.
+  /// The start of the structure that a line ends.
   [[nodiscard]] std::size_t start(std::size_t index) const { return structure_[index].start; }
 
   /// The line to which a jump of a line leads: the nearest in its direction, and not inside of a structure that is not

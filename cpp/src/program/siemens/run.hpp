@@ -67,7 +67,7 @@ class Run : public Scope {
 
   [[nodiscard]] Program find(const std::string& name);
   void call(const Program& program, const std::string& name, std::uint32_t column, std::span<const Expression> given);
-  /// PROC at the begin of a program.
+  /// PROC at the start of a program.
   [[nodiscard]] static std::shared_ptr<const Block> heading(ProgramLines& program);
   [[nodiscard]] std::vector<Reference> parameters(const Block& head, const std::string& name, std::uint32_t column,
                                                   std::span<const Expression> given, Variables& variables);

@@ -86,7 +86,7 @@ class Scanner {
 /// Whether all of a text, which is not empty, is digits.
 [[nodiscard]] bool is_digits(std::string_view text);
 
-/// Digits without zeros at their begin.
+/// Digits without zeros at their start.
 [[nodiscard]] std::string_view without_zeros(std::string_view digits);
 
 /// What digits with EX or without are worth.

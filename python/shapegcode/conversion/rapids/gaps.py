@@ -192,7 +192,7 @@ class _Reader:
         return ""
 
     def _feed_mm_per_s(self, travel_mm: FloatArray, units: int) -> float:
-        """Largest cutting feed along a travel, a whole F word, within the feeds of each axis and of the fastest one."""
+        """Largest feed along a travel, whole in F: each axis within its limit, the total within the largest."""
         share = np.abs(travel_mm) / np.linalg.norm(travel_mm)
         moved = share > 0.0
         along = float((self._largest_mm_per_s[moved] / share[moved]).min())

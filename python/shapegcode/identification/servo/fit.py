@@ -292,7 +292,7 @@ def torque_friction(
     columns = [np.column_stack([np.tanh(v / sign), np.gradient(v, period_s), v, np.ones_like(v)]) for v in late]
 
     def fit(use: Masks) -> tuple[float, float]:
-        """T_c/J, and the torque ratio that T_c explains in addition to the other terms."""
+        """T_c/J, and the fraction that T_c explains of the torque power left by the other terms."""
         basis, values = counted(columns, use), counted(torque, use)
         scale = np.linalg.norm(basis, axis=0)
         scale[scale == 0.0] = 1.0

@@ -252,7 +252,7 @@ class Thinner:
 
 
 def _path_factor(factor: float) -> float:
-    """Factor of the path's tolerance for a factor of the curves' tolerance."""
+    """By how much to loosen the path's tolerance if that of the curves is loosened by a factor."""
     return max(factor / _PATH_LAST, min(factor, _STEP))
 
 

@@ -20,7 +20,7 @@ from shapegcode.timing.calibration.observed import IntArray, ObservedRun, seen_a
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of a family."""
+    """One parameter of a kind of look-ahead."""
 
     name: str  # short, within the family
     key: str  # key of the machine file; "{axis}": each axis of `axes`
@@ -207,7 +207,7 @@ class SeenSection:
 
     @cached_property
     def windows(self) -> tuple[tuple[IntArray, IntArray], ...]:
-        """For each length of a window: readings at its starts and at its ends."""
+        """For each window length: indices of the readings at which windows start, and at which they end."""
         found = []
         for length_s, _, _ in _SCALES:
             upto = np.searchsorted(self.time_s, self.time_s + length_s)
@@ -504,7 +504,7 @@ def _names(runs: Sequence[ObservedRun]) -> list[str]:
 
 
 def _spans(run: ObservedRun) -> list[_Span]:
-    """Spans: from a reading to the next across a function, from cut to cut, and at start and end of the run."""
+    """Times between logged lines with M, S or T functions in between: between cuts, at start and end of the run."""
     line, time_s, function = run.line, run.time_s, run.timed.function
     spans = []
 

@@ -73,7 +73,7 @@ class RunEntry:
         return (self.program.name, number[1]) if number and int(number[1][1:]) else (self.program.name,)
 
     def read(self) -> tuple[RunLog, ...]:
-        """Read the runs of all its logs; from a log that names programs only those of this one.
+        """Read the runs in the logs of this entry; a run that names another program is left out.
 
         Returns:
             The runs, log by log.
