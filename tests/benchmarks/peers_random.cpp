@@ -1,6 +1,7 @@
 // Random paths under random settings, while somebody turns the override and presses hold: what of the limits the
-// set-points take. A seed says everything about a path; `random 1 SEED TRACE` runs it again, says its settings and
-// writes a line for every step: number, activity, segments done, override, speed, distance, set-point; then the path.
+// set-points take. A seed says everything about a path; an odd one has settings of every kind and up to 10 000
+// segments. `random 1 SEED TRACE` runs it again, says its settings and writes a line for every step: number, activity,
+// segments done, override, speed, distance, set-point; then the path.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -24,6 +25,7 @@ using tests::Outcome;
 using tests::Trial;
 
 constexpr double allowed_ratio = 1.001;
+constexpr std::size_t most_steps = 20'000'000;
 constexpr std::array order_names{"speed", "acceleration", "jerk"};
 
 void write_step(std::FILE* trace, const ControllerState& state) {
@@ -94,10 +96,11 @@ int random_motion(std::span<const char* const> arguments) {
   std::size_t turns = 0;
   std::size_t holds = 0;
   for (std::uint32_t seed = first; seed < first + count; ++seed) {
-    const Trial trial = tests::random_trial(seed);
-    const Outcome outcome = tests::run_trial(trial, seed, [&](const ControllerState& state) {
+    const Trial trial = seed % 2 == 0 ? tests::random_trial(seed) : tests::wide_trial(seed);
+    const auto see = [&](const ControllerState& state) {
       if (trace != nullptr) write_step(trace, state);
-    });
+    };
+    const Outcome outcome = tests::run_trial(trial, seed, see, most_steps);
     (std::holds_alternative<FollowingFir>(trial.settings.shaper) ? following : fixed).add(outcome, seed);
     tell(outcome, trial, seed, count == 1);
     if (trace != nullptr) write_path(trace, trial);

@@ -42,7 +42,7 @@ struct Trial {
 
 Trial random_trial(std::uint32_t seed);
 
-/// Every setting is drawn: both laws, the override at the begin, correction, windows of 8 to 1024, up to six following
+/// Every setting is drawn: both laws, the override at the start, correction, windows of 8 to 1024, up to six following
 /// axes, 1 to 10 000 segments. The seeds of `random_trial` keep the trials that they stand for in its tests.
 Trial wide_trial(std::uint32_t seed);
 

@@ -411,9 +411,9 @@ def rt_documentation() -> str:
 
 def _contents() -> str:
     counts = {folder: (len(files), sum(map(code_lines, files))) for folder, files in rt_files().items()}
-    rows = [f"| {folder} | {WHAT[folder]} | {n} | {lines} |" for folder, (n, lines) in counts.items()]
+    rows = [f"| {folder} | {WHAT[folder]} | {n} | {round(lines, -2)} |" for folder, (n, lines) in counts.items()]
     files, lines = (sum(column) for column in zip(*counts.values(), strict=True))
-    return "\n".join([*rows, f"| all of it | | {files} | **{lines}** |"])
+    return "\n".join([*rows, f"| all of it | | {files} | **{round(lines, -2)}** |"])
 
 
 def _link(test: HeldBy) -> str:

@@ -1,7 +1,6 @@
 #include "planner/path_plan.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace shapegcode {
@@ -33,9 +32,6 @@ constexpr double least_gain_s = 1e-5;
 constexpr double least_gain = 0.001;
 // Of an interval at rest, mm/s.
 constexpr double least_speed = 1e-9;
-// Behind a valley, over which the time is compared, and shares of the square of its highest speed that are tried.
-constexpr int passing_stations = 64;
-constexpr std::array<double, 5> passings{1.0, 0.85, 0.7, 0.55, 0.4};
 
 }  // namespace
 
@@ -181,7 +177,7 @@ bool PathPlan::make_set(std::size_t index) noexcept {
   const Course& next = courses_[index + 1];
   Making making = making_of(index);
   if (!here.straight) making.corners = corners_on_curves;
-  if (here.valley) making.cap = std::min(making.cap, best_passing(index));
+  if (here.valley) making.cap = std::min(making.cap, segment_of(here).passed);
   course.approaches = is_approach(index);
   if (course.approaches) {
     course.approach = rules_.hardest_before(here, segment, making.cap, next.approach);
@@ -343,30 +339,6 @@ PathState PathPlan::fastest_after(std::size_t index, PathState state) const noex
   }
   if (!std::isfinite(c)) c = 0.0;
   return {std::max(0.0, state.speed_squared + h * (2.0 * state.acceleration + c * h)), state.acceleration + c * h};
-}
-
-// At which speed a valley is passed best: what is gained there is lost behind it, where the jerk that turns the motion
-// leaves less for its acceleration.
-double PathPlan::best_passing(std::size_t index) const noexcept {
-  const double most = segment_of(stations_[index]).passed;
-  double best = most;
-  double least_s = no_limit;
-  for (const double share : passings) {
-    PathState state{most * share, 0.0};
-    double time_s = 0.0;
-    std::size_t k = index;
-    for (int n = 0; n < passing_stations && !ends_in_stop(k); ++n, ++k) {
-      if (k > index && stations_[k].valley) break;
-      const PathState next = fastest_after(k, state);
-      time_s += duration_s(k, state.speed_squared, next.speed_squared);
-      state = next;
-    }
-    if (time_s < least_s) {
-      least_s = time_s;
-      best = most * share;
-    }
-  }
-  return best;
 }
 
 // How a motion goes; where it joins one that was expected before, on sets that are the same, it goes on as that did.

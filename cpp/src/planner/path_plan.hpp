@@ -95,7 +95,6 @@ class PathPlan {
   bool lay_tangents() noexcept;
   [[nodiscard]] double cap_at(std::size_t index) const noexcept;
   [[nodiscard]] PathState fastest_after(std::size_t index, PathState state) const noexcept;
-  [[nodiscard]] double best_passing(std::size_t index) const noexcept;
 
   RoundedPath path_;
   ControllableSets rules_;
