@@ -157,7 +157,7 @@ bool PathMotion::controllable(double jerk, double time_s, const Derivatives& pat
   const double left = station.length - place.offset;
   const PathState state{v * v, a};
   const double cap = station.squared_limit();
-  if (state.speed_squared > cap * (1.0 + rounding)) return false;
+  if (state.speed_squared + std::max(a, 0.0) * left > cap * (1.0 + rounding)) return false;
   const AxisLimits limits = plan_->limits_at(station);
   // Braking must be over before the motion is.
   if (a < 0.0 && 2.0 * plan_->highest_jerk(station, path) * v < a * a) return false;
@@ -477,10 +477,11 @@ void PathMotion::advance(double max_speed) noexcept {
     double jerk = 0.0;
     const bool slower = max_speed < no_limit;
     if (slower) wish_ = wished(max_speed);
+    const bool was_slow = is_slow_ || is_beside_;
     is_slow_ = slower;
     if (choose(wish_, slower ? jerks_.high : jerks_.low, jerk)) return keep_to(jerk);
-    // After a slow motion.
-    is_slow_ = plan_->has_slow_sets();
+    // After a slow motion, which may brake harder than a valley is approached.
+    is_slow_ = was_slow && plan_->has_slow_sets();
     if (!slower && is_slow_ && choose(wish_, jerks_.low, jerk)) return keep_to(jerk);
   }
   if (last) {

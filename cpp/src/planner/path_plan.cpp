@@ -194,7 +194,7 @@ bool PathPlan::make_set(std::size_t index) noexcept {
   if (here.valley) {
     course.approaches = true;
     course.approach = {ControllableSets::steady(set), 0.0};
-    course.approach_begin = here.distance - segment.half_width;
+    course.approach_begin = here.slower_feed ? -no_limit : here.distance - segment.half_width;
   }
   return differs;
 }
@@ -281,7 +281,7 @@ bool PathPlan::choose_valleys() {
   for (int n = 0; n < valley_rounds; ++n) {
     bool is_any = false;
     for (std::size_t k = 1; k < end(); ++k) {
-      if (!stations_[k].valley || ends_in_stop(k)) continue;
+      if (!stations_[k].valley || stations_[k].slower_feed || ends_in_stop(k)) continue;
       const double less_s = brake_through(k);
       gain_s += less_s;
       is_any = is_any || less_s > 0.0;

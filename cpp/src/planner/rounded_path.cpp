@@ -17,13 +17,16 @@ constexpr double closest_on_half = 30000.0;
 constexpr double radians_of_arc = 0.1;
 // Periods that an interval lasts at the programmed feed.
 constexpr double periods_of_interval = 4.0;
-// Towards a stop intervals shrink with the distance to it, down to what the jerk travels in so many periods.
+// Towards a stop or a slower feed intervals shrink with the distance to it; of a stop down to what the jerk travels in
+// so many periods.
 constexpr double share_before_stop = 0.4;
 constexpr double stopping_periods = 5.0;
 constexpr double longest_stopping_mm = 0.5;
 // Junctions that are looked at to each side.
 constexpr std::size_t lookahead = RoundedPath::lookback - 2;
 constexpr std::uint64_t everything = static_cast<std::uint64_t>(-1);
+// The next feed is a slower one from this share of a feed down.
+constexpr double slower_share = 0.999;
 // Nothing is shorter, mm.
 constexpr double shortest_mm = 1e-9;
 
@@ -331,10 +334,19 @@ double RoundedPath::step() const noexcept {
   return step;
 }
 
+// Whether a slower segment begins there.
+bool RoundedPath::slows_at(std::uint64_t segment) const noexcept {
+  return segment < end_ && feed_of((*ring_)[segment]) < slower_share * feed_of((*ring_)[segment - 1]);
+}
+
 bool RoundedPath::next(Station& station) noexcept {
   if (segment_ == end_) return false;
   double end = next_break();
   double length = step();
+  if (slows_at(segment_ + 1)) {
+    const double least = periods_of_interval * period_s_ * feed_of((*ring_)[segment_ + 1]);
+    length = std::min(length, std::max(share_before_stop * (end_of(segment_) - x_), least));
+  }
   const double left = to_stop();
   if (left > stopping_length_ + shortest_mm) {
     length = std::min(length, std::max(share_before_stop * (left - stopping_length_), stopping_length_));
@@ -388,6 +400,8 @@ void RoundedPath::fill(double length, Station& station) const noexcept {
   if (station.offset <= shortest_mm) {
     station.valley =
         entry.half_width > 0.0 && entry.passed < feed_of(entry) * feed_of(entry) && entry.passed <= squared_speed();
+    station.slower_feed = !station.stop && segment_ > start_.segment && slows_at(segment_);
+    station.valley = station.valley || station.slower_feed;
   }
   AxisValues position{};
   const Derivatives begin = roundings_at(x_, position);

@@ -58,6 +58,7 @@ class RoundedPath {
   [[nodiscard]] double squared_speed() const noexcept;
   [[nodiscard]] double step() const noexcept;
   [[nodiscard]] double feed_of(const PlannedSegment& entry) const noexcept;
+  [[nodiscard]] bool slows_at(std::uint64_t segment) const noexcept;
   template <class See>
   void see_roundings(const See& see) const noexcept;
   [[nodiscard]] Derivatives roundings_at(double x, AxisValues& position) const noexcept;

@@ -60,6 +60,7 @@ struct Station {
   bool stop = false;  ///< the motion comes to rest here
   bool arc = false;
   bool valley = false;                                ///< the slowest place around: braking is over here
+  bool slower_feed = false;                           ///< a valley because a slower segment begins
   bool straight = false;                              ///< a line that no rounding reaches
   double speed_limit = 0.0;                           ///< of the interval: feed and axes
   double share = 1.0;                                 ///< of acceleration and jerk that is planned here

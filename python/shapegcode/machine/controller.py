@@ -2,6 +2,7 @@
 other controls' planners, by the names of their own configuration files.
 """
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
@@ -421,6 +422,11 @@ class TimeScatter(InlineTable):
     runs_percent: Annotated[NonNegative, Field(le=100)] = key("scatter between repeated runs of a program")
 
 
+@lru_cache(maxsize=1024)  # a calibration validates the same texts for every machine that it tries
+def _value(text: str) -> Any:
+    return toml_tables(f"value = {text}")["value"]
+
+
 class OpenTime(TomlTable):
     """A direction in parameter space that run logs do not determine."""
 
@@ -441,7 +447,7 @@ class OpenTime(TomlTable):
         for text in self.values:
             name, _, value = text.partition("=")
             try:
-                found[name.strip()] = toml_tables(f"value = {value}")["value"]
+                found[name.strip()] = _value(value)
             except ValueError as error:
                 raise ValueError(f"{text!r}: must be KEY = VALUE: {error}") from error
         return found

@@ -1,0 +1,122 @@
+// The planned speed on straight lines, planned as a whole and while it runs, against closed forms: with feeds that are
+// reached within a few periods, and where a slower or a faster segment follows.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "random_motion.hpp"
+#include "shapegcode/controller.hpp"
+#include "shapegcode/planner.hpp"
+
+using namespace shapegcode;
+using namespace shapegcode::tests;
+
+namespace {
+
+constexpr double period_s = 0.001;
+
+struct Dynamics {
+  double acceleration, jerk;
+};
+constexpr Dynamics all_dynamics[] = {{1000.0, 5e4}, {2000.0, 2e5}, {5000.0, 1e5}, {5000.0, 5e5}};
+
+// Lines along X, one behind the other.
+std::vector<Segment> lines_of(const std::vector<double>& lengths_mm, const std::vector<double>& feeds) {
+  std::vector<Segment> segments;
+  double x = 0.0;
+  for (std::size_t i = 0; i < feeds.size(); ++i) {
+    segments.push_back(make_line({x, 0, 0}, {x + lengths_mm[i], 0, 0}, feeds[i]));
+    x += lengths_mm[i];
+  }
+  segments.back().stop_at_end = true;
+  return segments;
+}
+
+std::vector<double> planned_as_a_whole(const std::vector<Segment>& segments, const Dynamics& dynamics) {
+  TrajectoryLimits limits;
+  limits.max_feed_mm_per_s.setConstant(250.0);
+  limits.max_acceleration_mm_per_s2.setConstant(dynamics.acceleration);
+  limits.max_jerk_mm_per_s3.setConstant(dynamics.jerk);
+  const Samples samples = time_optimal_trajectory(Path(segments), limits, period_s);
+  std::vector<double> x;
+  for (Eigen::Index k = 0; k < samples.positions_mm.rows(); ++k) x.push_back(samples.positions_mm(k, 0));
+  return x;
+}
+
+std::vector<double> planned_online(const std::vector<Segment>& segments, const Dynamics& dynamics) {
+  ControllerSettings settings;
+  settings.period_s = period_s;
+  settings.limits.law = AccelerationLaw::jerk_limited;
+  settings.limits.max_feed_mm_per_s.setConstant(250.0);
+  settings.limits.max_acceleration_mm_per_s2.setConstant(dynamics.acceleration);
+  settings.limits.max_jerk_mm_per_s3.setConstant(dynamics.jerk);
+  settings.plans_in_step = true;
+  MotionController control(settings);
+  for (const Segment& segment : segments) REQUIRE(control.push(segment) == PushResult::accepted);
+  std::vector<double> x{0.0};
+  Vector3 point = Vector3::Zero();
+  while (control.step(values_of(point)) != Activity::idle && x.size() < 100'000) x.push_back(point[0]);
+  return x;
+}
+
+// The speed from set-point to set-point, and between which places of the path.
+void for_speeds(const std::vector<double>& x, double from, double to, const auto& check) {
+  for (std::size_t k = 1; k < x.size(); ++k) {
+    if (x[k - 1] >= from && x[k] <= to) check((x[k] - x[k - 1]) / period_s);
+  }
+}
+
+// The distance within which a speed changes by a jerk and an acceleration.
+double change_mm(double from, double to, const Dynamics& dynamics) {
+  const double rise_s = dynamics.acceleration / dynamics.jerk;
+  const double change = std::abs(to - from);
+  const double time_s = change > dynamics.acceleration * rise_s ? change / dynamics.acceleration + rise_s
+                                                                : 2.0 * std::sqrt(change / dynamics.jerk);
+  return 0.5 * (from + to) * time_s;
+}
+
+}  // namespace
+
+TEST_CASE("a line is run at its feed, without ripple, between a start and an end of a few periods") {
+  for (const Dynamics& dynamics : all_dynamics) {
+    for (const double feed : {1.0, 2.0, 2.5, 5.0, 10.0, 40.0}) {
+      CAPTURE(dynamics.jerk);
+      CAPTURE(feed);
+      const std::vector<Segment> segments = lines_of({9.0}, {feed});
+      const double ends_mm = change_mm(0.0, feed, dynamics) + 12.0 * feed * period_s;
+      for (const std::vector<double>& x :
+           {planned_as_a_whole(segments, dynamics), planned_online(segments, dynamics)}) {
+        CHECK(x.back() == doctest::Approx(9.0));
+        for_speeds(x, ends_mm, 9.0 - ends_mm, [&](double speed) {
+          CHECK(speed <= feed * (1.0 + 1e-5));
+          CHECK(speed >= feed * 0.998);
+        });
+      }
+    }
+  }
+}
+
+TEST_CASE("a slower feed is reached where it begins, and not passed below") {
+  for (const Dynamics& dynamics : all_dynamics) {
+    for (const auto& [before, after] : {std::pair{50.0, 10.0}, std::pair{100.0, 40.0}, std::pair{20.0, 5.0}}) {
+      CAPTURE(dynamics.jerk);
+      CAPTURE(before);
+      const std::vector<Segment> segments = lines_of({30.0, 20.0}, {before, after});
+      const double start_mm = change_mm(0.0, before, dynamics);
+      const double end_mm = change_mm(0.0, after, dynamics);
+      // As fast as if the feed of the second were reached at its very beginning, but for some periods.
+      const double shortest_s = (30.0 + start_mm - change_mm(before, after, dynamics)) / before +
+                                change_mm(before, after, dynamics) / (0.5 * (before + after)) + (20.0 + end_mm) / after;
+      for (const std::vector<double>& x :
+           {planned_as_a_whole(segments, dynamics), planned_online(segments, dynamics)}) {
+        CHECK(static_cast<double>(x.size()) * period_s <= shortest_s + 0.015);
+        for_speeds(x, start_mm, 50.0 - end_mm - 12.0 * after * period_s,
+                   [&](double speed) { CHECK(speed >= 0.9 * after); });
+        for_speeds(x, 30.0, 50.0, [&](double speed) { CHECK(speed <= after * (1.0 + 1e-5)); });
+      }
+    }
+  }
+}
