@@ -87,15 +87,15 @@ test:
 # tests/full_pass.txt tells by folder. Commit that file with the change.
 test-all:
 	$(MAKE) test
+	$(MAKE) trials
 	$(MAKE) test-all-core
 	$(MAKE) tidy-all
-	$(MAKE) test-all-python
+	SHAPEGCODE_ALL_TRIALS=1 $(MAKE) test-all-python
 	$(MAKE) test-linuxcnc LINUXCNC_TESTS=
 	$(MAKE) docs
 	$(BIN)/python tests/tools/full_pass.py write
 
 test-all-core:
-	$(MAKE) trials
 	$(MAKE) plain
 	$(MAKE) sanitize
 	$(MAKE) threads

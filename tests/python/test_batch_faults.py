@@ -14,10 +14,11 @@ from pathlib import Path
 import pytest
 
 from command import COMMAND, run
+from effort import trials
 from shapegcode.batching import batch as batching
 from test_batch import HEAD, TAIL, contents, parent_of
 
-TIMES = 20
+TIMES = trials(20)
 WORDS = ("batch", "parts", "-m", "vx500", "-o", "disk/out", "--html", "disk/pages", "--jobs", "2", "--command", "time")
 
 

@@ -23,6 +23,7 @@ from dialect_readers import (
     read_mitsubishi,
     read_siemens,
 )
+from effort import trials
 from judge import Mode, residual_um
 from shapegcode import _core
 from shapegcode.conversion.translate import translate
@@ -286,7 +287,7 @@ def read_random(dialect: str, seed: int, folder: Path) -> tuple[int, float] | No
 
 @pytest.mark.parametrize("dialect", READERS)
 @pytest.mark.parametrize(
-    "seeds", [range(15), pytest.param(range(15, 200), marks=pytest.mark.slow)], ids=["few", "many"]
+    "seeds", [range(15), pytest.param(range(15, 15 + trials(185)), marks=pytest.mark.slow)], ids=["few", "many"]
 )
 def test_random_programs_read_back(dialect: str, seeds: range, tmp_path: Path) -> None:
     found = [each for seed in seeds if (each := read_random(dialect, seed, tmp_path)) is not None]

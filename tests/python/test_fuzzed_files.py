@@ -21,11 +21,12 @@ from typing import Any
 
 import pytest
 
+from effort import trials
 from faults import MAX_BYTES, MAX_CPU_S, changed
 
 TESTS = Path(__file__).resolve().parents[1]
 DATA = TESTS.parent / "python" / "shapegcode" / "data"
-_QUICK, _MANY = 30, 3000
+_QUICK, _MANY = 30, trials(3000)
 #: Each file of these starts a process.
 _SLOW_KINDS = {"mat": 6}
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import binom
 
 import shapegcode as sg
+from effort import trials
 from hard_records import accelerance, hard_record, is_meant, to_find
 from shapegcode.cli import main
 from shapegcode.identification.frf_model import steady_sines
@@ -60,7 +61,7 @@ def test_hard_records() -> None:
 
 @pytest.mark.slow
 def test_many_hard_records() -> None:
-    check(range(1300, 1330))
+    check(range(1300, 1300 + trials(30)))
 
 
 POINTS = 5

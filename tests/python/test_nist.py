@@ -17,6 +17,7 @@ from evidence_nist import (
 )
 
 import shapegcode as sg
+from effort import trials
 from shapegcode.results import plot
 
 
@@ -79,7 +80,7 @@ def test_picture_has_a_row_for_each_run(learned: sg.CycleTimeCalibration) -> Non
 
 @pytest.mark.slow
 def test_every_program_left_out_is_predicted() -> None:
-    for title, found in learned_machines().items():
+    for title, found in learned_machines(trials(3)).items():
         assert [cells for cells, within in prediction_rows(title, found) if not within] == []
         for run in left_out(found):
             times = published()[Path(run.program).stem]

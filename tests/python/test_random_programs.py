@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import pytest
 
+from effort import trials
 from judge.dialect import play
 from judge.draws import draw
 from random_verdict import Case, complaints, convert, read
 from second_reading import compare
 
 QUICK = range(16)
-MANY = range(len(QUICK), len(QUICK) + 500)
+MANY = range(len(QUICK), len(QUICK) + trials(500))
 CHUNK = 20
 
 

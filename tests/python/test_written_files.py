@@ -15,6 +15,7 @@ import pytest
 
 import shapegcode as sg
 from command import run
+from effort import trials
 from faults import command, hear_ctrl_c, sound
 from shapegcode.io.data_file import is_temporary, write_text
 from test_data_limits import PROGRAM, M, no_wait
@@ -169,7 +170,7 @@ def _interrupted(folder: Path, number: int, after_s: float) -> subprocess.Comple
     return subprocess.CompletedProcess(words, process.returncode, out, said)
 
 
-@pytest.mark.parametrize("times", [4, pytest.param(int(os.environ.get("STOPS", "60")), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("times", [4, pytest.param(trials(60), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_stopped_at_random_instants_no_half_file_is_there(number: int, times: int, folder: Path) -> None:
     whole = _interrupted(folder, 0, 0.0)
