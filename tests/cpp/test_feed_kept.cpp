@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -35,18 +37,18 @@ std::vector<Segment> lines_of(const std::vector<double>& lengths_mm, const std::
   return segments;
 }
 
-std::vector<double> planned_as_a_whole(const std::vector<Segment>& segments, const Dynamics& dynamics) {
+std::vector<Vector3> planned_as_a_whole(const std::vector<Segment>& segments, const Dynamics& dynamics) {
   TrajectoryLimits limits;
   limits.max_feed_mm_per_s.setConstant(250.0);
   limits.max_acceleration_mm_per_s2.setConstant(dynamics.acceleration);
   limits.max_jerk_mm_per_s3.setConstant(dynamics.jerk);
   const Samples samples = time_optimal_trajectory(Path(segments), limits, period_s);
-  std::vector<double> x;
-  for (Eigen::Index k = 0; k < samples.positions_mm.rows(); ++k) x.push_back(samples.positions_mm(k, 0));
-  return x;
+  std::vector<Vector3> points;
+  for (Eigen::Index k = 0; k < samples.positions_mm.rows(); ++k) points.emplace_back(samples.positions_mm.row(k));
+  return points;
 }
 
-std::vector<double> planned_online(const std::vector<Segment>& segments, const Dynamics& dynamics) {
+std::vector<Vector3> planned_online(const std::vector<Segment>& segments, const Dynamics& dynamics) {
   ControllerSettings settings;
   settings.period_s = period_s;
   settings.limits.law = AccelerationLaw::jerk_limited;
@@ -56,16 +58,19 @@ std::vector<double> planned_online(const std::vector<Segment>& segments, const D
   settings.plans_in_step = true;
   MotionController control(settings);
   for (const Segment& segment : segments) REQUIRE(control.push(segment) == PushResult::accepted);
-  std::vector<double> x{0.0};
+  std::vector<Vector3> points{Vector3::Zero()};
   Vector3 point = Vector3::Zero();
-  while (control.step(values_of(point)) != Activity::idle && x.size() < 100'000) x.push_back(point[0]);
-  return x;
+  while (control.step(values_of(point)) != Activity::idle && points.size() < 100'000) points.push_back(point);
+  return points;
 }
 
 // The speed from set-point to set-point, and between which places of the path.
-void for_speeds(const std::vector<double>& x, double from, double to, const auto& check) {
-  for (std::size_t k = 1; k < x.size(); ++k) {
-    if (x[k - 1] >= from && x[k] <= to) check((x[k] - x[k - 1]) / period_s);
+void for_speeds(const std::vector<Vector3>& points, double from, double to, const auto& check) {
+  double travel = 0.0;
+  for (std::size_t k = 1; k < points.size(); ++k) {
+    const double step = (points[k] - points[k - 1]).norm();
+    if (travel >= from && travel + step <= to) check(step / period_s);
+    travel += step;
   }
 }
 
@@ -87,10 +92,10 @@ TEST_CASE("a line is run at its feed, without ripple, between a start and an end
       CAPTURE(feed);
       const std::vector<Segment> segments = lines_of({9.0}, {feed});
       const double ends_mm = change_mm(0.0, feed, dynamics) + 12.0 * feed * period_s;
-      for (const std::vector<double>& x :
+      for (const std::vector<Vector3>& points :
            {planned_as_a_whole(segments, dynamics), planned_online(segments, dynamics)}) {
-        CHECK(x.back() == doctest::Approx(9.0));
-        for_speeds(x, ends_mm, 9.0 - ends_mm, [&](double speed) {
+        CHECK(points.back()[0] == doctest::Approx(9.0));
+        for_speeds(points, ends_mm, 9.0 - ends_mm, [&](double speed) {
           CHECK(speed <= feed * (1.0 + 1e-5));
           CHECK(speed >= feed * 0.998);
         });
@@ -110,12 +115,34 @@ TEST_CASE("a slower feed is reached where it begins, and not passed below") {
       // As fast as if the feed of the second were reached at its very beginning, but for some periods.
       const double shortest_s = (30.0 + start_mm - change_mm(before, after, dynamics)) / before +
                                 change_mm(before, after, dynamics) / (0.5 * (before + after)) + (20.0 + end_mm) / after;
-      for (const std::vector<double>& x :
+      for (const std::vector<Vector3>& points :
            {planned_as_a_whole(segments, dynamics), planned_online(segments, dynamics)}) {
-        CHECK(static_cast<double>(x.size()) * period_s <= shortest_s + 0.015);
-        for_speeds(x, start_mm, 50.0 - end_mm - 12.0 * after * period_s,
+        CHECK(static_cast<double>(points.size()) * period_s <= shortest_s + 0.015);
+        for_speeds(points, start_mm, 50.0 - end_mm - 12.0 * after * period_s,
                    [&](double speed) { CHECK(speed >= 0.9 * after); });
-        for_speeds(x, 30.0, 50.0, [&](double speed) { CHECK(speed <= after * (1.0 + 1e-5)); });
+        for_speeds(points, 30.0, 50.0, [&](double speed) { CHECK(speed <= after * (1.0 + 1e-5)); });
+      }
+    }
+  }
+}
+
+TEST_CASE("a circle is run at its feed") {
+  constexpr double radius_mm = 5.0;
+  const double length_mm = 2.0 * std::numbers::pi * radius_mm;
+  for (const Dynamics& dynamics : all_dynamics) {
+    for (const double feed : {2.5, 10.0, 50.0}) {
+      CAPTURE(dynamics.jerk);
+      CAPTURE(feed);
+      std::vector<Segment> segments{
+          make_arc(Vector3::Zero(), Vector3::Zero(), {radius_mm, 0.0, 0.0}, 2.0 * std::numbers::pi, 2, feed)};
+      segments.back().stop_at_end = true;
+      const double ends_mm = 2.0 * change_mm(0.0, feed, dynamics) + 12.0 * feed * period_s;
+      for (const std::vector<Vector3>& points :
+           {planned_as_a_whole(segments, dynamics), planned_online(segments, dynamics)}) {
+        for_speeds(points, ends_mm, length_mm - ends_mm, [&](double speed) {
+          CHECK(speed <= feed * (1.0 + 1e-5));
+          CHECK(speed >= feed * 0.995);
+        });
       }
     }
   }
