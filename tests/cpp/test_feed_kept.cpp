@@ -147,3 +147,32 @@ TEST_CASE("a circle is run at its feed") {
     }
   }
 }
+
+TEST_CASE("where the feed falls in steps the motion never gets faster, whatever the length of the steps") {
+  constexpr int steps = 40;
+  for (const Dynamics& dynamics : all_dynamics) {
+    for (const double step_mm : {0.05, 0.1, 0.3, 1.0}) {
+      CAPTURE(dynamics.jerk);
+      CAPTURE(step_mm);
+      std::vector<double> lengths_mm{20.0};
+      std::vector<double> feeds{50.0};
+      for (int k = 0; k < steps; ++k) {
+        lengths_mm.push_back(step_mm);
+        feeds.push_back(49.0 - k);
+      }
+      lengths_mm.push_back(10.0);
+      feeds.push_back(9.0);
+      const std::vector<Segment> segments = lines_of(lengths_mm, feeds);
+      for (const std::vector<Vector3>& points :
+           {planned_as_a_whole(segments, dynamics), planned_online(segments, dynamics)}) {
+        double before = 50.0;
+        for_speeds(points, change_mm(0.0, 50.0, dynamics) + 1.0, 20.0 + steps * step_mm + 5.0, [&](double speed) {
+          CHECK(speed <= 1.015 * before);
+          CHECK(speed >= 8.9);
+          before = std::min(before, speed);
+        });
+        CHECK(before == doctest::Approx(9.0).epsilon(0.01));
+      }
+    }
+  }
+}

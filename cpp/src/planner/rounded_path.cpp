@@ -310,12 +310,22 @@ double RoundedPath::squared_speed() const noexcept {
   return squared;
 }
 
+namespace {
+
+// In which all axes move, `offset` mm behind the start of a segment.
+AxisValues direction_of(const PlannedSegment& entry, double offset) noexcept {
+  AxisValues direction = entry.rate;
+  const Vector3 tangent = tangent_at(entry.segment, offset);
+  std::copy_n(tangent.data(), axis_count, direction.begin());
+  return direction;
+}
+
+}  // namespace
+
 // How long an interval may be here.
 double RoundedPath::step() const noexcept {
   const PlannedSegment& entry = (*ring_)[segment_];
-  AxisValues direction = entry.rate;
-  const Vector3 tangent = tangent_at(entry.segment, x_ - entry.distance);
-  std::copy_n(tangent.data(), axis_count, direction.begin());
+  const AxisValues direction = direction_of(entry, x_ - entry.distance);
   double speed = std::min(feed_of(entry), along(direction, limits_.speed, limits_.axes));
   double step = widest_mm;
   if (entry.segment.kind == SegmentKind::arc) {
@@ -337,6 +347,18 @@ double RoundedPath::step() const noexcept {
 // Whether a slower segment begins there.
 bool RoundedPath::slows_at(std::uint64_t segment) const noexcept {
   return segment < end_ && feed_of((*ring_)[segment]) < slower_share * feed_of((*ring_)[segment - 1]);
+}
+
+// Whether a still slower one follows it so soon that braking goes on.
+bool RoundedPath::slows_on(std::uint64_t segment) const noexcept {
+  if (!slows_at(segment + 1)) return false;
+  const PlannedSegment& entry = (*ring_)[segment];
+  const double before = feed_of(entry);
+  const double after = feed_of((*ring_)[segment + 1]);
+  const AxisValues direction = direction_of(entry, 0.0);
+  const double time_s = braking_time(before - after, along(direction, limits_.acceleration, limits_.axes),
+                                     along(direction, limits_.jerk, limits_.axes));
+  return end_of(segment) - entry.distance < 0.5 * (before + after) * time_s;
 }
 
 bool RoundedPath::next(Station& station) noexcept {
@@ -400,7 +422,7 @@ void RoundedPath::fill(double length, Station& station) const noexcept {
   if (station.offset <= shortest_mm) {
     station.valley =
         entry.half_width > 0.0 && entry.passed < feed_of(entry) * feed_of(entry) && entry.passed <= squared_speed();
-    station.slower_feed = !station.stop && segment_ > start_.segment && slows_at(segment_);
+    station.slower_feed = !station.stop && segment_ > start_.segment && slows_at(segment_) && !slows_on(segment_);
     station.valley = station.valley || station.slower_feed;
   }
   AxisValues position{};

@@ -59,6 +59,7 @@ class RoundedPath {
   [[nodiscard]] double step() const noexcept;
   [[nodiscard]] double feed_of(const PlannedSegment& entry) const noexcept;
   [[nodiscard]] bool slows_at(std::uint64_t segment) const noexcept;
+  [[nodiscard]] bool slows_on(std::uint64_t segment) const noexcept;
   template <class See>
   void see_roundings(const See& see) const noexcept;
   [[nodiscard]] Derivatives roundings_at(double x, AxisValues& position) const noexcept;
