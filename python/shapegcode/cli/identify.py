@@ -126,7 +126,7 @@ IDENTIFY = arguments.Interface(
         *options.MACHINE_OR_NONE,
         ("--modes", "N", arguments.count, "number of modes (default: by information criterion)"),
         ("--max-modes --most-modes", "N", {"dest": "max_modes", "type": arguments.count},
-         "largest number of modes (default: 40 fitted over frequency, 8 fitted over time)"),
+         "largest number of modes (default: 40 if the fit is over frequency, 8 if it is over time)"),
         ("--force", None, bool, "write modes with --update even if the verdict is 'do not use'"),
         ("--frequencies", "LOW:HIGH", arguments.frequency_band, "find modes between these frequencies, Hz"),
         ("--decay --ignore-force", None, {"dest": "ignore_force", "action": "store_true"},

@@ -362,7 +362,8 @@ def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
         if wanted:
             raise _core.ArgumentError(
                 "shaping.per_axis needs shaping.contour (different shapers distort the path), shaping.family = "
-                '"auto", and modes without frequency_uncertainty_percent and frequency_over axis'
+                '"auto", and modes without frequency_uncertainty_percent whose frequency does not depend on an axis '
+                "position (frequency_over)"
             )
         return grid
     longest = machine.shaping.max_duration_s if wanted else grid.shaper.duration_s - 0.5 * grid.block_period_s
