@@ -209,7 +209,7 @@ class Aims:
         if original_um > asked:
             wanted.append(("the original's contour error", original_um))
         loosest = max(asked, *(self._curve_of(index).planned_um[-1] / _MARGIN for index in cuts))
-        wanted.append(("cuts not slowed", loosest))
+        wanted.append(("no slowing needed", loosest))
         points = [self._point(name, um, cuts, original_s) for name, um in sorted(wanted, key=lambda each: each[1])]
         tolerances, times = [each.tolerance_um for each in points], [each.time_s for each in points]
         knee = knee_of(tolerances, times)
@@ -287,7 +287,7 @@ class CutCurve:
 class TolerancePoint:
     """The program at one contour tolerance."""
 
-    name: str  # "as asked", "1.5 times", "the original's contour error", "cuts not slowed"
+    name: str  # "as asked", "1.5 times", "the original's contour error", "no slowing needed"
     tolerance_um: float  # planned tolerance; without slowing: the deviation reached
     time_s: float  # of the program
     time_increase_percent: float  # over the original

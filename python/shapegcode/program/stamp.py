@@ -9,7 +9,7 @@ Its cautions, each a sentence and a comment, are also used in reports, pages, te
 (BLOCK PERIOD 5 MS SHAPER 20 MS ZVD)
 (SET FEED OVERRIDE 100 PCT)
 (NO SINGLE BLOCK IN SHAPED CUTS)
-(RESTART ONLY AFTER A SHAPED COMMENT OR AT N OF THE REPORT)
+(RESTART ONLY AFTER COMMENT SHAPED OR AT N IN RESTART LIST)
 (FIRST RUN ABOVE THE PART WITHOUT TOOL)
 (TIME CONSTANT AFTER INTERPOLATION 0 MS)
 
@@ -56,9 +56,9 @@ OVERRIDES = {"ask": OVERRIDE, "lock": OVERRIDE_LOCKED, "any": OVERRIDE_ANY}
 SINGLE_BLOCK = Habit(
     "single block",
     "NO SINGLE BLOCK IN SHAPED CUTS",
-    "no single block inside of shaped cuts: the control would stop at every block, some milliseconds apart; to check "
-    "the program use the graphic display, machine lock, or dry run above the part, and single block between "
-    "the cuts; then the first run above the part",
+    "no single block inside of shaped cuts: the control would stop at every block, some milliseconds apart; "
+    "between the cuts it may be used; to check the program: graphic display, machine lock, or dry run above the part, "
+    "then the first run",
 )
 FEED_HOLD = Habit(
     "feed hold",
@@ -68,7 +68,7 @@ FEED_HOLD = Habit(
 )
 RESTART = Habit(
     "restart",
-    "RESTART ONLY AFTER A SHAPED COMMENT OR AT N OF THE REPORT",
+    "RESTART ONLY AFTER COMMENT SHAPED OR AT N IN RESTART LIST",
     "restart only where a cut begins, or at a restart point: other blocks of a shaped cut are not valid restart points",
 )
 FIRST_RUN = Habit(

@@ -435,7 +435,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         Column("verdict", value=lambda case: _verdict(case, case is worst), left=True),
     )
     shown = sum(not case.counts for case in cases)
-    brackets = "; those in brackets are only shown" if shown else ""
+    brackets = "; a verdict in brackets does not count" if shown else ""
     return Table(
         "operating conditions: residual X Y Z, contour error of command and machine table, µm",
         columns,
