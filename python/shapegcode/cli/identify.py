@@ -22,7 +22,7 @@ _OF_FILES = (
     ("--time-column", "NAME", None, "header or number (from 1) of the time column"),
     ("--force-column", "NAME", None, "header or number of the force column"),
     ("--response-column", "NAME", {"dest": "response_columns", "action": "append"},
-     "header or number of a response column; repeatable"),
+     "header or number of a response column; may be repeated"),
     ("--time-unit", "UNIT", None, "s, ms or us"),
     ("--force-unit", "UNIT", None, "N, kN, kgf or lbf"),
     ("--response-unit", "UNIT", None, "for example m/s^2, g, mm/s or um"),

@@ -111,7 +111,7 @@ _LINE_HEAD = re.compile(rb"(\n(?:/\d?)?)(?:N\d+(?:[O:]\d+)?|[O:]\d+)")
 
 @dataclass(frozen=True)
 class Stamp:
-    """Data in the header of an emitted program; texts are in the characters of comments."""
+    """Data in the header of an emitted program; all text is in characters that a comment may contain."""
 
     version: str  # version of shapegcode
     machine: str  # name of the machine
@@ -141,7 +141,7 @@ class Stamp:
         return [first, _PENDING.decode(), *rest]
 
     def difference(self, other: Stamp) -> str:
-        """Difference of another header's machine as text; empty: no relevant difference."""
+        """What differs in the machine of another header, as text; empty: nothing relevant."""
         pairs = (
             ("machine", self.machine, other.machine),
             ("modes", ", ".join(self.modes) or "none", ", ".join(other.modes) or "none"),
@@ -259,7 +259,7 @@ def write_verdict(program: _core.ProgramText, mark: str, *, good: bool, better: 
 
 
 def _changes(find: Callable[[bytes], int], mark: str, *, good: bool, better: bool) -> list[tuple[int, bytes]]:
-    """Positions and new bytes of changes in the header, each of the replaced length."""
+    """Changes in the header: the position of each, and the bytes that replace as many old ones."""
     open_ones = (_PENDING,) if good else (_PENDING, _GOOD, _BETTER)
     verdicts = [(before, _BAD if not good else _BETTER if better else _GOOD) for before in open_ones]
     wanted = [*verdicts, (MARK_PENDING, f"(CHECKSUM {mark})".encode())]
