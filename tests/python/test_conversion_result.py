@@ -68,7 +68,7 @@ def test_the_table_sets_original_against_emitted() -> None:
     assert found["contour error of the command, largest"].limit is None
     assert found["contour error of the machine table, largest"].limit == 20.0  # what `shaping.contour` names
     assert found["size of the program"].emitted == len(conversion.text)
-    assert found["orbit error"].emitted == conversion.orbit_error_percent[0]
+    assert found["orbit error of the command"].emitted == conversion.orbit_error_percent[0]
     text = str(conversion.tables()[0])
     assert max(map(len, text.splitlines())) <= 80
 

@@ -183,7 +183,7 @@ def _restarts(emitted: Program, written: Written, machine: Machine) -> Iterator[
     if stops := sum(each.stops for each in restarts):
         cost_s = sum(each.stops_s for each in restarts)
         yield (
-            f"{stops} of them {'is a stop that was' if stops == 1 else 'are stops that were'} added "
+            f"{stops} of these points {'is a stop that was' if stops == 1 else 'are stops that were'} added "
             f"(emission.restart_stops): {cost_s:.1f} s more, and a dwell mark where the tool stops in the cut"
         )
     long = [
