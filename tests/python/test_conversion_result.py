@@ -68,7 +68,7 @@ def test_the_table_sets_original_against_emitted() -> None:
     assert found["contour error of the command, largest"].limit is None
     assert found["contour error of the machine table, largest"].limit == 20.0  # what `shaping.contour` names
     assert found["size of the program"].emitted == len(conversion.text)
-    assert found["orbit error"].emitted == conversion.orbit_error_percent[0]
+    assert found["orbit error of the command"].emitted == conversion.orbit_error_percent[0]
     text = str(conversion.tables()[0])
     assert max(map(len, text.splitlines())) <= 80
 
@@ -157,7 +157,7 @@ def test_an_option_is_checked_as_a_key_of_the_machine_file(options: dict[str, An
 
 def test_what_a_verdict_rests_on_fits_80_columns_without_a_broken_word() -> None:
     longest = Sensitivity(
-        "controller.interpolation_period_s", "0.001 s", "inherited", "longer, case underrun 20 ms",
+        "controller.interpolation_period_s", "0.001 s", "inherited", "longer: buffer underrun 20 ms",
         "contour error of the machine table", 12.3, 279.8, 20.0,
     )  # fmt: skip
     law = replace(longest, key="controller.motion", value="after_interpolation", origin="assumed")

@@ -141,7 +141,7 @@ def test_no_line_joins_the_two_sides_of_a_rounded_corner() -> None:
     steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
     assert np.isnan(steps).sum() == 2  # to the gap, and from it
     assert np.nanmax(steps) < 0.3
-    assert "rounds corners" in " ".join(text.get_text() for text in panel.texts)
+    assert "drawn up to the bisector" in " ".join(text.get_text() for text in panel.texts)
 
 
 def test_numbers_in_titles_are_never_powers_of_ten() -> None:

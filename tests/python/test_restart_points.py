@@ -189,7 +189,7 @@ def test_without_a_place_of_rest_there_are_points_only_where_stops_are_asked_for
     stopped = converted(text, restart_interval_s=5.0, restart_stops=True)
     note = next(each.text for each in stopped.at_the_control if each.topic == "restart")
     assert len(stopped.restart_points) >= 2
-    told = re.search(r"(\d+) of them are stops that were added .*: ([\d.]+) s more, and a dwell mark", note)
+    told = re.search(r"(\d+) of these points are stops that were added .*: ([\d.]+) s more, and a dwell mark", note)
     cost_s = stopped.cutting_time_s.emitted - none.cutting_time_s.emitted
     assert float(told[2]) == pytest.approx(cost_s, abs=0.1) and cost_s > 0.05
     moves = cuts(stopped.text.decode())
@@ -203,7 +203,7 @@ def test_without_a_place_of_rest_there_are_points_only_where_stops_are_asked_for
 def test_what_single_block_does_is_as_the_independent_player_has_it() -> None:
     conversion = converted(zigzag(1))
     note = next(each.text for each in conversion.at_the_control if each.topic == "single block")
-    told = re.search(r"in lines (\d+) to (\d+): .* \((\d+) stops, .*marks of up to (\d+) µm", note)
+    told = re.search(r"lines (\d+) to (\d+) would take .* \((\d+) stops, .*marks of up to (\d+) µm", note)
     assert "graphic display, machine lock, or dry run above the part" in note
     first, last, stops, mark_um = map(int, told.groups())
     moves = [move for move in cuts(conversion.text.decode()) if first <= move.line <= last and move.length > 0.0]

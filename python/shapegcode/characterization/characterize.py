@@ -107,7 +107,7 @@ def _assumed(machine: Machine, key: str) -> float | str | None:
 
 
 def _fitted(machine: Machine, facts: Sequence[ControllerFact]) -> tuple[Machine, dict[str, str]]:
-    """The machine with all known parameters, and a remark for each key set."""
+    """The machine with all known parameters, and a remark for each key that was set."""
     values: dict[str, object] = {}
     remarks: dict[str, str] = {}
     for_all: dict[str, list[ControllerFact]] = defaultdict(list)

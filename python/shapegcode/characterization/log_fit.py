@@ -403,7 +403,7 @@ def fit_rapids(facts: LogFacts, axis: str, parts: list[moves.PartLog]) -> list[_
 
 
 def _short_ramp(facts: LogFacts, fits: list[_Rapid]) -> tuple[float, float]:
-    """Bounds of the time constant from rapids below the rate: eq. 16 of paper 004, for half of a rapid."""
+    """Bounds of the time constant from rapids too short to reach their rate: eq. 16 of paper 004, for half of one."""
     period = facts.tick
     halves = [(whole_periods(fit.ramp[0] - 0.3 * period, period), fit) for fit in fits]
     sure = [(half, fit) for half, fit in halves if abs(half - fit.ramp[0]) + fit.ramp[1] < 0.3 * period]

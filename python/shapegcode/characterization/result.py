@@ -172,7 +172,7 @@ class Characterisation(Result):
         findings: one for each quantity, including unknown ones.
         files: files read.
         fitted: the machine with all known parameters.
-        remarks: interval and source of each machine-file key set, by dotted name.
+        remarks: interval and source of each key that was set in the machine file, by dotted name.
         warnings: contradictions: results that do not agree with the others, with their location.
     """
 

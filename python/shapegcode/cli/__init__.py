@@ -1,5 +1,8 @@
-"""The ``shapegcode`` command: modules of this package contain the `Interface` of each command and are imported when it
-runs; its function returns the exit code and does slow imports."""
+"""The ``shapegcode`` command.
+
+A module of this package contains the `Interface` of one or more commands, and is imported when one of them runs. The
+function of a command does the slow imports, and returns the exit code.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +55,7 @@ class Command:
     help: str  # one line for ``shapegcode --help``
 
     def interface(self) -> Interface:
-        """Import and return its options and function."""
+        """Import the command's module, and return the command's options and function."""
         home = next((module for module, names in _HOMES.items() if self.name in names), self.name)
         found: Interface = getattr(importlib.import_module(f"{__name__}.{home}"), self.name.upper())
         return found

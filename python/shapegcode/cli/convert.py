@@ -139,8 +139,9 @@ CONVERT = Interface(
         ("--arc-feed", "RATIO", ratio, "feed on arcs relative to the programmed feed, for example 60%%"),
         *options.override_options(MACHINE_KEYS),
         ("--shape-all", None, bool,
-         "shape every cut that the price allows: also if the gain is below shaping.least_gain_um, the result is worse, "
-         "or the original is within tolerance; by default such cuts are left unchanged"),
+         "shape every cut whose time stays within --max-time-increase and --max-cut-time-increase, even if it gains "
+         "less than shaping.least_gain_um, gets worse, or is within tolerance already; by default such cuts are left "
+         "unchanged"),
         ("--only", "A-B,...", line_ranges, "shape nothing but the cuts in these lines of IN, for example 12-80,95-240"),
         ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines of IN unchanged", ()),
         ("--tolerance-curve", None, {"action": argparse.BooleanOptionalAction},

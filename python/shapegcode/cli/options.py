@@ -78,7 +78,7 @@ def cluster_of(args: argparse.Namespace) -> Cluster | None:
 
 MODES = (
     ("--keep-modes", "AXES", axes,
-     "keep the modes of these axes without a test, for example XY: right if the file was made for this machine"),
+     "keep the modes of these axes without a test, for example XY; do so only if the file was made for this machine"),
     ("--rigid", "AXES", axes, "these axes have no significant vibration mode, for example Z"),
 )  # fmt: skip
 """Options for modes that were not measured on this machine."""

@@ -231,7 +231,8 @@ TIME = Interface(
          "rapid override, for example 25%% (at most 100%%; default: times.rapid_override_percent); the acceleration of "
          "rapids is unchanged"),
         ("--log-next", "PROGRAM", [None],
-         "show the interval that a log of this program would give; repeatable, the best comes first"),
+         "show the 95 %% interval that would remain if a run of this program were logged too; may be repeated: the "
+         "program that narrows it most is listed first"),
         ("--no-full", None, bool, "closed form only, no full interpolation"),
         ("--blocks", None, bool, "write every block into the JSON"),
         ("--csv", "FILE", None, "write one line per block; - for standard output"),

@@ -123,7 +123,7 @@ def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_perio
         return f"{needs}; {prologue} before each shaped cut switches the look-ahead mode off{again}"
     if prologue:
         return f"{needs}; {prologue} before each shaped cut must select the control's mode for shaped cuts"
-    return f"{needs}; no look-ahead code in the program: contour control with look-ahead (G05.1Q1, G08P1) must be off"
+    return f"{needs}; contour control with look-ahead (G05.1Q1, G08P1) must be off: the program does not switch it off"
 
 
 def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFigures, model: MachineModel) -> str:
@@ -149,9 +149,9 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFi
         mark_um = max(mark_um, float(np.max([simulated.peak_mm, simulated.residual_mm])) * 1e3)
     time_s = region.time_s.emitted + len(blocks) * (1.0 / _PRESSES_PER_S + model.shaped_filter.duration_s)
     lines = "{} to {}".format(*region.emitted_lines)
-    marks = f", marks of up to {mark_um:.0f} µm" if mark_um >= 1.0 else ""
+    marks = f" and leave marks of up to {mark_um:.0f} µm" if mark_um >= 1.0 else ""
     return (
-        f"single block in lines {lines}: {_duration(time_s)} instead of {_duration(region.time_s.emitted)} "
+        f"in single block, lines {lines} would take {_duration(time_s)} instead of {_duration(region.time_s.emitted)} "
         f"({len(blocks)} stops, two presses of cycle start a second){marks}"
     )
 
@@ -173,16 +173,17 @@ def _restarts(emitted: Program, written: Written, machine: Machine) -> Iterator[
     if count:
         before = (*emission.prologue, *emission.locking)
         shakes_um = max(mark.vibration_um for each in restarts for mark in each.marks)
-        switched = f", by MDI {' '.join(before)}" if before else ""
+        switched = f", enter {' '.join(before)} by MDI" if before else ""
         yield (
             f"{count} restart point{'' if count == 1 else 's'} inside long cuts, where the command is nearly at "
-            f"rest: spindle on, tool, H and coordinate system of the list in force{switched}, go to its position from "
-            f"above, then search the N number; a start there excites one vibration of up to {shakes_um:.1f} µm"
+            "rest (table of restart points); to start at one: load its tool, activate its H and coordinate system, "
+            f"switch the spindle on{switched}, move to its position from above, then search its N number; such a start "
+            f"makes the machine vibrate once, by up to {shakes_um:.1f} µm"
         )
     if stops := sum(each.stops for each in restarts):
         cost_s = sum(each.stops_s for each in restarts)
         yield (
-            f"{stops} of them {'is a stop that was' if stops == 1 else 'are stops that were'} added "
+            f"{stops} of these points {'is a stop that was' if stops == 1 else 'are stops that were'} added "
             f"(emission.restart_stops): {cost_s:.1f} s more, and a dwell mark where the tool stops in the cut"
         )
     long = [
@@ -192,7 +193,7 @@ def _restarts(emitted: Program, written: Written, machine: Machine) -> Iterator[
     ]
     for (first, last), each in sorted(long, key=lambda pair: -pair[1].longest_s)[:1]:
         more = f" (and {len(long) - 1} more cuts)" if len(long) > 1 else ""
-        why = each.reason or "the command is nowhere nearly at rest"
+        why = each.reason or "the command does not come nearly to rest there"
         remedy = "" if each.reason or emission.restart_stops else "; emission.restart_stops = true adds a stop"
         yield (
             f"no restart point for {_duration(each.longest_s)} in the cut of lines {first} to {last}{more}: "

@@ -111,7 +111,7 @@ def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[mo
     if conversion.tolerance_curve is not None:
         sentence = conversion.tolerance_curve.sentence
         how = f"{sentence}. " if sentence else ""
-        how += "The time as asked was simulated, the others are planned. Limits: table [price]."
+        how += "The time at the requested tolerance was simulated; the others are estimates. Limits: table [price]."
         yield model.Section("price", "Tolerance against time", (curve_table(conversion.tolerance_curve),), how=how)
 
 
@@ -160,7 +160,7 @@ def _cases(conversion: Conversion) -> model.Section:
     rows = tuple(_case(rank, case, axes, conversion) for rank, case in enumerate(conversion.cases))
     how = (
         "Each line is an operating condition under which the emitted program was simulated. The colour is the ratio "
-        "to the limit: up to 100 % is within. Lines in brackets are only shown."
+        "to the limit: up to 100 % is within. A condition in brackets does not count in the verdict."
     )
     counted = sum(case.counts for case in conversion.cases)
     caption = f"{counted} of {len(rows)} operating conditions count ([verdict] of the machine file)"

@@ -101,8 +101,8 @@ class Aims:
 
         The bound on the feed treats corners and arcs one by one, but those within one shaper duration add up. If the
         planned deviation of a cut is below its tolerance, tightening starts from that deviation (a bound above it
-        would change nothing). A cut gets its former plan back if tightening does not help, or if it is within the
-        limit at 100 % override but, after one attempt, not at other overrides.
+        would change nothing). A cut that exceeds the limit at other overrides only is tightened once. A cut gets its
+        former plan back if tightening does not help, or was not enough at other overrides.
         """
         room_um = self.room_um
         tightened = False
@@ -127,7 +127,7 @@ class Aims:
         return tightened
 
     def keep_cut_price(self, written: Written, keepable: Callable[[int], bool], attempts_left: int) -> bool:
-        """Loosen the tolerance of cuts above the price of one cut; leave a cut unchanged if no tolerance helps."""
+        """Loosen the tolerance of cuts whose time exceeds the price; leave a cut unchanged if no tolerance suffices."""
         percent = self._machine.price.cut_time_percent
         changed = False
         for place in written.placed:
@@ -153,7 +153,10 @@ class Aims:
     def keep_program_price(
         self, excess_s: float, gains_um: Mapping[int, float], keepable: Callable[[int], bool]
     ) -> bool:
-        """Loosen the tolerance of all cuts to a common value until the price is kept; then leave cuts unchanged."""
+        """Bring the program's time within its price.
+
+        The tolerance of all cuts is loosened to a common value; if no value suffices, cuts are left unchanged.
+        """
         cuts = [index for index in gains_um if not self.reasons[index]]
         wanted_s = math.fsum(self.emitted_s[index] for index in cuts) - excess_s
 
@@ -209,7 +212,7 @@ class Aims:
         if original_um > asked:
             wanted.append(("the original's contour error", original_um))
         loosest = max(asked, *(self._curve_of(index).planned_um[-1] / _MARGIN for index in cuts))
-        wanted.append(("cuts not slowed", loosest))
+        wanted.append(("no slowing needed", loosest))
         points = [self._point(name, um, cuts, original_s) for name, um in sorted(wanted, key=lambda each: each[1])]
         tolerances, times = [each.tolerance_um for each in points], [each.time_s for each in points]
         knee = knee_of(tolerances, times)
@@ -287,7 +290,7 @@ class CutCurve:
 class TolerancePoint:
     """The program at one contour tolerance."""
 
-    name: str  # "as asked", "1.5 times", "the original's contour error", "cuts not slowed"
+    name: str  # "as asked", "1.5 times", "the original's contour error", "no slowing needed"
     tolerance_um: float  # planned tolerance; without slowing: the deviation reached
     time_s: float  # of the program
     time_increase_percent: float  # over the original
@@ -322,8 +325,10 @@ class ToleranceCurve:
 def plan_curve(
     path: _core.Path, fir: _core.Fir, options: _core.ShapingOptions, asked_um: float, original_um: float
 ) -> CutCurve:
-    """Plan a cut at several tolerances, from no slowing to the requested one; each search starts from the last
-    speeds."""
+    """Plan a cut at several tolerances, from one that needs no slowing down to the requested one.
+
+    Each search starts from the speeds of the search before it.
+    """
     wanted = sorted(
         {*(factor * asked_um for factor in (*_FACTORS, *_BETWEEN)), max(original_um, asked_um)}, reverse=True
     )

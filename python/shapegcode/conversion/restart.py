@@ -190,7 +190,7 @@ class RestartPlaces:
         self.last = period
 
     def further_stops(self, points: Sequence[int], reached: Sequence[int], end: int) -> list[int]:
-        """Segments before which the command must stop, because it is nowhere nearly at rest within the interval."""
+        """Segments before which the command must stop, because it does not come nearly to rest within the interval."""
         stops: list[int] = []
         begins = np.asarray(reached)
         near = self._interval * _APART

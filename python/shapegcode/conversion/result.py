@@ -391,7 +391,7 @@ class Conversion(ProgramFigures, Result):
 
     def _orbits_and_feeds(self) -> Iterator[list[BeforeAfter]]:
         if errors := self.orbit_error_percent:
-            name = "orbit error" if len(errors) == 1 else f"largest orbit error of {len(errors)} arcs"
+            name = "orbit error of the command" + (f", largest of {len(errors)} arcs" if len(errors) > 1 else "")
             yield [BeforeAfter(name, "%", None, max(errors, key=abs), 4)]
         if self.feed_excess is not None:
             above, limit = max(0.0, self.feed_excess.ratio - 1.0) * 100.0, self.limits.feed_excess_ratio * 100.0

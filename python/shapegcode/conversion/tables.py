@@ -264,13 +264,12 @@ def _from_cases(machine: Machine, region: _Region, figures: RegionFigures) -> It
 
 
 def _key_of(case: Case) -> tuple[str, str]:
-    """Key and tested value of a case; empty if it belongs to none."""
-    name = f"case {case.name}"
+    """The key that an operating condition varies, and the tested value; empty if it varies none."""
     if case.look_ahead:
-        return "controller.motion", name
+        return "controller.motion", case.name
     if case.starved_s > 0.0:
-        return "controller.block_time_s", f"longer, {name}"
-    return ("controller.block_end", name) if case.nominal else ("", "")
+        return "controller.block_time_s", f"longer: buffer {case.name}"
+    return ("controller.block_end", case.name) if case.nominal else ("", "")
 
 
 # Round-off in sums of increments is far below this, a least increment far above.

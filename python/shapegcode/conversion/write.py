@@ -90,7 +90,7 @@ class TransferLoad:
 
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
-    """Measure the data rate of a shaped cut, averaged over the shaper's duration, in which it hardly changes."""
+    """Measure the highest data rate of a shaped cut as a mean over the shaper's duration; it hardly changes faster."""
     durations = np.concatenate(shaped.block_periods, dtype=np.float64)
     durations *= grid.block_period_s
     window_s = max(grid.duration_s, grid.block_period_s)
@@ -114,7 +114,7 @@ class NoRoomError(Exception):
 
 @dataclass(frozen=True)
 class Room:
-    """Limits of the text of a region."""
+    """Largest size of the shaped text of a region."""
 
     bytes: int  # bytes of text
     blocks: int  # shaped blocks

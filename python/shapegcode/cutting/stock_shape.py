@@ -215,7 +215,7 @@ def _extended(points: Points, length_mm: float) -> Points:
 
 
 def _with_touched(points: Points) -> Points:
-    """Insert into a line the points at which another part of it touches it, as where it overlaps its start."""
+    """Insert into each piece of a line the line's other points that lie on it, as where the end overlaps the start."""
     import shapely
 
     pieces = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))

@@ -160,7 +160,7 @@ def plot_force_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
         ax: where to draw; None: a new figure.
 
     Returns:
-        The panel of before.
+        The panel of the force before scheduling.
 
     Raises:
         ArgumentError: no cutting force is known.
@@ -246,7 +246,7 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
         ax: where to draw; None: a new figure.
 
     Returns:
-        The panel of before.
+        The panel of the wall error before scheduling.
 
     Raises:
         ArgumentError: no wall is made.

@@ -361,7 +361,7 @@ class _Clock:
         )
 
     def _refine(self, rows: npt.NDArray[np.intp], furthest: float) -> None:
-        """Fit the clock error for the best agreement of neighbouring parts, any wait between them; then that wait."""
+        """Fit the clock error at which neighbouring parts agree best, whatever wait is between them; then that wait."""
         band_hz = _LOWEST_HZ, _CLOCK_HZ
 
         def shares(rate: float) -> Spectra:  # response times conjugate command, over the power of all parts
@@ -436,7 +436,7 @@ class _Clock:
 
 
 def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
-    """Parts to use: clear ones, and others at their time in the program if they are significant or lie between."""
+    """Parts to use: the clear ones; and others at their time in the program, if significant or between clear ones."""
     lags = np.linspace(-_AWAY_S, _AWAY_S, 401)
     crossed = spectra.response * np.conj(spectra.command)
     height = np.abs(crossed @ np.exp(spectra.turn[:, None] * lags))

@@ -1,5 +1,6 @@
-"""Spectra: of taps and decays (FRF, peaks, envelopes), and of a command and its response, part by part; the start of a
-free decay in a record without force, where the axis' command is unknown.
+"""Spectra of taps and decays (FRF, peaks, envelopes), and of a command and its response, part by part.
+
+Also finds where a free decay starts in a record that has neither the force nor the command of the axis.
 """
 
 from collections.abc import Sequence
@@ -128,7 +129,7 @@ _SMOOTH_LINES, _COHERENT = 31, 0.9
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """Spectra of each part, at the same lines and on the program's time."""
+    """Spectra of the parts, all at the same frequencies; times are the program's, not the logger's."""
 
     hertz: FloatArray  # (n,)
     command: ComplexArray  # (parts, n)
@@ -259,7 +260,10 @@ def _events(envelope: FloatArray) -> npt.NDArray[np.intp]:
 
 
 def _until_next(envelope: FloatArray, starts: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
-    """First and last + 1 sample of the decay after each start; the forward RMS rises before an event."""
+    """First and last + 1 sample of the decay after each start.
+
+    A decay ends where the envelope is lowest: as a forward RMS it rises before the next event.
+    """
     ends = [int(a) + int(np.argmin(envelope[a:b])) + 1 for a, b in pairwise(starts)]
     return list(zip([int(each) for each in starts], [*ends, len(envelope)], strict=True))
 

@@ -312,7 +312,7 @@ def amplitude(command_mm: FloatArray, period_s: float, band_hz: tuple[float, flo
 
 
 def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[list[_Stroke]]:
-    """Back-and-forth moves of each rise and each fall, on increments and digits of the control."""
+    """Moves back and forth of each rise and fall of the frequency, rounded to increments and feed decimals."""
     hertz, length, feed = np.array([astuple(each) for each in strokes]).T
     octaves = math.log2(hertz[-1] / hertz[0])
     edges = np.geomspace(hertz[0], hertz[-1], 1 + math.ceil(_BANDS_PER_OCTAVE * octaves))

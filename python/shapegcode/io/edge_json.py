@@ -435,8 +435,8 @@ def _axes(signals: tuple[tuple[str, str], ...]) -> tuple[EdgeAxis, ...]:
 def edge_runs(path: Path) -> Iterator[RunLog]:
     """Yield the run of a capture.
 
-    The blocks are those of the program with most blocks in the capture; those of cycles and subprograms are in
-    the texts only, since their line numbers are of other files.
+    `block` has the line numbers of one program only, the one with most blocks in the capture: those of cycles and
+    subprograms count in other files. `block_texts` has all blocks.
     """
     capture = read_edge_json(path)
     count = Counter(block.path for block in capture.blocks if block.line is not None)

@@ -143,8 +143,8 @@ class Emission(TomlTable):
     """How shaped programs are written."""
 
     dialect: DialectName = key(
-        "control for which `convert` writes (for input programs: controller.dialect); other commands that write "
-        "programs accept fanuc only",
+        "control for which `convert` writes the program; the control of the original is controller.dialect. Other "
+        "commands that write programs refuse any control but fanuc",
         default="fanuc",
     )
     words: dict[str, Text] = key(
@@ -326,14 +326,15 @@ class Shaping(TomlTable):
 
     max_duration_s: Annotated[Positive, Field(le=10)] = key("longest shaper that is accepted", default=0.25)
     family: _Family = key(
-        'family of the shaper (`shapegcode shaper` compares them). "auto": the shortest one without negative impulses; '
-        "its residual is zero at the modes, or below vibration_limit over the bands of modes with "
-        "frequency_uncertainty_percent",
+        'family of the shaper (`shapegcode shaper` compares them). "auto": the shortest one without negative impulses '
+        "that has zero residual at every mode; or, if modes have frequency_uncertainty_percent, a residual below "
+        "vibration_limit over the whole band of each",
         default="auto",
     )
     per_axis: Bool = key(
-        "one shaper per axis, for that axis' modes only: shorter than one for all. Not with "
-        'contour = "off", a named family, frequency_uncertainty_percent, or frequency_over an axis',
+        "one shaper per axis, for that axis' modes only: shorter than one for all. Not possible with "
+        'contour = "off", with a named family, or if a mode has frequency_uncertainty_percent or a frequency that '
+        "depends on an axis position (frequency_over)",
         default=False,
     )
     vibration_limit: Annotated[Positive, Field(lt=1)] = key(
@@ -345,15 +346,15 @@ class Shaping(TomlTable):
         "feed in arcs relative to the programmed feed, reached before the arc begins; 1: no reduction", default=1.0
     )
     contour: Literal["response", "command", "off"] = key(
-        'path that contour compensation holds within tolerance.contour_um, at the highest possible feed. "response": '
-        'that of the machine table with its modes, hence of the part; "command": that of the set-points; "off": no '
-        "compensation: a lower feed keeps the set-points within the tolerance",
+        "what contour compensation keeps within tolerance.contour_um of the programmed path, at the highest possible "
+        'feed. "response": the machine table, as its modes move it, and so the part; "command": the set-points; "off": '
+        "no compensation; the set-points are kept within the tolerance by a lower feed",
         default="response",
     )
     planner: Literal["auto", "look-ahead", "optimal"] = key(
-        'planner of the command of a cut before shaping. "look-ahead": as a FANUC control\'s look-ahead, by its '
-        'law of acceleration and its corner rule; "optimal": as fast as feed, acceleration and jerk of the axes '
-        "allow, corners and short moves rounded within tolerance.contour_um (needs axes.*.max_jerk_mm_s3); "
+        'how the motion of a cut is planned before it is shaped. "look-ahead": as by a FANUC control\'s look-ahead, '
+        'with its law of acceleration and its corner rule; "optimal": as fast as feed, acceleration and jerk of the '
+        "axes allow, corners and short moves rounded within tolerance.contour_um (needs axes.*.max_jerk_mm_s3); "
         '"auto": "look-ahead" where controller.kind is "fanuc", else "optimal"',
         default="auto",
     )

@@ -214,6 +214,6 @@ class MeasuredSection:
 
     @property
     def place(self) -> str:
-        """Its lines as text."""
+        """Program lines of the section, as text."""
         first, last = self.lines
         return f"line {first}" if first == last else f"lines {first}-{last}"

@@ -79,7 +79,7 @@ def _worst(sections: Sections, values: Values) -> str:
 
 
 def _figures(band_um: float) -> Iterator[tuple[str, Values]]:
-    """Names with units, and functions for a section's values, of which the largest counts."""
+    """Yield each figure: name with unit, and a function for its values in a section, of which the largest counts."""
     yield "contour error of a section µm", lambda s: [s.contour_error_um.response.max]
     for name, key in (("peak vibration", "peak_vibration_um"), ("residual at the stop", "residual_vibration_um")):
         for axis in "xyz":

@@ -270,7 +270,7 @@ class MachineModel:
         return OwnFilter(control.shaped_filter_shape, *times_s, duration_s)
 
     def simulated(self, *, shaped: bool) -> SimulatedController:
-        """Select the controller: `shaped` for an emitted program."""
+        """The controller as it runs shaped blocks, or ordinary programs."""
         return self.shaped if shaped else self.ordinary
 
     @property

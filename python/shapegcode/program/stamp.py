@@ -9,7 +9,7 @@ Its cautions, each a sentence and a comment, are also used in reports, pages, te
 (BLOCK PERIOD 5 MS SHAPER 20 MS ZVD)
 (SET FEED OVERRIDE 100 PCT)
 (NO SINGLE BLOCK IN SHAPED CUTS)
-(RESTART ONLY AFTER A SHAPED COMMENT OR AT N OF THE REPORT)
+(RESTART ONLY AFTER COMMENT SHAPED OR AT N IN RESTART LIST)
 (FIRST RUN ABOVE THE PART WITHOUT TOOL)
 (TIME CONSTANT AFTER INTERPOLATION 0 MS)
 
@@ -56,9 +56,9 @@ OVERRIDES = {"ask": OVERRIDE, "lock": OVERRIDE_LOCKED, "any": OVERRIDE_ANY}
 SINGLE_BLOCK = Habit(
     "single block",
     "NO SINGLE BLOCK IN SHAPED CUTS",
-    "no single block inside of shaped cuts: the control would stop at every block, some milliseconds apart; to check "
-    "the program use the graphic display, machine lock, or dry run above the part, and single block between "
-    "the cuts; then the first run above the part",
+    "no single block inside of shaped cuts: the control would stop at every block, some milliseconds apart; "
+    "between the cuts it may be used; to check the program: graphic display, machine lock, or dry run above the part, "
+    "then the first run",
 )
 FEED_HOLD = Habit(
     "feed hold",
@@ -68,7 +68,7 @@ FEED_HOLD = Habit(
 )
 RESTART = Habit(
     "restart",
-    "RESTART ONLY AFTER A SHAPED COMMENT OR AT N OF THE REPORT",
+    "RESTART ONLY AFTER COMMENT SHAPED OR AT N IN RESTART LIST",
     "restart only where a cut begins, or at a restart point: other blocks of a shaped cut are not valid restart points",
 )
 FIRST_RUN = Habit(
@@ -111,7 +111,7 @@ _LINE_HEAD = re.compile(rb"(\n(?:/\d?)?)(?:N\d+(?:[O:]\d+)?|[O:]\d+)")
 
 @dataclass(frozen=True)
 class Stamp:
-    """Data in the header of an emitted program; texts are in the characters of comments."""
+    """Data in the header of an emitted program; all text is in characters that a comment may contain."""
 
     version: str  # version of shapegcode
     machine: str  # name of the machine
@@ -141,7 +141,7 @@ class Stamp:
         return [first, _PENDING.decode(), *rest]
 
     def difference(self, other: Stamp) -> str:
-        """Difference of another header's machine as text; empty: no relevant difference."""
+        """What differs in the machine of another header, as text; empty: nothing relevant."""
         pairs = (
             ("machine", self.machine, other.machine),
             ("modes", ", ".join(self.modes) or "none", ", ".join(other.modes) or "none"),
@@ -259,7 +259,7 @@ def write_verdict(program: _core.ProgramText, mark: str, *, good: bool, better: 
 
 
 def _changes(find: Callable[[bytes], int], mark: str, *, good: bool, better: bool) -> list[tuple[int, bytes]]:
-    """Positions and new bytes of changes in the header, each of the replaced length."""
+    """Changes in the header: the position of each, and the bytes that replace as many old ones."""
     open_ones = (_PENDING,) if good else (_PENDING, _GOOD, _BETTER)
     verdicts = [(before, _BAD if not good else _BETTER if better else _GOOD) for before in open_ones]
     wanted = [*verdicts, (MARK_PENDING, f"(CHECKSUM {mark})".encode())]

@@ -1,6 +1,6 @@
-"""Answer and equality of results; figures per axis, in µm. The module `plots` of the same folder draws their pictures.
+"""Answer, equality and pickling of results; figures per axis, in µm. The module `plots` of a folder draws the pictures.
 
-When unpickled, paths are rebuilt; other core objects keep their figures but cannot compute.
+An unpickled result has its paths again; other objects of the core in it keep their figures, but cannot compute.
 """
 
 from __future__ import annotations
@@ -243,7 +243,7 @@ class Outcome(OldNames):
             return {}
 
     def _beside(self, name: str) -> Any:
-        """A module of the result's folder; it imports the result, so it is loaded on demand."""
+        """Import a module of the folder that contains the result's class; on demand, since it imports that class."""
         return importlib.import_module(f"{type(self).__module__.rpartition('.')[0]}.{name}")
 
 

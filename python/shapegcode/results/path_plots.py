@@ -27,7 +27,7 @@ _STRAIGHT = (
     "See the picture of the vibration."
 )
 
-_CUT = "The table rounds corners: each side is drawn up to the bisector, magnified from its own line."
+_CUT = "Corners: each side is drawn up to the bisector of the corner, with its own deviation."
 # A smaller angle between two segments belongs to an arc in pieces.
 _CORNER_RAD = 0.3
 # If both sides of a corner are further apart than this ratio of the picture, they are not joined.

@@ -287,7 +287,7 @@ class Reports(Result):
         return f"open {self.pages[0].page} in a browser."
 
     def tables(self) -> list[Table]:
-        """The pages."""
+        """A table of the pages."""
         columns = (
             Column("result", left=True),
             Column("page", left=True),

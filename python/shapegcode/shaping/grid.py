@@ -362,7 +362,8 @@ def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
         if wanted:
             raise _core.ArgumentError(
                 "shaping.per_axis needs shaping.contour (different shapers distort the path), shaping.family = "
-                '"auto", and modes without frequency_uncertainty_percent and frequency_over axis'
+                '"auto", and modes without frequency_uncertainty_percent whose frequency does not depend on an axis '
+                "position (frequency_over)"
             )
         return grid
     longest = machine.shaping.max_duration_s if wanted else grid.shaper.duration_s - 0.5 * grid.block_period_s
@@ -412,7 +413,7 @@ def _of_family(
 
 
 def shaper_track(machine: Machine, period_s: float) -> ShaperTrack:
-    """Design shapers for all modes of a machine along the axis with which some of them vary."""
+    """Design shapers for all modes of a machine, at positions of the axis on which frequencies depend."""
     axis = moving_axis(machine)
     if axis is None:
         raise _core.ArgumentError("no mode of the machine file varies with the position of an axis (frequency_over)")
@@ -452,7 +453,10 @@ def override_vibration_um(
 
 
 def best_for_overrides(designs: Iterable[tuple[float, _core.Shaper]], machine: Machine, feed_mm_per_s: float) -> float:
-    """Period with the least duration × vibration at other overrides (vibration at least the residual floor)."""
+    """Period whose shaper has the smallest product of duration and vibration at other overrides.
+
+    Vibration below the residual floor counts as the floor.
+    """
     model = MachineModel(machine)
     floor_um = max(machine.tolerance.residual_floor_um, 1e-3)
 

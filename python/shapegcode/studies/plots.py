@@ -23,7 +23,7 @@ _PANELS = 3
 
 
 def plots_of(study: MachineStudy | Optimum) -> dict[str, Plot]:
-    """Its pictures by name."""
+    """Pictures of a study or an optimisation, by name."""
     if isinstance(study, Optimum):
         return {"optimum-choices": partial(plot_choices, study)}
     return {"study-tornado": partial(plot_tornado, study), "study-bands": partial(plot_bands, study)}

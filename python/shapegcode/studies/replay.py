@@ -73,8 +73,11 @@ class Replay:
         self, machine: Machine, original: Program, emitted: Program, parts: Sequence[tuple[int, int, int]],
         limits: Sequence[RegionLimits], time_s: float,
     ) -> None:  # fmt: skip
-        """Prepare the regions: `parts` has index in the original, first and last emitted line of each; `time_s`
-        is the cycle time on the machine for which it was converted."""
+        """Prepare the regions.
+
+        `parts`: for each region its index in the original, and its first and last emitted line. `time_s`: cycle time
+        of the emitted program on the machine for which it was converted.
+        """
         self.machine, self._original, self._emitted, self._extents = machine, original, emitted, tuple(parts)
         self.time_s = time_s
         regions = [original.regions[index] for index, _, _ in parts]

@@ -41,12 +41,12 @@ class CuttingLaw:
 
     @classmethod
     def of(cls, law: _core.CuttingCoefficients) -> CuttingLaw:
-        """Convert to the coefficients of the core."""
+        """Convert from coefficients of the core."""
         values = {name: getattr(law, name) for name in COEFFICIENTS}
         return cls(**values, chip_thickness="local" if law.thickness == _core.ChipThickness.local else "mean")
 
     def core(self) -> _core.CuttingCoefficients:
-        """Coefficients of the core."""
+        """Convert to coefficients of the core."""
         values = {name: float(getattr(self, name)) for name in COEFFICIENTS}
         return _core.CuttingCoefficients(**values, thickness=_core.ChipThickness.__members__[self.chip_thickness])
 

@@ -128,7 +128,7 @@ def _log_next(
 
 
 def _locked(program: Program, feed_override: float) -> Iterator[str]:
-    """Warn of an override that the control ignores in shaped moves, but these times do not."""
+    """Warn if the times of shaped moves include an override that the control ignores there."""
     locked = program.shaped_regions and f"({OVERRIDE_LOCKED.comment})".encode() in program.own_text
     if locked and feed_override != 1.0:
         yield (

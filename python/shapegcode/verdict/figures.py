@@ -60,7 +60,7 @@ class GridTaps:
 
 @dataclass(frozen=True)
 class FollowingShapers:
-    """Shapers for several positions of the axis over which the modes vary."""
+    """Shapers for several positions of the axis on which frequencies depend."""
 
     axis: str  # "x", "y" or "z"
     position_mm: tuple[float, ...]  # position at which each is exact (machine coordinates)
@@ -275,7 +275,10 @@ class Case:
         return self.override == 1.0 and self.mode is None and not self.look_ahead and self.starved_s == 0.0
 
     def needs_contour(self, target: Target) -> bool:
-        """True if the contour must be measured in this case: a shifted mode does not change the command."""
+        """True if the contour error must be measured in this operating condition.
+
+        With a shifted mode only if it counts and may differ: the mode changes the response, not the command.
+        """
         return self.mode is None or (self.counts and (self.override != 1.0 or target == "response"))
 
 
@@ -435,7 +438,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         Column("verdict", value=lambda case: _verdict(case, case is worst), left=True),
     )
     shown = sum(not case.counts for case in cases)
-    brackets = "; those in brackets are only shown" if shown else ""
+    brackets = "; a verdict in brackets does not count" if shown else ""
     return Table(
         "operating conditions: residual X Y Z, contour error of command and machine table, µm",
         columns,
@@ -589,7 +592,7 @@ def case_figures(run: _core.SimulationFigures, *, contour: bool = True, response
 
 
 def _starved(run: _core.SimulationFigures, waited_s: float) -> CaseFigures:
-    """Worst figures over all positions of the underrun; the residual is usually that without an underrun."""
+    """Largest figures of the run without an underrun and of those with one, at each of its positions."""
     runs: list[_core.SimulationFigures | _core.StarvedFigures] = [run, *run.starved]
     return CaseFigures(
         np.max([each.residual_mm for each in runs], axis=0),

@@ -400,8 +400,8 @@ def simulate_unchanged(
     """Simulate a cut left unchanged in every operating condition that counts for it.
 
     Block timing, buffer underrun and look-ahead left on affect shaped blocks only: there the nominal result is
-    used. Other feed overrides and uncertain modes are simulated where they count. Arcs are the
-    emitted ones.
+    used. Other feed overrides and uncertain modes are simulated where they count. The path is that of the emitted
+    program, which may have chords instead of an arc.
     """
     path, offset = mine.path, model.offset(region)
     same = path.moves_as(region.path)

@@ -70,7 +70,7 @@ class Gap:
 
     @property
     def rapids(self) -> list[Rapid]:
-        """Its rapids in order."""
+        """The rapids of the gap, in order."""
         return [step for step in self.steps if isinstance(step, Rapid)]
 
 

@@ -331,7 +331,7 @@ def _held_rapids(run: logs.ObservedRun) -> list[_Hold]:
 
 
 def _not_covered(run: logs.ObservedRun, starts: FloatArray, hold: _Hold) -> _Hold:
-    """Part of a hold that lengthened the run: the spindle start or an M code may have run during the rest."""
+    """Part of a hold that lengthened the run; during its other part the spindle start or an M code may have run."""
     begin, length, why = hold
     plain = np.flatnonzero(~run.timed.function[run.line] & np.isfinite(run.timed.feed_mm_per_s[run.line]))
     before = plain[run.time_s[plain] <= begin]

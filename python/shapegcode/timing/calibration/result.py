@@ -156,7 +156,7 @@ class CycleTimeCalibration(Result):
         numbers: calibrated parameters, one row for each key of the machine file.
         runs: one row for each run.
         fitted: the calibrated machine.
-        remarks: interval and source of each key set, by dotted name.
+        remarks: interval and source of each key that was set in the machine file, by dotted name.
         undetermined: parameters that the logs do not determine, in words.
         warnings: runs with errors above 2 %, and holds.
         largest_error_percent: of a run, by cross-validation if possible, without holds; null: no complete run.
