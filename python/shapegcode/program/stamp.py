@@ -58,7 +58,7 @@ SINGLE_BLOCK = Habit(
     "NO SINGLE BLOCK IN SHAPED CUTS",
     "no single block inside of shaped cuts: the control would stop at every block, some milliseconds apart; "
     "between the cuts it may be used; to check the program: graphic display, machine lock, or dry run above the part, "
-    "then the first run",
+    "then the first run above the part",
 )
 FEED_HOLD = Habit(
     "feed hold",
