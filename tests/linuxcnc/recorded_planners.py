@@ -230,6 +230,8 @@ def main() -> None:
     kept: dict[str, NDArray[Any]] = {}
     all_of_them = []
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
     settings: tuple[Setting, ...] = ("host", "two lines", "as delivered")
     for setting, path, acceleration in product(settings, PATHS, (5_000.0, 10_000.0)):
         setup = Setup(path, acceleration, setting)
