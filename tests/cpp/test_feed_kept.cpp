@@ -96,7 +96,7 @@ TEST_CASE("a line is run at its feed, without ripple, between a start and an end
            {planned_as_a_whole(segments, dynamics), planned_online(segments, dynamics)}) {
         CHECK(points.back()[0] == doctest::Approx(9.0));
         for_speeds(points, ends_mm, 9.0 - ends_mm, [&](double speed) {
-          CHECK(speed <= feed * (1.0 + 1e-5));
+          CHECK(speed <= feed * (1.0 + 1e-4));
           CHECK(speed >= feed * 0.998);
         });
       }
@@ -120,7 +120,7 @@ TEST_CASE("a slower feed is reached where it begins, and not passed below") {
         CHECK(static_cast<double>(points.size()) * period_s <= shortest_s + 0.015);
         for_speeds(points, start_mm, 50.0 - end_mm - 12.0 * after * period_s,
                    [&](double speed) { CHECK(speed >= 0.9 * after); });
-        for_speeds(points, 30.0, 50.0, [&](double speed) { CHECK(speed <= after * (1.0 + 1e-5)); });
+        for_speeds(points, 30.0, 50.0, [&](double speed) { CHECK(speed <= after * (1.0 + 1e-4)); });
       }
     }
   }
@@ -140,7 +140,7 @@ TEST_CASE("a circle is run at its feed") {
       for (const std::vector<Vector3>& points :
            {planned_as_a_whole(segments, dynamics), planned_online(segments, dynamics)}) {
         for_speeds(points, ends_mm, length_mm - ends_mm, [&](double speed) {
-          CHECK(speed <= feed * (1.0 + 1e-5));
+          CHECK(speed <= feed * (1.0 + 1e-4));
           CHECK(speed >= feed * 0.995);
         });
       }

@@ -371,8 +371,8 @@ ControllableSet ControllableSets::before(const Station& station, const PlannedSe
   polygon.add(cap, -widest);
   polygon.add(cap, widest);
   polygon.add(0.0, widest);
-  // Acceleration ends within an interval: with a jerk that allows more the motion would rise and fall in each.
-  polygon.cut(1.0, length, cap);
+  // Acceleration ends within the interval: the motion would rise and fall in each otherwise.
+  if (station.coarse) polygon.cut(1.0, length, cap);
   if (std::isfinite(making.least_acceleration)) polygon.cut(0.0, -1.0, -making.least_acceleration);
   if (station.valley) polygon.cut(0.0, 1.0, valley_share * steepest);
   if (!station.straight) {

@@ -157,7 +157,8 @@ bool PathMotion::controllable(double jerk, double time_s, const Derivatives& pat
   const double left = station.length - place.offset;
   const PathState state{v * v, a};
   const double cap = station.squared_limit();
-  if (state.speed_squared + std::max(a, 0.0) * left > cap * (1.0 + rounding)) return false;
+  const double rise = station.coarse ? std::max(a, 0.0) * left : 0.0;
+  if (state.speed_squared + rise > cap * (1.0 + rounding)) return false;
   const AxisLimits limits = plan_->limits_at(station);
   // Braking must be over before the motion is.
   if (a < 0.0 && 2.0 * plan_->highest_jerk(station, path) * v < a * a) return false;

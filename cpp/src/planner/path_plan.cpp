@@ -30,6 +30,8 @@ constexpr int plans_anew = 16;
 constexpr int valley_rounds = 3;
 constexpr double least_gain_s = 1e-5;
 constexpr double least_gain = 0.001;
+// An interval is coarse over which the jerk can change the speed by more than this share.
+constexpr double coarse_share = 0.2;
 // Of an interval at rest, mm/s.
 constexpr double least_speed = 1e-9;
 
@@ -104,11 +106,14 @@ void PathPlan::make_stations() {
         if (bend > 0.0) station.speed_limit = std::min(station.speed_limit, std::sqrt(max_across_ / bend));
       }
     }
+    const Derivatives path = derivatives(station, 0.0);
+    const double jerk = highest_jerk(station, path);
     if (station.straight) {
-      const Derivatives path = derivatives(station, 0.0);
       station.max_acceleration = steepest(station, path);
-      station.max_jerk = highest_jerk(station, path);
+      station.max_jerk = jerk;
     }
+    // What the jerk makes of the speed over it.
+    station.coarse = jerk * station.length * station.length > coarse_share * std::pow(station.speed_limit, 3.0);
     if (count_ == 0) {
       passed = 0;
       while (passed < before_end &&

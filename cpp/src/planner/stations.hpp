@@ -62,6 +62,7 @@ struct Station {
   bool valley = false;                                ///< the slowest place around: braking is over here
   bool slower_feed = false;                           ///< a valley because a slower segment begins
   bool straight = false;                              ///< a line that no rounding reaches
+  bool coarse = false;                                ///< so long that a jerk turns the acceleration within it
   double speed_limit = 0.0;                           ///< of the interval: feed and axes
   double share = 1.0;                                 ///< of acceleration and jerk that is planned here
   double max_acceleration = 0.0, max_jerk = 0.0;      ///< along the path: of a straight one, or of its segment
