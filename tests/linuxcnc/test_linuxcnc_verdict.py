@@ -44,6 +44,8 @@ def test_what_convert_said(name: str, acceleration: float, setting: Setting) -> 
         print(f"\n{recordings.row(found)} model off by {off_um:.1f} um", end="")
         assert was.time_s == pytest.approx(said.time_s, rel=0.005, abs=0.005)
         exact = off_um < EXACT_UM
+        # A deviation of the set-points that comes and goes excites up to twice itself.
+        least_um = 0.3 + 2.0 * off_um if exact else 3.0
         for recorded_um, said_um in zip(was.residual_um, said.residual_um, strict=True):
-            assert recorded_um == pytest.approx(said_um, rel=0.1 if exact else 0.5, abs=0.3 if exact else 3.0)
+            assert recorded_um == pytest.approx(said_um, rel=0.1 if exact else 0.5, abs=least_um)
         assert was.both_ways_um == pytest.approx(said.both_ways_um, rel=0.05 if exact else 0.2, abs=0.5)
