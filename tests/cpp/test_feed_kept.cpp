@@ -10,6 +10,7 @@
 #include <doctest/doctest.h>
 
 #include "random_motion.hpp"
+#include "row_of_lines.hpp"
 #include "shapegcode/controller.hpp"
 #include "shapegcode/planner.hpp"
 
@@ -24,18 +25,6 @@ struct Dynamics {
   double acceleration, jerk;
 };
 constexpr Dynamics all_dynamics[] = {{1000.0, 5e4}, {2000.0, 2e5}, {5000.0, 1e5}, {5000.0, 5e5}};
-
-// Lines along X, one behind the other.
-std::vector<Segment> lines_of(const std::vector<double>& lengths_mm, const std::vector<double>& feeds) {
-  std::vector<Segment> segments;
-  double x = 0.0;
-  for (std::size_t i = 0; i < feeds.size(); ++i) {
-    segments.push_back(make_line({x, 0, 0}, {x + lengths_mm[i], 0, 0}, feeds[i]));
-    x += lengths_mm[i];
-  }
-  segments.back().stop_at_end = true;
-  return segments;
-}
 
 std::vector<Vector3> planned_as_a_whole(const std::vector<Segment>& segments, const Dynamics& dynamics) {
   TrajectoryLimits limits;
@@ -90,7 +79,7 @@ TEST_CASE("a line is run at its feed, without ripple, between a start and an end
     for (const double feed : {1.0, 2.0, 2.5, 5.0, 10.0, 40.0}) {
       CAPTURE(dynamics.jerk);
       CAPTURE(feed);
-      const std::vector<Segment> segments = lines_of({9.0}, {feed});
+      const std::vector<Segment> segments = row_of_lines({9.0}, {feed});
       const double ends_mm = change_mm(0.0, feed, dynamics) + 12.0 * feed * period_s;
       for (const std::vector<Vector3>& points :
            {planned_as_a_whole(segments, dynamics), planned_online(segments, dynamics)}) {
@@ -109,7 +98,7 @@ TEST_CASE("a slower feed is reached where it begins, and not passed below") {
     for (const auto& [before, after] : {std::pair{50.0, 10.0}, std::pair{100.0, 40.0}, std::pair{20.0, 5.0}}) {
       CAPTURE(dynamics.jerk);
       CAPTURE(before);
-      const std::vector<Segment> segments = lines_of({30.0, 20.0}, {before, after});
+      const std::vector<Segment> segments = row_of_lines({30.0, 20.0}, {before, after});
       const double start_mm = change_mm(0.0, before, dynamics);
       const double end_mm = change_mm(0.0, after, dynamics);
       // As fast as if the feed of the second were reached at its very beginning, but for some periods.
@@ -162,7 +151,7 @@ TEST_CASE("where the feed falls in steps the motion never gets faster, whatever 
       }
       lengths_mm.push_back(10.0);
       feeds.push_back(9.0);
-      const std::vector<Segment> segments = lines_of(lengths_mm, feeds);
+      const std::vector<Segment> segments = row_of_lines(lengths_mm, feeds);
       for (const std::vector<Vector3>& points :
            {planned_as_a_whole(segments, dynamics), planned_online(segments, dynamics)}) {
         double before = 50.0;

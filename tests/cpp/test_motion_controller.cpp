@@ -78,7 +78,7 @@ TEST_CASE("a path that is pushed at once is run as a whole path is planned: a sh
       const Samples offline = time_optimal_trajectory(Path(segments), limits, period_s);
       const auto count = static_cast<std::size_t>(offline.positions_mm.rows()) - 1;  // the first one is the start
       CHECK((online.set_points.back() == segments.back().end_mm));
-      CHECK(static_cast<double>(online.set_points.size()) <= 1.04 * static_cast<double>(count) + 3.0);
+      CHECK(static_cast<double>(online.set_points.size()) <= 1.03 * static_cast<double>(count) + 3.0);
       if (segments.size() > 3) continue;
       bool same = online.set_points.size() == count;
       for (std::size_t k = 0; same && k < count; ++k) {

@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "row_of_lines.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/simulation.hpp"
@@ -36,6 +37,7 @@ using shapegcode::SimulationFigures;
 using shapegcode::SimulationOptions;
 using shapegcode::SpeedProfile;
 using shapegcode::Vector3;
+using shapegcode::tests::row_of_lines;
 
 namespace {
 
@@ -120,17 +122,6 @@ Vibration integrated(const PaperMotion& motion, Eigen::Index axis, double freque
     worst = std::max(worst, std::abs(d));
   }
   return result;
-}
-
-/// Lines along X, one after the other.
-std::vector<Segment> row_of_lines(const std::vector<double>& lengths, const std::vector<double>& feeds) {
-  std::vector<Segment> blocks;
-  double x = 0.0;
-  for (std::size_t i = 0; i < lengths.size(); ++i) {
-    blocks.push_back(make_line({x, 0, 0}, {x + lengths[i], 0, 0}, feeds[i]));
-    x += lengths[i];
-  }
-  return blocks;
 }
 
 }  // namespace

@@ -410,8 +410,9 @@ def rt_documentation() -> str:
 
 
 def _contents() -> str:
-    rows = [f"| {folder} | {WHAT[folder]} | {len(files)} |" for folder, files in rt_files().items()]
-    return "\n".join([*rows, f"| all of it | | {sum(map(len, rt_files().values()))} |"])
+    counts = {folder: len(files) for folder, files in rt_files().items()}
+    rows = [f"| {folder} | {WHAT[folder]} | {count} |" for folder, count in counts.items()]
+    return "\n".join([*rows, f"| all of it | | {sum(counts.values())} |"])
 
 
 def _link(test: HeldBy) -> str:

@@ -98,18 +98,17 @@ void PathPlan::make_stations() {
   while ((grows_ || count_ + 1 < stations_.size()) && path_.next(station)) {
     if (count_ + 1 == stations_.size()) resize(2 * stations_.size());
     // What the axes and the filters behind allow.
-    for (const double x : {0.0, station.length}) {
-      const Derivatives path = derivatives(station, x);
+    const Derivatives begin = derivatives(station, 0.0);
+    for (const Derivatives& path : {begin, derivatives(station, station.length)}) {
       station.speed_limit = std::min(station.speed_limit, along(path.first, limits_at(station).speed, axes()));
       if (max_across_ < no_limit) {
         const double bend = Vector3(path.second[0], path.second[1], path.second[2]).norm();
         if (bend > 0.0) station.speed_limit = std::min(station.speed_limit, std::sqrt(max_across_ / bend));
       }
     }
-    const Derivatives path = derivatives(station, 0.0);
-    const double jerk = highest_jerk(station, path);
+    const double jerk = highest_jerk(station, begin);
     if (station.straight) {
-      station.max_acceleration = steepest(station, path);
+      station.max_acceleration = steepest(station, begin);
       station.max_jerk = jerk;
     }
     // What the jerk makes of the speed over it.

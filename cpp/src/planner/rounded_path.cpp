@@ -358,7 +358,7 @@ bool RoundedPath::slows_on(std::uint64_t segment) const noexcept {
   const AxisValues direction = direction_of(entry, 0.0);
   const double time_s = braking_time(before - after, along(direction, limits_.acceleration, limits_.axes),
                                      along(direction, limits_.jerk, limits_.axes));
-  return end_of(segment) - entry.distance < 0.5 * (before + after) * time_s;
+  return entry.segment.length_mm < 0.5 * (before + after) * time_s;
 }
 
 bool RoundedPath::next(Station& station) noexcept {

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
 from shapegcode.cli.arguments import NEEDED, OneOf, Row, axes, micrometres, number, program_choice, seconds, share
 from shapegcode.errors import ArgumentError, MachineError, Problem
-from shapegcode.io.data_file import toml_tables, write_text
+from shapegcode.io.data_file import toml_value, write_text
 
 if TYPE_CHECKING:
     from shapegcode.batching.process import Cluster
@@ -137,7 +137,7 @@ def load_machine(args: argparse.Namespace, *, writes_program: bool = False) -> M
 def _toml_value(text: str) -> Any:
     # A bare word is a string: quotes would have to be escaped from the shell.
     try:
-        return toml_tables(f"value = {text}")["value"]
+        return toml_value(text)
     except tomllib.TOMLDecodeError:
         return text
     except ValueError as error:

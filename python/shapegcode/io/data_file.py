@@ -214,6 +214,11 @@ def toml_tables(text: str) -> dict[str, Any]:
     return tables
 
 
+def toml_value(text: str) -> Any:
+    """Parse one value of TOML within the limits."""
+    return toml_tables(f"value = {text}")["value"]
+
+
 _passing = False
 _LONGEST_NAME = 200  # longest used part of a file name, to leave space for a suffix
 

@@ -2,13 +2,14 @@
 other controls' planners, by the names of their own configuration files.
 """
 
+from copy import deepcopy
 from functools import lru_cache
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
-from shapegcode.io.data_file import toml_tables
+from shapegcode.io.data_file import toml_value
 from shapegcode.machine.axes import optional
 from shapegcode.settings.keys import (
     AxisRatios,
@@ -422,9 +423,8 @@ class TimeScatter(InlineTable):
     runs_percent: Annotated[NonNegative, Field(le=100)] = key("scatter between repeated runs of a program")
 
 
-@lru_cache(maxsize=1024)  # a calibration validates the same texts for every machine that it tries
-def _value(text: str) -> Any:
-    return toml_tables(f"value = {text}")["value"]
+# A calibration validates the same texts for every machine that it tries.
+_known_value = lru_cache(maxsize=1024)(toml_value)
 
 
 class OpenTime(TomlTable):
@@ -447,7 +447,7 @@ class OpenTime(TomlTable):
         for text in self.values:
             name, _, value = text.partition("=")
             try:
-                found[name.strip()] = _value(value)
+                found[name.strip()] = deepcopy(_known_value(value))
             except ValueError as error:
                 raise ValueError(f"{text!r}: must be KEY = VALUE: {error}") from error
         return found
