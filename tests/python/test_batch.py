@@ -23,6 +23,7 @@ HEAD = "%\nO0001\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\n"
 TAIL = "G0 Z5.\nM30\n%\n"
 BAD = HEAD + "G99.9 X1.\n" + TAIL
 CALLER = HEAD + "M98 P1234\n" + TAIL
+LONG = HEAD + "X1.\nX0.\n" * 700_000 + TAIL  # takes seconds, wherever it is timed
 CALLED = "O1234\nG1 X{x}. Y10.\nM99\n"
 ONE = ("-m", "vx500", "-o", "out", "--jobs", "1")
 
@@ -210,7 +211,7 @@ def test_the_index_lists_more_than_the_terminal(folder: Path) -> None:
 
 
 def test_a_run_that_takes_too_long_ends_alone(folder: Path) -> None:
-    (folder / "parts/long.nc").write_text(HEAD + "".join(f"X{k % 100}. Y{k % 7}.\n" for k in range(200_000)) + TAIL)
+    (folder / "parts/long.nc").write_text(LONG)
     words = ["parts/a.nc", "parts/long.nc", *ONE, "--command", "time"]
     a, long = told(folder, *words, "--time-limit", "400ms")["rows"]
     assert (a["ended"], long["ended"]) == ("ok", "failed")
@@ -223,7 +224,7 @@ def test_a_run_that_takes_too_long_ends_alone(folder: Path) -> None:
 
 
 def test_a_killed_process_is_a_row(folder: Path) -> None:
-    (folder / "parts/long.nc").write_text(HEAD + "".join(f"X{k % 100}. Y{k % 7}.\n" for k in range(100_000)) + TAIL)
+    (folder / "parts/long.nc").write_text(LONG)
     killed: list[int] = []
 
     def kill() -> None:
