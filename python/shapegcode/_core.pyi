@@ -8141,7 +8141,8 @@ def time_optimal_trajectory(path: Path | typing.Annotated[numpy.typing.ArrayLike
     Set-points of a whole path from rest to rest, nearly as fast as the limits of every axis allow.
     
     Junctions are rounded within the tolerance, jerk is limited, and the motion rests at segments with `stop_at_end`. Limits
-    hold for the differences of the set-points (1.001); programmed feeds are kept. See docs/concepts/time_optimal.md.
+    hold for the differences of the set-points (1.001); programmed feeds are kept. Bit for bit the set-points of a
+    `MotionController` without filters that is given all segments at once. See docs/concepts/time_optimal.md.
     
     Args:
         path: A path whose segments have a feed, or the points of a polyline, (n, 3), mm.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "planner/planned_limits.hpp"
 
@@ -32,8 +33,15 @@ constexpr double renewed_share = 0.25;
 constexpr std::size_t section_if_tight = 6;
 constexpr double stations_for_new_if_tight = 64.0;
 constexpr std::size_t stations_of_period = 32;
-// What is tried while the motion is under way, by its speed; and how often from rest, with less each time.
-constexpr std::array<double, 4> slower{no_limit, 0.9, 0.6, 0.0};
+// A window is short if what a stop from the mean speed takes is a larger share of it.
+constexpr double short_share = 0.4;
+// What is tried while the motion is under way: a share of its speed, and of the limits for the stop behind the section,
+// which no plan has checked; and how often from rest, with less each time.
+struct Trial {
+  double speed, stop_share;
+};
+constexpr std::array<Trial, 6> trials{
+    {{no_limit, 1.0}, {no_limit, 0.99}, {no_limit, 0.9}, {0.9, 1.0}, {0.6, 1.0}, {0.0, 1.0}}};
 constexpr int attempts_at_rest = 12;
 // Plans that are made at once, with less each time where limits would be passed.
 constexpr int plans = 4;
@@ -48,6 +56,10 @@ constexpr double stop_room = 2.0;
 constexpr double least_points = 512.0;
 constexpr double most_points = 16384.0;
 constexpr double highest_speed = 1000.0;
+
+bool is_as_far(const PlannedPoint& one, const PlannedPoint& other) noexcept {
+  return std::pair(one.point.segment, one.point.offset) >= std::pair(other.point.segment, other.point.offset);
+}
 
 Vector3 xyz(const PlannedPoint& point) noexcept { return {point.position[0], point.position[1], point.position[2]}; }
 
@@ -72,7 +84,7 @@ OnlinePlanner::OnlinePlanner(SegmentRing& ring, const PlanningRules& rules)
       sections_(points_of(rules), rules.lead_periods > 0 ? sections_ahead + spare_sections : spare_sections + 1,
                 contour_.duration()),
       plan_(ring, planned_limits(rules.limits, rules.period_s), rules.period_s,
-            std::max(least_stations, stations_of_segment * rules.window), rules.max_across),
+            rules.is_open ? 0 : std::max(least_stations, stations_of_segment * rules.window), rules.max_across),
       motion_(plan_, rules.period_s) {
   const auto end = static_cast<std::ptrdiff_t>(rules.limits.axes);
   const AxisLimits limits = planned_limits(rules.limits, rules.period_s);
@@ -175,7 +187,19 @@ bool OnlinePlanner::wants_plan(const PathPoint& from, std::uint64_t pushed) cons
       std::min(static_cast<double>(plan_.end()) / for_new, renewed_share * static_cast<double>(rules_.window));
   if (is_full_ && has_more && static_cast<double>(end - planned_) < worth) return false;
   // Before the motion has to brake for what is only the end of the plan.
-  return std::isfinite(motion_.to_stop(stops_ahead * longest_stop_mm_));
+  return motion_.is_near_end(stops_ahead * longest_stop_mm_);
+}
+
+// What a stop takes, and what may be run before it begins.
+double OnlinePlanner::stop_mm(double speed, double acceleration, double jerk) const noexcept {
+  const double sections_s = rules_.period_s * static_cast<double>(longest_section + margin_periods);
+  return speed * (0.5 * stopping_time(speed, acceleration, jerk) + sections_s);
+}
+
+// Whether it is the window that makes the motion slow.
+bool OnlinePlanner::is_short() const noexcept {
+  const double speed = ahead_mm_ / plan_.expected_s();
+  return is_full_ && stop_mm(speed, least_acceleration_, least_jerk_) > short_share * ahead_mm_;
 }
 
 // How far is planned: as many of the longest stops ahead as make it worth while, and the segments that this takes.
@@ -196,14 +220,13 @@ std::uint64_t OnlinePlanner::look_ahead(const PathPoint& from, std::uint64_t pus
     double jerk = least_jerk_;
     if (std::isfinite(entry.max_acceleration)) a = std::min(a, entry.max_acceleration);
     if (std::isfinite(entry.max_jerk)) jerk = std::min(jerk, entry.max_jerk);
-    const double stop_s = stopping_time(v, a, jerk);
-    const double sections_s = rules_.period_s * static_cast<double>(longest_section + margin_periods);
-    longest_stop_mm_ = std::max(longest_stop_mm_, v * (0.5 * stop_s + sections_s));
+    longest_stop_mm_ = std::max(longest_stop_mm_, stop_mm(v, a, jerk));
     longest_braking_mm = std::max(longest_braking_mm, 0.5 * v * braking_time(v, a, jerk));
     ahead += entry.segment.length_mm;
   }
   is_full_ = end == from.segment + rules_.window;
   is_tight_ = is_full_ && ahead >= longest_braking_mm && ahead < longest_stop_mm_;
+  ahead_mm_ = ahead;
   return end;
 }
 
@@ -281,7 +304,7 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const F
     bind_to_spindle(section, from, pushed);
     return true;
   }
-  const int attempts = rests ? attempts_at_rest : static_cast<int>(slower.size());
+  const int attempts = rests ? attempts_at_rest : static_cast<int>(trials.size());
   PathMotion begin = motion_;
   // Under way on the stations of the plan before: a state that just keeps the limits there keeps them here.
   const bool goes_on =
@@ -293,17 +316,14 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const F
       planned_ = look_ahead(from, pushed, planned_ratios);
       ratios_ = planned_ratios;
       has_motion_ = false;
-      for (int k = 0; k < plans; ++k) {
-        plan_.make(path_start, from.state, planned_, ratios_);
-        begin = PathMotion(plan_, rules_.period_s, from.state, path_start.in_station);
-        if (is_faster || keeps_ahead(section, begin)) break;
-      }
+      begin = begin_plan(section, from, path_start, pushed, !is_faster);
     }
     motion_ = begin;
-    double max_speed = rests ? no_limit : slower[static_cast<std::size_t>(n)] * from.state.speed;
+    const Trial& trial = trials[rests ? 0 : static_cast<std::size_t>(n)];
+    double max_speed = rests ? no_limit : trial.speed * from.state.speed;
     if (is_faster) max_speed = std::min(max_speed, below_feed * feed);
     int settle = settle_;
-    const bool is_whole = fill(section, max_speed, settle);
+    const bool is_whole = fill(section, max_speed, trial.stop_share, settle);
     if (is_whole && section.count == 0) return false;
     if (is_whole && keeps(section, rests)) {
       settle_ = settle;
@@ -319,20 +339,49 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const F
   return false;
 }
 
+// The motion on a new plan.
+PathMotion OnlinePlanner::begin_plan(Section& section, const PathPoint& from, const PathStart& start,
+                                     std::uint64_t pushed, bool checks) {
+  const auto make = [&] {
+    plan_.make(start, from.state, planned_, ratios_);
+    return PathMotion(plan_, rules_.period_s, from.state, start.in_station);
+  };
+  PathMotion begin = make();
+  if (!checks) return begin;
+  bool is_kept = keeps_ahead(section, begin, pushed, true);
+  for (int n = 1; n < plans && !is_kept; ++n) {
+    begin = make();
+    is_kept = keeps_ahead(section, begin, pushed, true);
+  }
+  // Where the window does not slow the motion down: braking through valleys, if it is as far after as many periods.
+  if (!is_kept || is_short()) return begin;
+  const PlannedPoint before = section.at(static_cast<std::ptrdiff_t>(section.count));
+  const std::size_t count = section.count;
+  if (!plan_.choose_valleys()) return begin;
+  const PathMotion other(plan_, rules_.period_s, from.state, start.in_station);
+  if (keeps_ahead(section, other, pushed, false)) {
+    const PlannedPoint& now = section.at(static_cast<std::ptrdiff_t>(section.count));
+    if (section.count < count || is_as_far(now, before)) return other;
+  }
+  plan_.forget();
+  return make();
+}
+
 // Whether a motion keeps the limits as far as the plan will be followed; where it does not, less is planned there.
-bool OnlinePlanner::keeps_ahead(Section& section, PathMotion motion) noexcept {
+bool OnlinePlanner::keeps_ahead(Section& section, PathMotion motion, std::uint64_t pushed, bool reduces) noexcept {
+  const bool is_whole = planned_ == pushed && !plan_.is_cut();
   std::size_t n = 0;
   while (n < sections_.capacity() && !motion.at_end()) {
-    if (n % shortest_section == 0 && n > 0 && std::isfinite(motion.to_stop(longest_stop_mm_))) break;
+    if (!is_whole && n % shortest_section == 0 && n > 0 && motion.is_near_end(longest_stop_mm_)) break;
     motion.advance();
     add(section, n++, motion);
   }
   section.count = section.whole_count = n;
-  return keeps(section, true);
+  return keeps(section, reduces);
 }
 
 // Runs the motion on, and to a stop; false: it does not begin, or that takes too long.
-bool OnlinePlanner::fill(Section& section, double max_speed, int& settle) noexcept {
+bool OnlinePlanner::fill(Section& section, double max_speed, double stop_share, int& settle) noexcept {
   section.count = section.whole_count = 0;
   std::size_t n = 0;
   while (n < length_ && !motion_.at_end()) {
@@ -351,6 +400,7 @@ bool OnlinePlanner::fill(Section& section, double max_speed, int& settle) noexce
   }
   section.count = n;
   PathMotion stop = motion_;
+  stop.limit_to(stop_share);
   while (!stop.at_rest()) {
     if (n == sections_.capacity()) return false;
     stop.advance(0.0);

@@ -20,6 +20,7 @@ struct PlanningRules {
   AxisLimits limits;             ///< that the set-points keep
   double max_across = no_limit;  ///< acceleration across the path
   std::size_t window = 128;      ///< segments that are planned ahead
+  bool is_open = false;          ///< with as many stations as that takes, which are allocated when they are needed
   int lead_periods = 0;          ///< that are planned before they are run
   int settling_periods = 0;      ///< rest at a stop: what the filters behind hold
   /// Filters behind, and how far these may take the set-points from their path.
@@ -52,6 +53,8 @@ class OnlinePlanner {
   [[nodiscard]] int rest_at(const PathPoint& point) const noexcept;
   [[nodiscard]] bool waits_at(const PathPoint& point) const noexcept;
   [[nodiscard]] bool is_tight() const noexcept;
+  [[nodiscard]] bool is_short() const noexcept;
+  [[nodiscard]] double stop_mm(double speed, double acceleration, double jerk) const noexcept;
   [[nodiscard]] bool wants_plan(const PathPoint& from, std::uint64_t pushed) const noexcept;
   std::uint64_t look_ahead(const PathPoint& from, std::uint64_t pushed, const FeedRatios& ratios) noexcept;
   std::optional<PathPoint> next_start(std::uint64_t pushed) noexcept;
@@ -61,8 +64,10 @@ class OnlinePlanner {
   bool next_section(Section& section, std::uint64_t pushed, const FeedRatios& ratios);
   void bind_to_spindle(Section& section, const PathPoint& from, std::uint64_t pushed) noexcept;
   [[nodiscard]] bool begins_bound(const PathPoint& point) const noexcept;
-  bool keeps_ahead(Section& section, PathMotion motion) noexcept;
-  bool fill(Section& section, double max_speed, int& settle) noexcept;
+  PathMotion begin_plan(Section& section, const PathPoint& from, const PathStart& start, std::uint64_t pushed,
+                        bool checks);
+  bool keeps_ahead(Section& section, PathMotion motion, std::uint64_t pushed, bool reduces) noexcept;
+  bool fill(Section& section, double max_speed, double stop_share, int& settle) noexcept;
   void add(Section& section, std::size_t index, const PathMotion& motion) const noexcept;
   bool keeps(const Section& section, bool reduces) noexcept;
   void publish(Section& section) noexcept;
@@ -92,6 +97,7 @@ class OnlinePlanner {
   double least_acceleration_ = 0.0, least_jerk_ = 0.0;
   bool is_full_ = false;          // the plan reaches as far as the window
   bool is_tight_ = false;         // and that is hardly further than the longest stop
+  double ahead_mm_ = 0.0;         // how far that is
   double longest_stop_mm_ = 0.0;  // of the segments that are planned
   alignas(cache_line) std::atomic<std::uint64_t> running_{0};
 };

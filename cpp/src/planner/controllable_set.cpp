@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace shapegcode {
 namespace {
@@ -28,78 +29,78 @@ constexpr double stopping_share = 0.85;
 // A polygon while it is cut.
 class Polygon {
  public:
-  void add(double b, double a, bool checked = false) noexcept {
-    b_[count_] = b;
-    a_[count_] = a;
-    checked_[count_++] = checked;
-  }
-  [[nodiscard]] std::size_t count() const noexcept { return count_; }
-  [[nodiscard]] PathState corner(std::size_t i) const noexcept { return {b_[i], a_[i]}; }
+  Polygon() = default;
+  Polygon(const Polygon&) = delete;
+  Polygon& operator=(const Polygon&) = delete;
+
+  void add(double b, double a) noexcept { corners_->add(b, a, false); }
+  [[nodiscard]] std::size_t count() const noexcept { return corners_->count; }
+  [[nodiscard]] PathState corner(std::size_t i) const noexcept { return {corners_->b[i], corners_->a[i]}; }
   // Of a corner, as long as it is one.
-  [[nodiscard]] bool checked(std::size_t i) const noexcept { return checked_[i]; }
-  void check(std::size_t i) noexcept { checked_[i] = true; }
+  [[nodiscard]] bool checked(std::size_t i) const noexcept { return corners_->checked[i]; }
+  void check(std::size_t i) noexcept { corners_->checked[i] = true; }
 
   // Keeps what has on_b b + on_a a <= most; false: that is all of it.
   bool cut(double on_b, double on_a, double most) noexcept {
+    const Corners& now = *corners_;
     std::array<double, room> beyond;
     double farthest = 0.0;
-    for (std::size_t i = 0; i < count_; ++i) {
-      beyond[i] = on_b * b_[i] + on_a * a_[i] - most;
+    for (std::size_t i = 0; i < now.count; ++i) {
+      beyond[i] = on_b * now.b[i] + on_a * now.a[i] - most;
       farthest = std::max(farthest, beyond[i]);
     }
     if (!(farthest > 0.0)) return false;
-    Polygon kept;
-    for (std::size_t i = 0; i < count_; ++i) {
-      const std::size_t next = i + 1 == count_ ? 0 : i + 1;
-      if (beyond[i] <= 0.0) kept.add(b_[i], a_[i], checked_[i]);
+    Corners& kept = *other_;
+    kept.count = 0;
+    for (std::size_t i = 0; i < now.count; ++i) {
+      const std::size_t next = i + 1 == now.count ? 0 : i + 1;
+      if (beyond[i] <= 0.0) kept.add(now.b[i], now.a[i], now.checked[i]);
       if ((beyond[i] < 0.0 && beyond[next] > 0.0) || (beyond[i] > 0.0 && beyond[next] < 0.0)) {
         const double share = beyond[i] / (beyond[i] - beyond[next]);
-        kept.add(b_[i] + share * (b_[next] - b_[i]), a_[i] + share * (a_[next] - a_[i]));
+        kept.add(now.b[i] + share * (now.b[next] - now.b[i]), now.a[i] + share * (now.a[next] - now.a[i]), false);
       }
     }
-    if (kept.count_ > limit) kept.simplify(limit);
-    count_ = kept.count_;
-    std::copy_n(kept.b_.begin(), count_, b_.begin());
-    std::copy_n(kept.a_.begin(), count_, a_.begin());
-    std::copy_n(kept.checked_.begin(), count_, checked_.begin());
+    std::swap(corners_, other_);
+    if (kept.count > limit) simplify(limit);
     return true;
   }
 
   // Corners are left out where that costs the least area: what remains lies within.
   void simplify(std::size_t most) noexcept {
-    while (count_ > most) {
+    auto& [count, b, a, checked] = *corners_;
+    while (count > most) {
       std::size_t fastest = 0;
-      for (std::size_t i = 1; i < count_; ++i) {
-        if (b_[i] > b_[fastest] || (b_[i] == b_[fastest] && a_[i] > a_[fastest])) fastest = i;
+      for (std::size_t i = 1; i < count; ++i) {
+        if (b[i] > b[fastest] || (b[i] == b[fastest] && a[i] > a[fastest])) fastest = i;
       }
       std::size_t least_at = 0;
       double least = no_limit;
-      for (std::size_t i = 0; i < count_; ++i) {
+      for (std::size_t i = 0; i < count; ++i) {
         // Without these a motion could not begin, or not go on at its highest speed.
-        if (b_[i] <= at_rest || i == fastest) continue;
-        const std::size_t before = i == 0 ? count_ - 1 : i - 1;
-        const std::size_t after = i + 1 == count_ ? 0 : i + 1;
+        if (b[i] <= at_rest || i == fastest) continue;
+        const std::size_t before = i == 0 ? count - 1 : i - 1;
+        const std::size_t after = i + 1 == count ? 0 : i + 1;
         const double area =
-            std::abs((b_[i] - b_[before]) * (a_[after] - a_[before]) - (a_[i] - a_[before]) * (b_[after] - b_[before]));
+            std::abs((b[i] - b[before]) * (a[after] - a[before]) - (a[i] - a[before]) * (b[after] - b[before]));
         if (area < least) {
           least = area;
           least_at = i;
         }
       }
-      for (std::size_t i = least_at; i + 1 < count_; ++i) {
-        b_[i] = b_[i + 1];
-        a_[i] = a_[i + 1];
-        checked_[i] = checked_[i + 1];
+      for (std::size_t i = least_at; i + 1 < count; ++i) {
+        b[i] = b[i + 1];
+        a[i] = a[i + 1];
+        checked[i] = checked[i + 1];
       }
-      --count_;
+      --count;
     }
   }
 
   [[nodiscard]] ControllableSet set() const noexcept {
     ControllableSet set;
-    set.count = count_;
-    std::copy_n(b_.begin(), count_, set.b.begin());
-    std::copy_n(a_.begin(), count_, set.a.begin());
+    set.count = corners_->count;
+    std::copy_n(corners_->b.begin(), set.count, set.b.begin());
+    std::copy_n(corners_->a.begin(), set.count, set.a.begin());
     return set;
   }
 
@@ -107,9 +108,19 @@ class Polygon {
   // Convex: a cut adds one corner at most. Rounding may add some more.
   static constexpr std::size_t limit = 28;
   static constexpr std::size_t room = 2 * limit;
-  std::size_t count_ = 0;
-  std::array<double, room> b_, a_;
-  std::array<bool, room> checked_;
+  struct Corners {
+    std::size_t count = 0;
+    std::array<double, room> b, a;
+    std::array<bool, room> checked;
+    void add(double b_here, double a_here, bool is_checked) noexcept {
+      b[count] = b_here;
+      a[count] = a_here;
+      checked[count++] = is_checked;
+    }
+  };
+  std::array<Corners, 2> room_;  // a cut writes to the one that is not in use
+  Corners* corners_ = &room_[0];
+  Corners* other_ = &room_[1];
 };
 
 // Bounds of c that are linear in the state.
@@ -177,9 +188,9 @@ class Bounds {
       for (std::size_t i = 0; i < count; i += lanes) {
         for (std::size_t lane = 0; lane < lanes; ++lane) lowest[lane] = std::min(lowest[lane], bound[i + lane]);
       }
-      const double value = *std::min_element(lowest.begin(), lowest.end());
-      std::size_t i = 0;
-      while (i + 1 < count && bound[i] != value) ++i;
+      auto i = static_cast<std::size_t>(std::ranges::min_element(lowest) - lowest.begin());
+      const double value = lowest[i];
+      while (i + lanes < count && bound[i] != value) i += lanes;
       return i;
     }
   };

@@ -110,6 +110,12 @@ double PathMotion::to_stop(double most) const noexcept {
   return no_limit;
 }
 
+bool PathMotion::is_near_end(double length_mm) const noexcept {
+  double travel = -offset_;
+  for (std::size_t k = station_; k < plan_->end() && travel <= length_mm; ++k) travel += plan_->station(k).length;
+  return travel <= length_mm;
+}
+
 // The path where the motion is after so much time, as far as its jerk does not matter.
 Derivatives PathMotion::derivatives_after(double time_s) const noexcept {
   const Place place = place_at(std::max(0.0, time_s * (state_.speed + 0.5 * state_.acceleration * time_s)));
@@ -120,7 +126,7 @@ Derivatives PathMotion::derivatives_after(double time_s) const noexcept {
 // The jerks with which all limits are kept until the end of the period.
 PathMotion::Jerks PathMotion::allowed() const noexcept {
   const Station& here = plan_->station(station_);
-  const AxisLimits limits = plan_->limits_at(here);
+  const AxisLimits limits = plan_->limits_at(here).share(share_);
   const double t = period_s_;
   Jerks jerks{-no_limit, no_limit};
   const auto keep = [&](double on_jerk, double rest, double most) {
@@ -130,8 +136,8 @@ PathMotion::Jerks PathMotion::allowed() const noexcept {
     jerks.high = std::min(jerks.high, std::max(first, second));
     jerks.low = std::max(jerks.low, std::min(first, second));
   };
-  keep(1.0, 0.0, here.max_jerk);
-  keep(t, state_.acceleration, here.max_acceleration);
+  keep(1.0, 0.0, share_ * here.max_jerk);
+  keep(t, state_.acceleration, share_ * here.max_acceleration);
   for (const double share : jerk_looked_at) {
     const double x = share * t;
     const Derivatives path = share < 1.0 ? derivatives_after(x) : after_period_;
@@ -300,7 +306,7 @@ bool PathMotion::land(double travel, double excess) noexcept {
 bool PathMotion::land_anywhere() noexcept {
   const Station& here = plan_->station(station_);
   const Derivatives path = path_here();
-  const double most_jerk = (1.0 + landing_rounding) * plan_->highest_jerk(here, path);
+  const double most_jerk = share_ * (1.0 + landing_rounding) * plan_->highest_jerk(here, path);
   const double a = state_.acceleration;
   const double v = state_.speed;
   if (!(a < 0.0) || 2.0 * most_jerk * v > most_ahead * a * a) return false;
@@ -316,7 +322,7 @@ bool PathMotion::land_anywhere() noexcept {
     found.jerk[1] = -(a + found.jerk[0] * t) / u;
     const AlongPath middle = state_.after(found.jerk[0], t);
     if (!place_at(state_.travel(found.jerk[0], t) + middle.travel(found.jerk[1], u)).planned) continue;
-    if (!holds(found, most_jerk, steepest, 1.0)) continue;
+    if (!holds(found, most_jerk, steepest, share_)) continue;
     landing_ = found;
     return true;
   }
@@ -461,7 +467,7 @@ void PathMotion::advance(double max_speed) noexcept {
   const double travel = to_stop(near);
   const bool last = plan_->ends_in_stop(station_);
   if (last || (travel <= near && state_.acceleration < 0.0 && travel <= landing_stops * stop_from_here())) {
-    if (land(travel, 1.0)) return fly_on();
+    if (land(travel, share_)) return fly_on();
   }
   stops_ = max_speed <= 0.0;
   if (stops_ && land_anywhere()) return fly_on();
@@ -482,7 +488,7 @@ void PathMotion::advance(double max_speed) noexcept {
     is_slow_ = slower;
     if (choose(wish_, slower ? jerks_.high : jerks_.low, jerk)) return keep_to(jerk);
     // After a slow motion, which may brake harder than a valley is approached.
-    is_slow_ = was_slow && plan_->has_slow_sets();
+    is_slow_ = was_slow;
     if (!slower && is_slow_ && choose(wish_, jerks_.low, jerk)) return keep_to(jerk);
   }
   if (last) {

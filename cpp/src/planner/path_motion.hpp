@@ -25,6 +25,8 @@ class PathMotion {
   /// One period on: as fast as the plan allows, or, below `max_speed`, slowed down to that as soon as the limits allow;
   /// 0: to rest, wherever that is.
   void advance(double max_speed = no_limit) noexcept;
+  /// It takes no more than a share of the limits from here on, but for what the sets ask of it.
+  void limit_to(double share) noexcept { share_ = share; }
   [[nodiscard]] bool at_end() const noexcept { return station_ == plan_->end(); }
   [[nodiscard]] bool at_rest() const noexcept {
     return state_.speed <= 0.0 && state_.acceleration == 0.0 && !landing_.runs();
@@ -41,8 +43,8 @@ class PathMotion {
   /// Stations of the plan that are behind it.
   [[nodiscard]] std::size_t passed() const noexcept { return station_; }
   [[nodiscard]] const AlongPath& state() const noexcept { return state_; }
-  /// Distance to the next stop of the plan, infinite beyond `most`.
-  [[nodiscard]] double to_stop(double most) const noexcept;
+  /// Whether the plan ends within so many mm.
+  [[nodiscard]] bool is_near_end(double length_mm) const noexcept;
   /// Position of every axis.
   [[nodiscard]] AxisValues position() const noexcept;
   /// Its first and second derivative by time.
@@ -59,6 +61,7 @@ class PathMotion {
   };
 
   [[nodiscard]] Place place_at(double travel) const noexcept;
+  [[nodiscard]] double to_stop(double most) const noexcept;
   [[nodiscard]] Derivatives path_here() const noexcept { return plan_->derivatives(plan_->station(station_), offset_); }
   [[nodiscard]] Derivatives derivatives_after(double time_s) const noexcept;
   [[nodiscard]] Jerks allowed() const noexcept;
@@ -89,8 +92,9 @@ class PathMotion {
   std::size_t station_ = 0;
   double offset_ = 0.0;
   AlongPath state_;
-  bool is_beside_;     // has not been within the sets yet
-  double jerk_ = 0.0;  // of the last period
+  double share_ = 1.0;  // of the limits
+  bool is_beside_;      // has not been within the sets yet
+  double jerk_ = 0.0;   // of the last period
   Landing landing_;
   double course_ = 0.0;  // the last choice of c, and the interval that it was made for
   std::size_t course_station_ = static_cast<std::size_t>(-1);

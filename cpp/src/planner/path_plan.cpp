@@ -26,10 +26,11 @@ constexpr double same_share = 1e-9;
 constexpr double slow_share = 0.01;
 // Where keeping sets was of no use, because nearly all of them depend on the end, so many plans are made without.
 constexpr int plans_anew = 16;
-// Rounds in which each valley is tried; what makes one worth while, and all of them, as a share of the time.
+// Rounds in which each valley is tried; what makes one worth while.
 constexpr int valley_rounds = 3;
 constexpr double least_gain_s = 1e-5;
-constexpr double least_gain = 0.001;
+// As far as what a valley changes is looked at, in stations.
+constexpr std::size_t most_changed = 256;
 // An interval is coarse over which the jerk can change the speed by more than this share.
 constexpr double coarse_share = 0.2;
 // Of an interval at rest, mm/s.
@@ -39,14 +40,19 @@ constexpr double least_speed = 1e-9;
 
 PathPlan::PathPlan(SegmentRing& ring, const AxisLimits& limits, double period_s, std::size_t capacity,
                    double max_across)
-    : path_(ring, limits, period_s), rules_(limits), max_across_(max_across), grows_(capacity == 0) {
+    : path_(ring, limits, period_s),
+      rules_(limits),
+      max_across_(max_across),
+      grows_(capacity == 0),
+      saved_(most_changed),
+      expected_(2 * most_changed) {
   resize(grows_ ? first_capacity : capacity);
 }
 
 void PathPlan::resize(std::size_t capacity) {
   stations_.resize(capacity);
   sets_.resize(capacity);
-  if (!grows_) slow_sets_.resize(capacity);
+  slow_sets_.resize(capacity);
   courses_.resize(capacity);
 }
 
@@ -68,7 +74,7 @@ void PathPlan::make(const PathStart& start, const AlongPath& state, std::uint64_
     if (!lay_tangents()) break;
     make_sets(false);
   }
-  if (!grows_) make_slow_sets();
+  make_slow_sets();
 }
 
 // What the plan before found for an interval holds for the same one.
@@ -83,7 +89,7 @@ void PathPlan::keep(const Station& station, std::size_t before, std::size_t befo
       courses_[count_].is_kept = true;
       courses_[count_].is_remade = false;
       sets_[count_] = sets_[before];
-      if (!grows_) slow_sets_[count_] = slow_sets_[before];
+      slow_sets_[count_] = slow_sets_[before];
       return;
     }
   }
@@ -225,79 +231,81 @@ double PathPlan::duration_s(std::size_t index, double squared, double squared_af
   return 2.0 * stations_[index].length / (std::sqrt(squared) + std::sqrt(squared_after) + least_speed);
 }
 
-// How much less time the path is expected to take if the motion may brake through a valley; 0: no less, it may not.
-double PathPlan::brake_through(std::size_t valley) {
-  struct Saved {
-    ControllableSet set;
-    Course course;
-  };
-  std::vector<Saved> saved;
+double PathPlan::expected_s() const noexcept {
+  double sum_s = 0.0;
+  for (std::size_t k = 0; k < end(); ++k) {
+    sum_s += duration_s(k, courses_[k].expected.speed_squared, courses_[k + 1].expected.speed_squared);
+  }
+  return sum_s;
+}
+
+// Lets the motion brake through a valley if the path is expected to take less time then; whether it is.
+bool PathPlan::brake_through(std::size_t valley) noexcept {
   stations_[valley].valley = false;
+  std::size_t saved = 0;
   std::size_t first = valley;
+  bool is_known = true;  // how far it changes what is planned
   while (true) {
-    saved.push_back({sets_[first], courses_[first]});
+    saved_[saved++] = {sets_[first], courses_[first]};
     const bool approached = courses_[first].approaches;
     const bool differs = make_set(first) || courses_[first].approaches != approached || first == valley;
     if (!differs || first == 0 || ends_in_stop(first - 1)) break;
+    is_known = saved < saved_.size();
+    if (!is_known) break;
     --first;
   }
   // From there on the motion is another, until it is again what it was.
-  std::vector<PathState> states;
+  std::size_t count = 0;
   PathState state = courses_[first].expected;
   double gain_s = 0.0;
   std::size_t k = first;
-  while (!ends_in_stop(k)) {
-    states.push_back(state);
+  for (; is_known && !ends_in_stop(k); ++k) {
+    if (k > valley && is_near(courses_[k].expected, state, stations_[k].length)) break;
+    is_known = count + 1 < expected_.size();
+    expected_[count++] = state;
     const PathState next = fastest_after(k, state);
     gain_s += duration_s(k, courses_[k].expected.speed_squared, courses_[k + 1].expected.speed_squared) -
               duration_s(k, state.speed_squared, next.speed_squared);
     state = next;
-    ++k;
-    if (k > valley && is_near(courses_[k].expected, state, stations_[k].length)) break;
   }
-  if (ends_in_stop(k)) {
-    states.push_back(state);
+  if (is_known && ends_in_stop(k)) {
+    expected_[count++] = state;
     gain_s += duration_s(k, courses_[k].expected.speed_squared, 0.0) - duration_s(k, state.speed_squared, 0.0);
   }
-  if (gain_s > least_gain_s) {
-    for (std::size_t i = 0; i < states.size(); ++i) {
-      courses_[first + i].expected = states[i];
+  if (is_known && gain_s > least_gain_s) {
+    for (std::size_t i = 0; i < count; ++i) {
+      courses_[first + i].expected = expected_[i];
       courses_[first + i].is_another = false;
     }
-    return gain_s;
+    return true;
   }
   stations_[valley].valley = true;
-  for (std::size_t i = 0; i < saved.size(); ++i) {
-    sets_[valley - i] = saved[i].set;
-    courses_[valley - i] = saved[i].course;
+  for (std::size_t i = 0; i < saved; ++i) {
+    sets_[valley - i] = saved_[i].set;
+    courses_[valley - i] = saved_[i].course;
   }
-  return 0.0;
+  return false;
 }
 
 // Tried one by one: where the motion is slower than a corner allows, braking need not be over there.
-bool PathPlan::choose_valleys() {
+bool PathPlan::choose_valleys() noexcept {
   expect();
-  double gain_s = 0.0;
-  double whole_s = 0.0;
-  for (std::size_t k = 0; k < end(); ++k) {
-    whole_s += duration_s(k, courses_[k].expected.speed_squared, courses_[k + 1].expected.speed_squared);
-  }
+  bool is_another = false;
   for (int n = 0; n < valley_rounds; ++n) {
     bool is_any = false;
     for (std::size_t k = 1; k < end(); ++k) {
       if (!stations_[k].valley || stations_[k].slower_feed || ends_in_stop(k)) continue;
-      const double less_s = brake_through(k);
-      gain_s += less_s;
-      is_any = is_any || less_s > 0.0;
+      is_any = brake_through(k) || is_any;
     }
-    if (gain_s <= least_gain * whole_s) return false;
     if (!is_any) break;
+    is_another = true;
     for (int round = 0; round < rounds && lay_tangents(); ++round) {
       make_sets(false);
       expect();
     }
   }
-  return true;
+  if (is_another) make_slow_sets();
+  return is_another;
 }
 
 // Those that differ from the sets that approach valleys, as far as these are not those of the plan before.

@@ -25,15 +25,18 @@ class PathPlan {
   /// reach.
   void make(const PathStart& start, const AlongPath& state, std::uint64_t end, const FeedRatios& ratios);
 
-  /// Lets the motion brake through corners where that is expected to take less time; whether that is worth while. It is
-  /// only expected: compare the motion of this plan with that of the one before.
-  bool choose_valleys();
+  /// Lets the motion brake through corners where that is expected to take less time; whether there are any. It is only
+  /// expected: compare the motion of this plan with that of the one before.
+  bool choose_valleys() noexcept;
 
   /// Nothing of the plan before holds for what comes.
   void forget() noexcept {
     count_ = 0;
     anew_ = 0;
   }
+
+  /// How long the motion is expected to take.
+  [[nodiscard]] double expected_s() const noexcept;
 
   /// Whether it ends before the end of what is known.
   [[nodiscard]] bool is_cut() const noexcept { return is_cut_; }
@@ -68,7 +71,6 @@ class PathPlan {
   [[nodiscard]] AxisLimits limits_at(const Station& station) const noexcept { return rules_.limits_at(station); }
   [[nodiscard]] double stopping_length() const noexcept { return path_.stopping_length(); }
   [[nodiscard]] std::size_t axes() const noexcept { return rules_.axes(); }
-  [[nodiscard]] bool has_slow_sets() const noexcept { return !grows_; }
   /// Whether the motion rests at the end of an interval.
   [[nodiscard]] bool ends_in_stop(std::size_t index) const noexcept { return stations_[index + 1].stop; }
   /// The limits of a motion along a station's direction.
@@ -87,7 +89,7 @@ class PathPlan {
   bool make_set(std::size_t index) noexcept;
   void make_sets(bool is_first) noexcept;
   [[nodiscard]] double duration_s(std::size_t index, double squared, double squared_after) const noexcept;
-  double brake_through(std::size_t valley);
+  bool brake_through(std::size_t valley) noexcept;
   void make_slow_sets() noexcept;
   [[nodiscard]] Making making_of(std::size_t index) const noexcept;
   [[nodiscard]] bool is_approach(std::size_t index) const noexcept;
@@ -121,6 +123,13 @@ class PathPlan {
   };
   std::vector<Course> courses_;
   PathState begin_;
+  // What a valley changes.
+  struct Saved {
+    ControllableSet set;
+    Course course;
+  };
+  std::vector<Saved> saved_;
+  std::vector<PathState> expected_;
 };
 
 }  // namespace shapegcode
