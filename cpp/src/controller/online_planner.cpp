@@ -57,8 +57,8 @@ constexpr double least_points = 512.0;
 constexpr double most_points = 16384.0;
 constexpr double highest_speed = 1000.0;
 
-bool is_as_far(const PlannedPoint& one, const PlannedPoint& other) noexcept {
-  return std::pair(one.point.segment, one.point.offset) >= std::pair(other.point.segment, other.point.offset);
+bool is_as_far(const PathPoint& one, const PathPoint& other) noexcept {
+  return std::pair(one.segment, one.offset) >= std::pair(other.segment, other.offset);
 }
 
 Vector3 xyz(const PlannedPoint& point) noexcept { return {point.position[0], point.position[1], point.position[2]}; }
@@ -355,12 +355,12 @@ PathMotion OnlinePlanner::begin_plan(Section& section, const PathPoint& from, co
   }
   // Where the window does not slow the motion down: braking through valleys, if it is as far after as many periods.
   if (!is_kept || is_short()) return begin;
-  const PlannedPoint before = section.at(static_cast<std::ptrdiff_t>(section.count));
   const std::size_t count = section.count;
+  const PathPoint before = section.at(static_cast<std::ptrdiff_t>(count)).point;
   if (!plan_.choose_valleys()) return begin;
   const PathMotion other(plan_, rules_.period_s, from.state, start.in_station);
-  if (keeps_ahead(section, other, pushed, false)) {
-    const PlannedPoint& now = section.at(static_cast<std::ptrdiff_t>(section.count));
+  if (keeps_ahead(section, other, pushed, false) && section.count <= count) {
+    const PathPoint& now = section.at(static_cast<std::ptrdiff_t>(section.count)).point;
     if (section.count < count || is_as_far(now, before)) return other;
   }
   plan_.forget();
