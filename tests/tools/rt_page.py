@@ -249,7 +249,7 @@ CALLS = (
         ("program", "threads", "flush", "sessions"),
     ),
     Call(("abort",), "any", "a word", ("allocation", "abort")),
-    Call(("restart",), "any, while no thread pushes or steps", "resets the filters", ("allocation", "abort")),
+    Call(("restart",), "any, while no thread pushes, plans or steps", "resets the filters", ("allocation", "abort")),
     Call(
         ("state",),
         "any",

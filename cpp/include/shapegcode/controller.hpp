@@ -296,8 +296,8 @@ class MotionController {
   /// a synchronous segment waits for the fade. From any thread. False: there is no such number.
   bool exchange_shaper(std::size_t number) noexcept;
 
-  /// Sets the control at rest at a position (axes() values), with an empty queue. Not while another thread pushes or
-  /// steps. False, and nothing is changed: a value is not finite.
+  /// Sets the control at rest at a position (axes() values), with an empty queue. Not while another thread pushes,
+  /// plans or steps. False, and nothing is changed: a value is not finite.
   bool restart(std::span<const double> position) noexcept;
 
   [[nodiscard]] ControllerState state() const noexcept;

@@ -348,8 +348,8 @@ shapegcode_status shapegcode_controller_offset(shapegcode_controller* controller
 /// From any thread.
 shapegcode_status shapegcode_controller_travel(shapegcode_controller* controller, int axis, double low, double high);
 
-/// Sets the control at rest at a position (one value per axis), with an empty queue. Not while another thread pushes or
-/// steps.
+/// Sets the control at rest at a position (one value per axis), with an empty queue. Not while another thread pushes,
+/// plans or steps.
 shapegcode_status shapegcode_controller_restart(shapegcode_controller* controller, const double* position);
 
 /// `struct_size` is sizeof(shapegcode_state).

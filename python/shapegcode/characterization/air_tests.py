@@ -158,7 +158,7 @@ class _Maker:
         self.rapid = {name: axis.rapid_mm_per_min for name, axis in zip(AXES, axes, strict=True)}
 
     def _signed(self, axis: str, increments: int) -> float:
-        """A length towards the farther side of the box."""
+        """Length of these increments in mm, with the sign of the direction to the farther side of the box."""
         length, travel = round(increments * self._step, 9), self._box.travel_mm(axis)
         if not 0.0 < length <= abs(travel) + 1e-9:
             needed = max(length, self._step)

@@ -38,7 +38,7 @@ def held_samples(log: ServoLog) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class _Bends:
-    """Where the speed of a command changes: how much of that at every count-th sample and the one after it."""
+    """How well the speed changes of a command fall on every count-th sample, or between it and the next one."""
 
     share: float  # fraction of all curvature
     first: int  # index of the first such sample

@@ -149,9 +149,11 @@ CONVERT = Interface(
         ("--block-period", "TIME", seconds,
          "duration of the shortest block, for example 5ms (default: chosen for the modes)"),
         ("--max-bytes", "N[k|M]", size,
-         "largest size of the emitted program, for example 256k: the cuts that gain least are left unchanged"),
+         "largest size of the emitted program, for example 256k; to keep it, the cuts that gain least are left "
+         "unchanged"),
         ("--baud", "N", positive,
-         "speed of the serial line; if too slow, block periods get longer, then cuts are left unchanged"),
+         "speed of the serial line; if it is too low, longer block periods are used; if they are not enough, cuts are "
+         "left unchanged"),
         ("--max-blocks-per-second", "N", positive, "blocks per second that the control can read; effect as --baud"),
         ("--feed-schedule", None, bool,
          "first set the feeds so that the shaped program keeps the tool's limits, as `shapegcode feed`; "

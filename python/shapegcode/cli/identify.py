@@ -28,7 +28,7 @@ _OF_FILES = (
     ("--response-unit", "UNIT", None, "for example m/s^2, g, mm/s or um"),
     ("--sample-period", "TIME", {"dest": "period_s", "type": arguments.seconds}, "time between samples, such as 0.1ms"),
     ("--quantity", None, ("acceleration", "velocity", "displacement"), "measured quantity of the sensor"),
-    ("--force-scale", "N", arguments.nonzero, "N per unit in the file (integer WAV: N at full scale)"),
+    ("--force-scale", "N", arguments.nonzero, "newtons per unit in the file (integer WAV: newtons at full scale)"),
     ("--response-scale", "X", arguments.nonzero, "m/s^2, m/s or m per unit in the file (integer WAV: at full scale)"),
     ("--force-sensitivity", "mV/N", None, "sensitivity of the hammer if the force is in volts: 2.25mV/N"),
     ("--response-sensitivity", "mV/g", None, "sensitivity of the sensor if the response is in volts: 100mV/g"),

@@ -65,13 +65,14 @@ SHAPER = Interface(
          "block period on which the impulses must lie, such as 5ms; may be repeated (default: the machine's, or the "
          "best few)", []),
         ("--continuous", None, bool,
-         "design in continuous time, too (default if neither -m nor --block-period is given: only in continuous time)"),
+         "design shapers whose impulses may lie at any time (continuous time): besides those on --block-period; "
+         "without it only these. Default without -m and --block-period: these and those on the best few periods"),
         ("--family", "NAME", {"action": "extend", "nargs": "+"},
          f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"),
         ("--list-families", None, bool, "list the families with meaning and source, and exit"),
         ("--max-duration", "TIME", seconds,
-         "longest shaper, for example 50ms (default: three periods of the slowest mode; the machine's limit if that is "
-         "not enough)"),
+         "longest shaper, for example 50ms (default: three periods of the slowest mode; with -m, if no such shaper is "
+         "good enough, shaping.max_duration_s of the machine)"),
         ("--max-abs-sum", "N", positive, "largest sum of the impulses' magnitudes (default: %(default)g)", 10.0),
         ("--vibration-limit", "RATIO", ratio,
          "maximum residual ratio within the bands (default: the machine's "
@@ -113,7 +114,7 @@ def _report(args: argparse.Namespace) -> int:
 
 
 def _target(source: Path, report: Mapping[str, Any]) -> Path:
-    """Path of the page, in the folder of the JSON; for one of several programs with its address."""
+    """Path of the page in the folder of the JSON; its name ends in the program's address in a multi-program file."""
     address = str(report.get("program_address", ""))
     label = "".join(letter if letter.isalnum() else "-" for letter in address).strip("-")
     return source.with_name(f"{source.stem}{'-' + label if label else ''}.html")

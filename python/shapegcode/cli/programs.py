@@ -148,11 +148,12 @@ def _measure(args: argparse.Namespace) -> int:
 
 
 MEASURE = Interface(
-    "Simulates programs on the machine's model and measures the response like a part: for each section of the path "
-    "vibration and settling time, contour error, fitted radius, the walls that the tool leaves, their roughness "
-    "and waviness. Programs written by shapegcode are measured against the first program if it did not write that. "
-    "Exit code 0; 1: the response of a program leaves the path by more than tolerance.contour_um (of shaped "
-    "programs with their original only the shaped ones count); 2: bad input.",
+    "Simulates programs on the machine's model and measures the response like a part. For each section of the "
+    "path: vibration and settling time, contour error, fitted radius, the walls that the tool leaves, their roughness "
+    "and waviness. If the first program is an original and shapegcode wrote all others, they are measured against "
+    "the original's path. Exit code 0: the response of every program is within tolerance.contour_um of its path; "
+    "1: that of one is not (if shaped programs are measured against their original, only the shaped ones count); "
+    "2: bad input.",
     (
         ("inputs", "PROGRAM", {"nargs": "+"}, "CNC program; several are compared side by side"),
         *options.MACHINE,
@@ -166,8 +167,8 @@ MEASURE = Interface(
         ("--lines", "A-B", [line_range],
          "measure the cut of these lines as one section; may be repeated (default: every line and arc)"),
         ("--settling-band", "LENGTH", micrometres, "vibration within it counts as settled (default: 1um)", 1.0),
-        ("--station", "LENGTH", micrometres, "distance of the stations at which walls are measured (default: 0.05mm)",
-         50.0),
+        ("--station", "LENGTH", micrometres, "spacing of the points along a wall at which it is measured (default: "
+         "0.05mm)", 50.0),
         ("--cutoff", "LENGTH", micrometres,
          "cut-off of the roughness (default: 0.8mm, less for sections shorter than 5.6 mm)"),
         ("--lambda-s", "LENGTH", micrometres, "short-wave cut-off (default: none)", 0.0),
@@ -285,7 +286,8 @@ COMPARE = Interface(
         ("against", "B", None, "second program, such as the output of convert"),
         *options.MACHINE_OR_NONE,
         ("--allow", "WORDS", None,
-         "differences that are allowed, for example feeds,blocks,path=20um,calls; an unknown word lists all", ""),
+         "differences that are allowed, for example feeds,blocks,path=20um,calls; any other word: an error that lists "
+         "all of them", ""),
         *RESULT,
     ),
     _compare,

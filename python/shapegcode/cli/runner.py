@@ -256,7 +256,7 @@ MACHINES = ("machine", "base", "files")
 
 
 def given_files(args: argparse.Namespace) -> Iterator[tuple[str, str]]:
-    """Yield role and value of all options for files to read."""
+    """Yield role and value of every option that names a file to read."""
     for role in _READ:
         value = getattr(args, role, None)
         for entry in value if isinstance(value, list | tuple) else [value]:

@@ -163,7 +163,7 @@ def _cases(conversion: Conversion) -> model.Section:
         "to the limit: up to 100 % is within. A condition in brackets does not count in the verdict."
     )
     counted = sum(case.counts for case in conversion.cases)
-    caption = f"{counted} of {len(rows)} operating conditions count ([verdict] of the machine file)"
+    caption = f"{counted} of {len(rows)} operating conditions count (table [verdict] of the machine file)"
     heat = model.HeatMap(columns, rows, 1, caption, factors=(*(1.0 for _ in axes), 1.0, 1.0, 100.0))
     return model.Section("cases", "Operating conditions", (heat,), how=how)
 

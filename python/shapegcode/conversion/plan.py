@@ -486,7 +486,7 @@ class ConversionPlan:
             self.curves.use(self.writer)
 
     def excess_s(self, shaped: Shaped) -> float:
-        """Time above the price of the program, s."""
+        """Time by which the program exceeds its permitted increase of time (`price_s`), s; negative: below it."""
         price_s = self.price_s()
         cuts_s = math.fsum(figures.emitted_s - figures.original.duration_s for figures in shaped.figures)
         cuts_s += self.machine.emission.prefill_dwell_s * len(shaped.figures)

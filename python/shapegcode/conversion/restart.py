@@ -323,7 +323,7 @@ class _PointLines:
         return None
 
     def _in_force(self, pattern: re.Pattern[bytes], end: int, before: bytes) -> bytes:
-        """The last word of a kind before a byte of the piece; *before* if there is none."""
+        """The last match of *pattern* in the lines up to byte *end* of the piece; *before* if there is none."""
         while end > 0:
             begin = self._text.rfind(b"\n", 0, end) + 1
             line = self._text[begin:end].lstrip(b"\r")

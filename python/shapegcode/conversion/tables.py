@@ -111,7 +111,7 @@ class _Region:
 def start_trials(
     judge: Judge, machine: Machine, place: Placed, emitted: Program, tracker: _core.ContourTracker, pool: Executor
 ) -> StartedTrials:
-    """Start simulations with contour for `parameter_sensitivity`, if only one region can decide."""
+    """Start the simulations with contour error that `parameter_sensitivity` needs; only if there is one region."""
     region = _Region(place, emitted, judge, tracker)
     trials = filter(region.needs_contour, islice(_trials(machine, region.moving), _FULL_RUNS))
     return {_name(trial): pool.submit(region.simulate, trial, contour=True) for trial in trials}

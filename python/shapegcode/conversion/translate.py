@@ -214,7 +214,7 @@ class _Translator:
             self._lasts |= {max(times, default=-1)}
 
     def _join(self, blocks: _core.Path, period_s: float) -> None:
-        """Write the blocks of a shaped cut with a feed that is linear along them, where their lines are only moves."""
+        """Replace blocks of constant feed by fewer of linear feed (FLIN), if the shaped cut contains only moves."""
         text = self._program.expanded_text.decode("latin-1").split(self._program.core.line_end)
         numbers = [int(number) for number in blocks.segment_lines]
         lines = {number: text[number - 1].replace(" ", "") for number in numbers}
@@ -380,7 +380,7 @@ class _Translator:
         return lines
 
     def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
-        """Words of an original for this very control, restored in place of their translation from FANUC."""
+        """Words of an original for the output control, in place of the FANUC words into which they were translated."""
         held = dict(words)
         found = {}
         if (tool := self._names.get(f"T{held.get('T', '')}")) is not None:

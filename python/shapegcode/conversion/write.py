@@ -270,7 +270,7 @@ class RegionWriter:
         return places
 
     def _stop_for_restarts(self, region: _core.Region, options: _core.ShapingOptions) -> tuple[int, int]:
-        """Add stops for restart points where needed; return the periods without them, and the number of stops."""
+        """Add stops for restart points where needed; return the number of block periods without them, and of stops."""
         places = self._places(region)
         segments = range(1, len(region.path))
         shaper = _core.RegionShaper(region.path, self._grid.fir, segments, options)

@@ -324,7 +324,7 @@ class Tool(TomlTable):
         return _core.SpindleSense.clockwise if programmed is None else programmed
 
     def coefficients(self) -> _core.CuttingCoefficients:
-        """Coefficients of the core: the file's values, then those of its material."""
+        """Cutting-force coefficients for the core: those of the file; those that it lacks from its material."""
         return self.cutting.coefficients()
 
     def force(

@@ -1,4 +1,4 @@
-"""Line, quarter arc, line at two feeds and two reductions: the model's figures compared with the published ones.
+"""Line, quarter arc, line, at two feeds and two reductions of the feed on the arc: our figures and the published ones.
 
 Ko, Lim and Hong, 2023 (paper 000 in docs/evidence/references.md): table 2 and the text on time.
 """
@@ -68,7 +68,7 @@ class PathRun:
 
 @dataclass(frozen=True)
 class PathCondition:
-    """One feed with one reduction on the arc."""
+    """One feed with one reduction of the feed on the arc."""
 
     feed_mm_per_s: int  # programmed
     reduction_percent: int  # of the feed on the arc
@@ -91,7 +91,7 @@ class PathDemo(Result):
         remark: how to read the differences.
         warnings: usually none.
         machine: name of the machine.
-        conditions: two feeds, each at two reductions.
+        conditions: two feeds, each with two reductions of the feed on the arc.
     """
 
     published: ClassVar[tuple[str, ...]] = ("path of paper 000",)

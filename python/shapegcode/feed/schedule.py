@@ -186,7 +186,7 @@ def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine)
 
 
 def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index: int) -> bool:
-    """Whether the next region is written too, and nothing in between needs the modal feed."""
+    """Whether the next region gets its own feed, and no block before it needs the modal feed restored."""
     if index + 1 == len(plans) or plans[index + 1] is None:
         return False
     here, following = program.regions[index], program.regions[index + 1]

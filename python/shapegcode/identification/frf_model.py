@@ -27,7 +27,7 @@ _MIN_DAMPING, _MAX_DAMPING = 1e-6, 0.99
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Lines of one response over force."""
+    """Spectral lines of one frequency response (response over force), with their noise."""
 
     s: ComplexArray  # (n,) rad/s, points of the Laplace plane: off the imaginary axis with an exponential window
     response: ComplexArray  # (n,) SI unit per N
@@ -84,7 +84,7 @@ class ModalFit:
 
     @property
     def squares(self) -> float:
-        """Sum of the weighted residuals."""
+        """Sum of the squares of the weighted residuals."""
         return float(sum(np.sum(np.abs(part) ** 2) for part in self.left))
 
     @property

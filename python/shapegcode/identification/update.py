@@ -103,7 +103,8 @@ def update_modes(
     """Replace the modes of one axis in the text of a machine file by identified ones; idempotent.
 
     A mode within 10 % of one in the file overwrites its table; unmeasured keys stay. A mode that appears in the
-    test but is refused stays unchanged. The axis' other tables are deleted, other modes get new ones.
+    test but is refused stays unchanged. The axis' remaining tables are deleted;
+    identified modes without a table get new ones.
     """
     if axis not in ("x", "y", "z"):
         raise ArgumentError(f"axis {axis!r}: must be x, y or z")

@@ -125,7 +125,7 @@ def _says(text: str) -> bool:
 
 
 def _places(table: TextTable, header: list[str], options: ReadOptions) -> dict[str, int]:
-    """Index of the column of each part."""
+    """Column index of each part: frequency, real and imaginary part, and others that the header names."""
     if not any(header):
         if len(header) not in _BARE_COLUMNS:
             raise RecordError(

@@ -114,7 +114,7 @@ class _Document:
         return self._open[-1] if self._open else "?xml"
 
     def feed(self, data: bytes) -> int:
-        """Parse data; returns the number of bytes of this document."""
+        """Parse data; return how many of its bytes belong to this document."""
         try:
             self._parser.Parse(data, False)
         except LookupError as error:
@@ -251,7 +251,7 @@ def shdr_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Even
 
 
 class _Odd:
-    """Handles lines other than those of one item with its value."""
+    """Handles every line that is not one item with its value: several items, a condition, an asset, a comment."""
 
     def __init__(self, path: Path, table: ItemTable, notes: FileNotes, known: dict[bytes, Item | None]) -> None:
         self._path, self._table, self._notes, self._known = path, table, notes, known

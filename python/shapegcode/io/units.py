@@ -1,4 +1,4 @@
-"""Units with the spellings of measuring programs (``m/s^2``, ``m_s2``, ``kgf``), labels of columns with them, arrays.
+"""Units in the spellings of measuring programs (``m/s^2``, ``m_s2``, ``kgf``), and labels of columns that contain them.
 
 `read_label` splits every label in the same way: ``Acc_X [m/s^2]``, ``time_ms``, ``Kraft / N``, or a name with its unit
 in the row below. Meanings of names differ: ``x`` is an acceleration along X in a tap file, a position in a record of

@@ -241,8 +241,9 @@ class Axis(TomlTable):
         "vibration modes, one table each; none: the axis is simulated as rigid", default=()
     )
     rigid: Bool = key(
-        "this axis has no significant vibration mode: by test or decision. false, and no modes: "
-        "not known; the axis is simulated as rigid, and every verdict says so",
+        "whether it is certain, by a test or by your decision, that this axis has no significant vibration mode. false "
+        "without modes: it is not known whether it has one; the axis is simulated as rigid, and every verdict reports "
+        "that",
         default=False,
     )
     drive: Drive | None = optional(

@@ -171,9 +171,9 @@ class Controller(TomlTable):
     )
     corner_rule: Literal["speed_difference", "junction_deviation", "stops"] = key(
         'corner rule of look-ahead. "speed_difference": no axis changes its speed by more than '
-        'corner_speed_difference_mm_per_min (FANUC); "junction_deviation": it is passed as an arc within '
-        'junction_deviation_mm (GRBL and others); "stops": it stops where the direction turns by '
-        "corner_stop_angle_deg. The emitted dialect is emission.dialect, whatever the value",
+        'corner_speed_difference_mm_per_min (FANUC); "junction_deviation": the corner is passed as an arc '
+        'within junction_deviation_mm of it (GRBL and others); "stops": the control stops where the direction turns by '
+        "corner_stop_angle_deg or more. It does not change the dialect of emitted programs (emission.dialect)",
         fanuc="1783",
         default="speed_difference",
     )
@@ -193,7 +193,7 @@ class Controller(TomlTable):
         'deviation at a corner, passed at the acceleration of the axes; corner_rule = "junction_deviation" needs it'
     )
     corner_stop_angle_deg: Annotated[Positive, Field(le=180)] | None = optional(
-        'smallest turn of a corner that is a stop; corner_rule = "stops" needs it'
+        'smallest change of direction at a corner at which the control stops; corner_rule = "stops" needs it'
     )
     look_ahead_block_time_s: Annotated[NonNegative, Field(le=1)] = key(
         "shortest time per block in look-ahead mode (the time to read one); 0: not limited", default=0.0
@@ -411,7 +411,7 @@ class SpindleTimes(InlineTable):
 
     @property
     def rows(self) -> list[tuple[float, float]]:
-        """(speed in 1/min, time in s)."""
+        """Rows of the table: speed in 1/min, and its time in s."""
         return list(zip(self.rpm, self.s, strict=True))
 
 

@@ -347,7 +347,7 @@ class Shaping(TomlTable):
     )
     contour: Literal["response", "command", "off"] = key(
         "what contour compensation keeps within tolerance.contour_um of the programmed path, at the highest possible "
-        'feed. "response": the machine table, as its modes move it, and so the part; "command": the set-points; "off": '
+        'feed. "response": the motion of the machine table, vibration included; "command": the set-points; "off": '
         "no compensation; the set-points are kept within the tolerance by a lower feed",
         default="response",
     )
@@ -379,8 +379,8 @@ class Shaping(TomlTable):
         default=15.0,
     )
     part_mass_kg: NonNegative | None = optional(
-        "mass of the part on the worktable, for modes whose frequency depends on it (frequency_over); left out: "
-        "nominal frequency"
+        "mass of the part on the worktable, for modes whose frequency depends on it (frequency_over); if neither "
+        "the machine file nor --part-mass gives it: nominal frequency"
     )
 
 

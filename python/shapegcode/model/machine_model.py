@@ -163,7 +163,7 @@ class OwnFilter:
 
     @property
     def mean_deviation_s(self) -> float:
-        """Upper bound on the mean absolute deviation of the delay; the error at a corner is proportional to it."""
+        """Mean absolute deviation of the impulse response, upper bound; the error at a corner is proportional to it."""
         if self.shape == "exponential":
             return self.time_constant_s * 2.0 / math.e
         return (self.time_constant_s + self.bell_time_s) / 4.0
@@ -346,7 +346,7 @@ class MachineModel:
     def simulate_rapid(
         self, start_mm: FloatArray, end_mm: FloatArray, options: _core.SimulationOptions
     ) -> _core.SimulationFigures:
-        """Simulate a rapid from rest to rest, without contour."""
+        """Simulate a rapid from rest to rest, without its contour error."""
         options.measure_contour = False
         samples = _core.rapid_samples(start_mm, end_mm, self.ordinary.model)
         still = _core.Path([_core.Segment.line(start_mm, start_mm, 1.0)])

@@ -133,7 +133,7 @@ def _variant(
 
 
 class _Blocks:
-    """Ranks of the interpolated blocks, and their durations."""
+    """Numbers the interpolated blocks in order of execution, and collects their durations."""
 
     def __init__(self) -> None:
         self._last_line = -1

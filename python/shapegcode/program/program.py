@@ -495,7 +495,7 @@ def _other_arc_centre(data: bytes, options: _core.ReaderOptions, message: str) -
 
 
 def given_program(program: Program | str | Path, machine: Machine) -> Program:
-    """A given program, or one read from its file like the controller of `machine`."""
+    """The program itself if it is one; a file is read as the controller of `machine` reads it."""
     if not isinstance(program, Program):
         return Program.read(program, machine)
     program.require_machine(machine)

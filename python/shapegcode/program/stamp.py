@@ -259,7 +259,7 @@ def write_verdict(program: _core.ProgramText, mark: str, *, good: bool, better: 
 
 
 def _changes(find: Callable[[bytes], int], mark: str, *, good: bool, better: bool) -> list[tuple[int, bytes]]:
-    """Changes in the header: the position of each, and the bytes that replace as many old ones."""
+    """Changes in the header: position and new bytes of each, which overwrite the same number of bytes."""
     open_ones = (_PENDING,) if good else (_PENDING, _GOOD, _BETTER)
     verdicts = [(before, _BAD if not good else _BETTER if better else _GOOD) for before in open_ones]
     wanted = [*verdicts, (MARK_PENDING, f"(CHECKSUM {mark})".encode())]

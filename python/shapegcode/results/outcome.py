@@ -32,7 +32,7 @@ class NotKeptError(_core.ArgumentError):
 
 
 class CoreFigures:
-    """Figures of a core object in an unpickled result."""
+    """Stands for a core object in an unpickled result: contains its figures, and nothing else."""
 
     def __init__(self, name: str, figures: Mapping[str, Any]) -> None:
         self.__dict__.update(figures)

@@ -111,7 +111,7 @@ def _note(key: str, origin: Any, found: dict[str, Any]) -> None:
 
 
 def remark_of(stated: str) -> str:
-    """Remark of an origin in a file: without the keyword if the note implies it."""
+    """Remark in a file for an origin such as "assumed: note"; only the note if it alone states the same origin."""
     word, _, note = stated.partition(": ")
     return note if note and origin_of(note) == origin_of(word) else stated
 

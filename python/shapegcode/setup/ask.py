@@ -71,7 +71,7 @@ def ask_all() -> Answers:
 
 
 def _alone(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """An answer with the other answers that it needs."""
+    """One answer, together with those without which it cannot be evaluated."""
     needed = {"delivery", "dnc_baud"} if name == "dnc_baud" else {name}
     return {key: given[key] for key in needed if key in given}
 

@@ -46,7 +46,7 @@ class MotionEnvelope:
             self._merge()
 
     def _merge(self) -> None:
-        """Join pairs of intervals; an odd last one goes back to the waiting samples."""
+        """Merge intervals in pairs; a last one without a partner goes back to the samples not yet in one."""
         pairs = len(self._low) // 2
         if len(self._low) % 2:
             # Its two extremes represent it until its interval is full.

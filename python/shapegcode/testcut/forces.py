@@ -201,7 +201,7 @@ class ForceModel:
         return CuttingLaw(factors[0], k1_exponent, factors[1], k2_exponent, k_te, k_re, self.thickness)
 
     def forces(self, law: CuttingLaw) -> FloatArray:
-        """Mean forces, (n, 2 or 3): along the feed, to its left; of the torque at the radius, if it was measured."""
+        """Mean forces, (n, 2 or 3): along the feed, to its left; torque over tool radius, if torque was measured."""
         found = np.zeros(self.measured.shape)
         for speed, at, met in _by_speed(self.data):
             forces = ForceLaw(self.tool, law, speed, self.depth).forces(met, self.data.feed_mm_per_min[at])

@@ -112,7 +112,7 @@ class TaperResult(Result):
         machine: name of the machine.
         cutting: the table ``[cutting]`` for the tool file.
         coefficients: each with its interval; the factors are for a chip 1 mm thick.
-        at_chip: k1 and k2 at the mean measured chip, known much better.
+        at_chip: k1 and k2 at the mean measured chip thickness, known much more precisely than the factors.
         chip_mm: range of the mean chip thickness.
         mean_forces: number of mean forces in the fit.
         outliers: number of ignored ones, whose force deviates from the others.

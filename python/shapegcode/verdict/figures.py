@@ -331,7 +331,7 @@ class LimitCheck:
 
 
 def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]]]]:
-    """Key of every mode with an uncertainty, with the names and shifts of its cases."""
+    """Key of every mode with an uncertainty, with name and relative frequency shift of each of its conditions."""
     found = []
     for axis, table in zip("XYZ", machine.axes.as_tuple(), strict=True):
         for number, mode in enumerate(table.modes, start=1):
@@ -438,12 +438,12 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         Column("verdict", value=lambda case: _verdict(case, case is worst), left=True),
     )
     shown = sum(not case.counts for case in cases)
-    brackets = "; a verdict in brackets does not count" if shown else ""
+    brackets = "; a verdict in brackets does not" if shown else ""
     return Table(
         "operating conditions: residual X Y Z, contour error of command and machine table, µm",
         columns,
         cases,
-        caption=f"{len(cases) - shown} of {len(cases)} operating conditions count{brackets} ([verdict]); "
+        caption=f"{len(cases) - shown} of {len(cases)} operating conditions count (table [verdict]){brackets}; "
         "ceil, carry: block timing (controller.block_end)",
         row_style=lambda case: _style(case, case is worst),
     )

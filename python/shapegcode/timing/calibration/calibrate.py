@@ -203,7 +203,7 @@ def _left_out(
     machine: Machine,
     rate: float,
 ) -> dict[int, _Calibration]:
-    """For each run, a calibration with the others."""
+    """Calibration for each run, from the runs outside its fold (cross-validation)."""
     found: dict[int, _Calibration] = {}
     for fold in folds:
         rest = [run for run in runs if run not in fold]

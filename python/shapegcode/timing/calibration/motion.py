@@ -109,7 +109,7 @@ _NO_LIMIT = 1e6  # mm/s²
 
 @dataclass(frozen=True)
 class MotionFit:
-    """A family with fitted parameters."""
+    """One kind of look-ahead with its fitted parameters."""
 
     family: LookAhead
     values: dict[str, float]  # parameters by name, in mm, s and rad

@@ -327,7 +327,7 @@ def _lines(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) 
 
 
 def _compare_tools(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) -> None:
-    """Compare the logged tools with those called by the program; numbers of another kind are noted."""
+    """Compare the logged tools with those called by the program; note it if the log numbers tools in another way."""
     if log.tool is None:
         return
     called = {int(tool) for tool in timed.tools if tool >= 0}
@@ -344,7 +344,7 @@ def _compare_tools(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: lis
     said = f"tool {value} in the spindle at line {at}, but the program has T{min(here)}"
     if len(wrong) > 1 and all(each[0] in called for each in wrong):
         raise RecordError(f"{log.source}: {said}: it is not the log of this version of {entry.program.name}")
-    notes.append(f"{said}: numbers of another kind, or of a tool that was there before the start")
+    notes.append(f"{said}: the log numbers tools in another way, or the tool was in the spindle before the start")
 
 
 def _rising(line: IntArray) -> npt.NDArray[np.bool_]:
