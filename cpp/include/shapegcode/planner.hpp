@@ -20,8 +20,8 @@ struct TrajectoryLimits {
 
 /// Set-points of a whole path from rest to rest, one per period: nearly as fast as speed, acceleration and jerk of
 /// every axis and the programmed feeds allow. The differences of the set-points keep the limits to a factor of 1.001,
-/// the end is reached to the last bit, and the motion stops at segments with `stop_at_end`. Bit for bit the set-points of
-/// a MotionController without filters that plans in step(), if all segments are pushed at once and its window holds
+/// the end is reached to the last bit, and the motion stops at segments with `stop_at_end`. Bit for bit the set-points
+/// of a MotionController without filters that plans in step(), if all segments are pushed at once and its window holds
 /// them. Method: docs/concepts/time_optimal.md.
 ///
 /// Throws Error(argument) on limits that are not above zero and finite, a tolerance below zero, a segment without a
