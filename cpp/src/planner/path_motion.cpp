@@ -11,6 +11,8 @@ constexpr double rounding = 1e-9;
 // Candidates of the jerk that are tried, and halvings between the best of them and the next.
 constexpr int candidates = 12;
 constexpr int halvings = 9;
+// A slow feed asks for far less than the limit of the jerk.
+constexpr int halvings_from_rest = 48;
 // Of the jerk that ends at a speed.
 constexpr int halvings_to_speed = 28;
 // So many landings are tried, each a little longer, and within so many stopping lengths.
@@ -212,7 +214,7 @@ bool PathMotion::choose(double wish, double end, double& jerk) const noexcept {
   for (const double candidate : {jerk_, -state_.acceleration / period_s_, 0.0}) look(candidate);
   if (!found) look_towards(end == jerks_.low ? jerks_.high : jerks_.low);
   if (!found) return false;
-  for (int n = 0; n < halvings; ++n) {
+  for (int n = 0; n < halvings || (n < halvings_from_rest && right == 0.0 && at_rest()); ++n) {
     const double middle = 0.5 * (wrong + right);
     (controllable(middle) ? right : wrong) = middle;
   }

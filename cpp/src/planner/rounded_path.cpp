@@ -255,6 +255,11 @@ double RoundedPath::feed_of(const PlannedSegment& entry) const noexcept {
   return std::min(entry.programmed * entry.feed_share * ratios_.of(entry), entry.max_speed);
 }
 
+// Of the last interval before a stop: what some periods of a constant jerk make of it, or less if the feed is slow.
+double RoundedPath::stopping_length(const PlannedSegment& entry) const noexcept {
+  return std::min(stopping_length_, feed_of(entry) * stopping_periods * period_s_ / 3.0);
+}
+
 // How far it is to the next stop, as far as that matters.
 double RoundedPath::to_stop() const noexcept {
   for (std::uint64_t i = segment_; (*ring_)[i].distance <= x_ + 4.0 * widest_mm; ++i) {
@@ -334,7 +339,7 @@ double RoundedPath::step() const noexcept {
     step = std::min(step, radians_of_arc / bend);
   }
   speed = std::min(speed, std::sqrt(squared_speed()));
-  step = std::min(step, std::max(periods_of_interval * period_s_ * speed, stopping_length_));
+  step = std::min(step, std::max(periods_of_interval * period_s_ * speed, stopping_length(entry)));
   see_roundings([&](const PlannedSegment& junction, bool) {
     const double d = junction.half_width;
     if (d > 0.0 && x_ >= junction.distance - d - shortest_mm && x_ < junction.distance + d - shortest_mm) {
@@ -370,9 +375,10 @@ bool RoundedPath::next(Station& station) noexcept {
     length = std::min(length, std::max(share_before_stop * (end_of(segment_) - x_), least));
   }
   const double left = to_stop();
-  if (left > stopping_length_ + shortest_mm) {
-    length = std::min(length, std::max(share_before_stop * (left - stopping_length_), stopping_length_));
-    end = std::min(end, x_ + left - stopping_length_);
+  const double stopping_mm = stopping_length((*ring_)[segment_]);
+  if (left > stopping_mm + shortest_mm) {
+    length = std::min(length, std::max(share_before_stop * (left - stopping_mm), stopping_mm));
+    end = std::min(end, x_ + left - stopping_mm);
   }
   const double room = end - x_;
   if (length < room) end = x_ + room / std::ceil(room / length);

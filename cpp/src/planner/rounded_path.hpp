@@ -53,6 +53,7 @@ class RoundedPath {
   [[nodiscard]] double end_of(std::uint64_t segment) const noexcept;
   [[nodiscard]] bool starts_anew(std::uint64_t segment) const noexcept;
   [[nodiscard]] bool ends_in_stop(std::uint64_t segment) const noexcept;
+  [[nodiscard]] double stopping_length(const PlannedSegment& entry) const noexcept;
   [[nodiscard]] double to_stop() const noexcept;
   [[nodiscard]] double next_break() const noexcept;
   [[nodiscard]] double squared_speed() const noexcept;
