@@ -281,7 +281,8 @@ void OnlinePlanner::rest_first(const PathPoint& from) noexcept {
   const bool is_settled = settled_ && periods_ahead() <= 0;
   const bool is_stop = (*ring_)[from.segment].stop && from.offset <= 0.0;
   const int needed = is_stop ? rest_at(from) - (is_settled ? rules_.settling_periods : 0) : 0;
-  settle_ = !has_motion_ || motion_.at_end() ? needed : std::min(settle_, needed);
+  const bool was_planned = has_motion_ && !motion_.at_end() && !motion_.has_strayed();
+  settle_ = was_planned ? std::min(settle_, needed) : needed;
 }
 
 bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const FeedRatios& asked) {

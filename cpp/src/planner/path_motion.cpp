@@ -361,19 +361,16 @@ void PathMotion::move(double jerk, double time_s) noexcept {
   jerk_ = jerk;
   pass(travel);
   const bool is_slow = state_.speed < no_speed && std::abs(state_.acceleration) * period_s_ < no_speed;
-  if (t < time_s || is_slow || (state_.speed <= 0.0 && state_.acceleration < 0.0)) come_to_standstill();
-}
-
-void PathMotion::come_to_standstill() noexcept {
-  state_ = {};
-  jerk_ = 0.0;
+  if (t < time_s || is_slow || (state_.speed <= 0.0 && state_.acceleration < 0.0)) come_to_rest();
 }
 
 void PathMotion::come_to_rest() noexcept {
-  come_to_standstill();
+  state_ = {};
+  jerk_ = 0.0;
   if (plan_->ends_in_stop(station_) && offset_ >= plan_->station(station_).length - no_travel_mm) {
     ++station_;
     offset_ = 0.0;
+    landing_ = {};  // what is left of it is rounding
   }
 }
 

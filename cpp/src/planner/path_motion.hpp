@@ -80,7 +80,6 @@ class PathMotion {
   void fly_on() noexcept;
   void move(double jerk, double time_s) noexcept;
   void pass(double travel) noexcept;
-  void come_to_standstill() noexcept;
   void come_to_rest() noexcept;
   void keep_to(double jerk) noexcept;
   bool returns() noexcept;
