@@ -165,3 +165,46 @@ TEST_CASE("where the feed falls in steps the motion never gets faster, whatever 
     }
   }
 }
+
+TEST_CASE("a feed begins, however slow it is") {
+  for (const Dynamics& dynamics : {Dynamics{1000.0, 5e5}, Dynamics{5000.0, 5e5}, Dynamics{1000.0, 1e9}}) {
+    for (const double feed : {0.1, 0.05, 0.02}) {
+      for (const double length : {0.001, 0.05}) {
+        CAPTURE(dynamics.jerk);
+        CAPTURE(feed);
+        CAPTURE(length);
+        const std::vector<Vector3> points = planned_as_a_whole(row_of_lines({length}, {feed}), dynamics);
+        REQUIRE(points.back()[0] == length);
+        // To reach it and to stop takes some periods.
+        CHECK(static_cast<double>(points.size()) * period_s <= length / feed + 0.06);
+        for_speeds(points, 0.0, length, [&](double speed) { REQUIRE(speed <= 1.001 * feed); });
+      }
+    }
+  }
+}
+
+TEST_CASE("set-points keep the feed where an arc is rounded into its lines") {
+  const double feed = 5.0;
+  const double sweep = 0.9 * std::numbers::pi;
+  for (const double radius : {0.05, 0.1, 1.0}) {
+    for (const double tolerance : {0.01, 0.05, 0.2}) {
+      CAPTURE(radius);
+      CAPTURE(tolerance);
+      const Vector3 begin(5.0, 0.0, 0.0);
+      const Vector3 centre = begin + Vector3(0.0, radius, 0.0);
+      const Vector3 end = centre + radius * Vector3(std::sin(sweep), -std::cos(sweep), 0.0);
+      const std::vector<Segment> segments{
+          make_line(Vector3::Zero(), begin, feed), make_arc(begin, end, centre, sweep, 2, feed),
+          make_line(end, end + 5.0 * Vector3(std::cos(sweep), std::sin(sweep), 0.0), feed)};
+      TrajectoryLimits limits;
+      limits.max_feed_mm_per_s.setConstant(250.0);
+      limits.max_acceleration_mm_per_s2.setConstant(5000.0);
+      limits.max_jerk_mm_per_s3.setConstant(1e6);
+      limits.contour_tolerance_mm = tolerance;
+      const Samples samples = time_optimal_trajectory(Path(segments), limits, period_s);
+      const auto count = samples.positions_mm.rows();
+      const auto steps = samples.positions_mm.bottomRows(count - 1) - samples.positions_mm.topRows(count - 1);
+      CHECK(steps.rowwise().norm().maxCoeff() <= 1.001 * feed * period_s);
+    }
+  }
+}

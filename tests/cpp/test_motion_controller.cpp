@@ -497,3 +497,39 @@ TEST_CASE("what leaves the control is within the contour tolerance, with a shape
     }
   }
 }
+
+TEST_CASE("behind a shaper an exact stop is reached, however short the lines and however high the jerk") {
+  for (unsigned seed = 0; seed < trials(1200); ++seed) {
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    const auto draw = [&](double low, double high) {
+      return std::pow(10.0, std::uniform_real_distribution<double>(low, high)(random));
+    };
+    ControllerSettings settings = limited();
+    settings.period_s = 0.001 * (1 << (seed % 3));
+    const double acceleration = draw(2.7, 3.8);
+    settings.limits.max_acceleration_mm_per_s2.setConstant(acceleration);
+    settings.limits.max_jerk_mm_per_s3.setConstant(
+        std::min(acceleration * draw(1.3, 3.0), acceleration / settings.period_s));
+    settings.shaper = Fir({0, 2 + static_cast<int>(seed % 23)}, {0.52, 0.48});
+    MotionController control(settings);
+    const double length = draw(-3.5, -0.5);
+    const double feed = draw(-0.5, 2.0);
+    std::vector<Vector3> stops;
+    Vector3 end = Vector3::Zero();
+    for (int i = 0; i < 13; ++i) {
+      const Vector3 start = end;
+      end[i % 2] += length;
+      Segment line = make_line(start, end, feed);
+      line.stop_at_end = random() % 5 < 2 || i == 12;
+      if (line.stop_at_end) stops.push_back(end);
+      REQUIRE(control.push(line) == PushResult::accepted);
+    }
+    const Run run = run_until_idle(control);
+    for (const Vector3& stop : stops) {
+      double off = length;
+      for (const Vector3& point : run.set_points) off = std::min(off, (point - stop).cwiseAbs().maxCoeff());
+      CHECK(off <= 1e-9);
+    }
+  }
+}

@@ -33,6 +33,8 @@ constexpr double least_gain_s = 1e-5;
 constexpr std::size_t most_changed = 256;
 // An interval is coarse over which the jerk can change the speed by more than this share.
 constexpr double coarse_share = 0.2;
+// Relative, of the length of a direction.
+constexpr double direction_rounding = 1e-9;
 // Of an interval at rest, mm/s.
 constexpr double least_speed = 1e-9;
 
@@ -103,15 +105,20 @@ void PathPlan::make_stations() {
   Station station;
   while ((grows_ || count_ + 1 < stations_.size()) && path_.next(station)) {
     if (count_ + 1 == stations_.size()) resize(2 * stations_.size());
-    // What the axes and the filters behind allow.
+    // What the axes and the filters behind allow; and the feed, where X, Y and Z move further than the path does.
     const Derivatives begin = derivatives(station, 0.0);
-    for (const Derivatives& path : {begin, derivatives(station, station.length)}) {
+    const double feed = station.speed_limit;
+    double longest = 1.0;
+    for (const Derivatives& path :
+         {begin, derivatives(station, 0.5 * station.length), derivatives(station, station.length)}) {
+      longest = std::max(longest, Vector3(path.first[0], path.first[1], path.first[2]).norm());
       station.speed_limit = std::min(station.speed_limit, along(path.first, limits_at(station).speed, axes()));
       if (max_across_ < no_limit) {
         const double bend = Vector3(path.second[0], path.second[1], path.second[2]).norm();
         if (bend > 0.0) station.speed_limit = std::min(station.speed_limit, std::sqrt(max_across_ / bend));
       }
     }
+    if (longest > 1.0 + direction_rounding) station.speed_limit = std::min(station.speed_limit, feed / longest);
     const double jerk = highest_jerk(station, begin);
     if (station.straight) {
       station.max_acceleration = steepest(station, begin);
