@@ -193,7 +193,7 @@ struct ControllerState {
   std::uint64_t segments_waiting = 0;
   std::uint64_t steps = 0;
   std::uint64_t starvations = 0;       ///< how often the queue ran empty
-  std::uint64_t late_plans = 0;        ///< how often the motion slowed down because planning was late
+  std::uint64_t late_plans = 0;        ///< how often the motion slowed down because no section was planned in time
   double set_point_distance_mm = 0.0;  ///< `distance_mm` and `line` of the last set-point, which has come
   std::uint64_t set_point_line = 0;    ///< through smoothing and shaper: `delay_periods()` later, rounded
   std::uint64_t travel_stops = 0;      ///< how often the control was held because the path would have left the travel

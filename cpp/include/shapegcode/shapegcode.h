@@ -187,7 +187,7 @@ typedef struct shapegcode_state {
   uint64_t segments_waiting;
   uint64_t steps;
   uint64_t starvations;          ///< how often the queue ran empty
-  uint64_t late_plans;           ///< how often the motion slowed down because planning was late
+  uint64_t late_plans;           ///< how often the motion slowed down because no section was planned in time
   uint64_t travel_stops;         ///< how often the control was held because the path would have left the travel
   double set_point_distance_mm;  ///< `distance_mm` and `line` of the last set-point, which has come through
   uint64_t set_point_line;       ///< smoothing and shaper: shapegcode_controller_delay() periods later, rounded

@@ -67,19 +67,21 @@ class Polygon {
 
   // Corners are left out where that costs the least area: what remains lies within.
   void simplify(std::size_t most) noexcept {
-    auto& [count, b, a, checked] = *corners_;
-    while (count > most) {
+    Corners& now = *corners_;
+    auto& b = now.b;
+    auto& a = now.a;
+    while (now.count > most) {
       std::size_t fastest = 0;
-      for (std::size_t i = 1; i < count; ++i) {
+      for (std::size_t i = 1; i < now.count; ++i) {
         if (b[i] > b[fastest] || (b[i] == b[fastest] && a[i] > a[fastest])) fastest = i;
       }
       std::size_t least_at = 0;
       double least = no_limit;
-      for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t i = 0; i < now.count; ++i) {
         // Without these a motion could not begin, or not go on at its highest speed.
         if (b[i] <= at_rest || i == fastest) continue;
-        const std::size_t before = i == 0 ? count - 1 : i - 1;
-        const std::size_t after = i + 1 == count ? 0 : i + 1;
+        const std::size_t before = i == 0 ? now.count - 1 : i - 1;
+        const std::size_t after = i + 1 == now.count ? 0 : i + 1;
         const double area =
             std::abs((b[i] - b[before]) * (a[after] - a[before]) - (a[i] - a[before]) * (b[after] - b[before]));
         if (area < least) {
@@ -87,12 +89,12 @@ class Polygon {
           least_at = i;
         }
       }
-      for (std::size_t i = least_at; i + 1 < count; ++i) {
+      for (std::size_t i = least_at; i + 1 < now.count; ++i) {
         b[i] = b[i + 1];
         a[i] = a[i + 1];
-        checked[i] = checked[i + 1];
+        now.checked[i] = now.checked[i + 1];
       }
-      --count;
+      --now.count;
     }
   }
 
