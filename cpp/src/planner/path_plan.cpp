@@ -107,16 +107,21 @@ void PathPlan::make_stations() {
     if (count_ + 1 == stations_.size()) resize(2 * stations_.size());
     // What the axes and the filters behind allow; and the feed, where X, Y and Z move further than the path does.
     const Derivatives begin = derivatives(station, 0.0);
+    const AxisLimits limits = limits_at(station);
     const double feed = station.speed_limit;
     double longest = 1.0;
-    for (const Derivatives& path :
-         {begin, derivatives(station, 0.5 * station.length), derivatives(station, station.length)}) {
+    const auto slow_down = [&](const Derivatives& path) {
       longest = std::max(longest, Vector3(path.first[0], path.first[1], path.first[2]).norm());
-      station.speed_limit = std::min(station.speed_limit, along(path.first, limits_at(station).speed, axes()));
+      station.speed_limit = std::min(station.speed_limit, along(path.first, limits.speed, axes()));
       if (max_across_ < no_limit) {
         const double bend = Vector3(path.second[0], path.second[1], path.second[2]).norm();
         if (bend > 0.0) station.speed_limit = std::min(station.speed_limit, std::sqrt(max_across_ / bend));
       }
+    };
+    slow_down(begin);
+    if (!station.straight) {
+      slow_down(derivatives(station, 0.5 * station.length));
+      slow_down(derivatives(station, station.length));
     }
     if (longest > 1.0 + direction_rounding) station.speed_limit = std::min(station.speed_limit, feed / longest);
     const double jerk = highest_jerk(station, begin);
