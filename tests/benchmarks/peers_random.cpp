@@ -25,6 +25,7 @@ using tests::Outcome;
 using tests::Trial;
 
 constexpr double allowed_ratio = 1.001;
+constexpr double allowed_segment_s = 10.0;  // the longest segments take some seconds
 constexpr std::size_t most_steps = 20'000'000;
 constexpr std::uint32_t wide_each = 20;  // these take twenty times as long
 constexpr std::array order_names{"speed", "acceleration", "jerk"};
@@ -36,6 +37,7 @@ void write_step(std::FILE* trace, const ControllerState& state) {
 }
 
 void write_path(std::FILE* trace, const Trial& trial) {
+  fmt::print(trace, "# {}\n", tests::text_of(trial.settings));
   for (std::size_t i = 0; i < trial.segments.size(); ++i) {
     const Segment& segment = trial.segments[i];
     fmt::print(trace, "# {} {} of {:.17g} mm to {:.17g}, radius {:.17g} sweep {:.17g}, feed {:.17g}{}; {:.17g}\n", i,
@@ -52,10 +54,18 @@ struct Summary {
   std::array<double, 3> worst{};
   std::array<std::uint32_t, 3> seed{};
   std::array<std::size_t, 3> above{};
+  double longest_segment_s = 0.0;
+  std::uint32_t longest_seed = 0;
+  std::size_t crawls = 0;
 
   void add(const Outcome& outcome, std::uint32_t of_seed) {
     ++paths;
     lost += outcome.ended && outcome.arrived ? 0 : 1;
+    crawls += outcome.longest_segment_s > allowed_segment_s ? 1 : 0;
+    if (outcome.longest_segment_s > longest_segment_s) {
+      longest_segment_s = outcome.longest_segment_s;
+      longest_seed = of_seed;
+    }
     for (std::size_t order = 0; order < worst.size(); ++order) {
       above[order] += outcome.worst[order] > allowed_ratio ? 1 : 0;
       if (outcome.worst[order] <= worst[order]) continue;
@@ -69,7 +79,8 @@ struct Summary {
       std::printf(", \"%s\": {\"worst\": %.7f, \"seed\": %u, \"above\": %zu}", order_names[order], worst[order],
                   seed[order], above[order]);
     }
-    std::printf("}");
+    std::printf(", \"segment_s\": {\"worst\": %.3f, \"seed\": %u, \"above\": %zu}}", longest_segment_s, longest_seed,
+                crawls);
   }
 };
 
@@ -77,6 +88,10 @@ struct Summary {
 void tell(const Outcome& outcome, const Trial& trial, std::uint32_t seed, bool always) {
   bool wrong = !outcome.ended || !outcome.arrived;
   if (wrong) std::fprintf(stderr, "seed %u: %s\n", seed, outcome.ended ? "at rest elsewhere" : "not at rest at last");
+  if (outcome.longest_segment_s > allowed_segment_s) {
+    std::fprintf(stderr, "seed %u: %.1f s in one segment\n", seed, outcome.longest_segment_s);
+    wrong = true;
+  }
   for (std::size_t order = 0; order < order_names.size(); ++order) {
     if (outcome.worst[order] <= allowed_ratio) continue;
     std::fprintf(stderr, "seed %u: %s at %.6f of its limit\n", seed, order_names[order], outcome.worst[order]);
@@ -101,10 +116,10 @@ int random_motion(std::span<const char* const> arguments) {
     const auto see = [&](const ControllerState& state) {
       if (trace != nullptr) write_step(trace, state);
     };
+    if (trace != nullptr) write_path(trace, trial);
     const Outcome outcome = tests::run_trial(trial, seed, see, most_steps);
     (std::holds_alternative<FollowingFir>(trial.settings.shaper) ? following : fixed).add(outcome, seed);
     tell(outcome, trial, seed, count == 1);
-    if (trace != nullptr) write_path(trace, trial);
     steps += outcome.steps;
     turns += outcome.turns;
     holds += outcome.holds;

@@ -169,6 +169,8 @@ Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<vo
   ratios.add(out);
   Outcome outcome;
   std::size_t pushed = 0;
+  std::uint64_t segment = 0;
+  std::size_t segment_begin = 0;
   while (outcome.steps < max_steps && !outcome.ended) {
     const bool alone = outcome.steps >= trial.does.leaves;
     while (pushed < trial.segments.size() && (alone || draw.chance(trial.does.push))) {
@@ -197,6 +199,13 @@ Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<vo
     ratios.add(out);
     if (see) see(control.state());
     ++outcome.steps;
+    if (alone) {
+      const std::uint64_t now = control.state().segments_done;
+      if (now != segment || outcome.steps == trial.does.leaves + 1) segment_begin = outcome.steps;
+      segment = now;
+      const double time_s = trial.settings.period_s * static_cast<double>(outcome.steps - segment_begin);
+      outcome.longest_segment_s = std::max(outcome.longest_segment_s, time_s);
+    }
     const bool idle = activity == Activity::idle && pushed == trial.segments.size();
     outcome.ended = idle || activity == Activity::aborted;
     const Vector3 end = trial.segments.back().end_mm;

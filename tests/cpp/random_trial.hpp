@@ -51,6 +51,7 @@ inline constexpr std::size_t max_steps_of_trial = 1'000'000;
 struct Outcome {
   std::array<double, 3>
       worst{};  ///< largest speed, acceleration and jerk of any axis (finite differences), over its limit
+  double longest_segment_s = 0.0;  ///< time in one segment after the operator has left
   std::size_t steps = 0;
   std::size_t turns = 0;
   std::size_t holds = 0;

@@ -20,6 +20,7 @@ void keeps_its_limits(std::uint32_t seed, const Trial& trial, std::size_t max_st
   CHECK(outcome.worst[2] <= 1.001);
   CHECK(outcome.ended);
   CHECK(outcome.arrived);
+  CHECK(outcome.longest_segment_s <= 10.0);
 }
 
 // All of them, for each was a fault once; the first one under sanitizers.
@@ -52,6 +53,10 @@ TEST_CASE("limits are kept where the override is raised between the two sides of
 
 TEST_CASE("limits are kept while a shaper follows a position") {
   for (const std::uint32_t seed : some_of({11U, 282U, 373U, 1148U, 1770U, 3026U, 4449U, 4888U})) keeps_its_limits(seed);
+}
+
+TEST_CASE("a segment behind a corner at which filters leave the tolerance is not crawled through") {
+  for (const std::uint32_t seed : some_of({842U})) keeps_its_limits(seed);
 }
 
 TEST_CASE("a crawl around a corner is no longer than it has to be") {

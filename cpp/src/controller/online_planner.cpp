@@ -482,7 +482,10 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
       PlannedSegment& less = (*ring_)[i];
       if (is_faster) less.feed_share *= feed / speed;
       const double most = std::max(beyond, off_path);
-      if (most > kept) less.limit_share *= std::max(most_less, 1.0 / most);
+      // With the motion under way still less does not help: what is beyond them has its cause in what is fixed.
+      if (most > kept && (!is_moving || less.limit_share >= least_share)) {
+        less.limit_share *= std::clamp(1.0 / most, most_less, least_less);
+      }
       // What is still beyond them when little is planned is run from rest to rest.
       if (less.limit_share < least_share && !less.is_fixed && !plan_.is_covered(i)) less.stop = true;
     }

@@ -12,8 +12,10 @@ namespace shapegcode {
 inline constexpr double planned_share = 0.9998;
 inline constexpr double kept = 1.0009;
 inline constexpr double kept_feed = 1.0009;
-/// Beyond that less is planned around there, at least so much of it at once; below the second from rest to rest.
+/// Beyond that less is planned around there: at once at most by the first factor and at least by the second; below the
+/// share from rest to rest.
 inline constexpr double most_less = 0.7;
+inline constexpr double least_less = 0.97;
 inline constexpr double least_share = 0.3;
 
 [[nodiscard]] inline AxisLimits planned_limits(const AxisLimits& asked, double period_s) noexcept {
