@@ -61,15 +61,16 @@ void register_errors(py::module_& module) {
   const py::object base = py::reinterpret_steal<py::object>(
       make_type(module, "ShapegcodeError", py::make_tuple(exception), "Base of every error that shapegcode raises."));
   base.inc_ref();
-  types().program = make_type(module, "ProgramError", py::make_tuple(base),
-                              "The CNC program cannot be read; `line` and `column` count from 1, 0 if not known; "
-                              "`alarm`: FANUC's number, 0 if it has none; `file`: the text it speaks of, if another.");
+  types().program =
+      make_type(module, "ProgramError", py::make_tuple(base),
+                "The CNC program cannot be read. `line` and `column` count from 1 (0: not known); `alarm`: FANUC's "
+                "number (0: none); `file`: name of its file (empty: the program itself).");
   module.attr("ProgramError").attr("line") = 0;
   module.attr("ProgramError").attr("column") = 0;
   module.attr("ProgramError").attr("alarm") = 0;
   module.attr("ProgramError").attr("file") = "";
   types().design = make_type(module, "DesignError", py::make_tuple(base),
-                             "The shaper asked for does not exist, or not on this grid.");
+                             "The requested shaper does not exist, or not on this grid.");
   types().argument =
       make_type(module, "ArgumentError", py::make_tuple(base, value_error), "A value is outside its stated range.");
   types().numeric =

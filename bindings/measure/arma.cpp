@@ -17,7 +17,7 @@ For a free decay the force is a unit impulse at the first sample. Source: paper 
           "phi_1 ... phi_2n, shape (2n,): lambda^2n - phi_1 lambda^(2n-1) - ... = 0 gives the poles.")
       .def_property_readonly(
           "numerator", [](const py::object& self) { return view(self.cast<const Arma&>().numerator, self); },
-          "b_0, b_1, ...: shape (1, 2n+1) of taps, (records, 2n) of free decays.")
+          "b_0, b_1, ...: shape (1, 2n+1) for impacts, (records, 2n) for free decays.")
       .def_property_readonly(
           "theta", [](const py::object& self) { return view(self.cast<const Arma&>().theta, self); },
           "theta_k = -b_k/b_0, one column less than the numerator; nan where b_0 is 0.")
@@ -42,13 +42,13 @@ void define_arma_fits(py::module_& m) {
         return arma_driven(taps, n_modes, plain);
       },
       py::arg("forces"), py::arg("responses"), py::arg("n_modes"), py::arg("plain") = false,
-      R"(ARMA model of one or several taps of the same point, by iterated least squares.
+      R"(ARMA model of one or several impacts at the same point, by iterated least squares.
 
 Args:
-    forces: Force per tap in N, each of shape (n,), at rest at the first sample.
-    responses: Response per tap at the same instants, each of shape (n,); poles and numerator are common.
+    forces: Force per impact in N, each of shape (n,); the structure is at rest at the first sample.
+    responses: Response per impact at the same instants, each of shape (n,); poles and numerator are common.
     n_modes: Number of modes, 1 to 50; the model has 2*n_modes poles and 2*n_modes+1 numerator terms.
-    plain: One round of unfiltered least squares, which noise bends, instead of the iterated one.
+    plain: One round of unfiltered least squares instead of the iteration; noise biases its poles.
 
 Returns:
     The model whose phi converged, or the best of all rounds with converged False.
@@ -67,15 +67,15 @@ Source: K. Steiglitz, L. McBride 1965; paper 003, eq. 1.)");
         return arma_decay(records, n_modes, plain);
       },
       py::arg("responses"), py::arg("n_modes"), py::arg("plain") = false,
-      R"(ARMA model of one or several free decays: common poles, each record's own initial state.
+      R"(ARMA model of one or several free decays: common poles, a separate initial state for each record.
 
 Args:
     responses: Response per decay, each of shape (n,), in any unit.
     n_modes: Number of modes, 1 to 50.
-    plain: One round of unfiltered least squares instead of the iterated one.
+    plain: One round of unfiltered least squares instead of the iteration.
 
 Returns:
-    The model, as from arma_driven with a unit impulse at the first sample for the force.
+    The model, as from arma_driven with a unit impulse at the first sample as force.
 
 Raises:
     ArgumentError: As arma_driven.
@@ -93,7 +93,7 @@ void define_poles(py::module_& m) {
             py::make_tuple(array_of(modes.omega_rad_s), array_of(modes.damping_ratio)));
       },
       py::arg("poles"), py::arg("period_s"),
-      R"(Natural frequencies and damping ratios of discrete poles: complex pairs that are stable, ascending.
+      R"(Natural frequencies and damping ratios of discrete poles: stable complex pairs, ascending in frequency.
 
 omega = |ln lambda|/period, zeta = -Re(ln lambda)/|ln lambda|.
 
@@ -123,10 +123,10 @@ Source: paper 003, eq. 5-6.)");
         return orders;
       },
       py::arg("responses"), py::arg("n_max"), py::arg("forces") = py::none(),
-      R"(Poles of models with 1 ... n_max modes, for a stabilisation chart and for starts. Quick.
+      R"(Poles of models with 1 ... n_max modes, for a stabilisation chart and as starts of a fit.
 
-All orders are read off one covariance matrix of the free decay (ESPRIT); of taps the decay is the correlation of
-response with force, which weighs all taps.
+All orders follow from one covariance matrix of the free decay (ESPRIT). For impacts the decay is the correlation of
+response with force, in which each impact is weighted by its force.
 
 Args:
     responses: Response per record, each of shape (n,).

@@ -42,11 +42,11 @@ Args:
     omega_rad_s: Starts, undamped natural frequencies in rad/s, shape (n_modes,), below Nyquist.
     damping_ratio: Starts, 0 < zeta < 1, shape (n_modes,).
     with_offset: Fit a constant offset per record.
-    coloured_residuals: Covariance that holds for residuals correlated over time (stationary) as well.
+    coloured_residuals: The covariance also holds for residuals that are correlated over time (stationary noise).
     most_iterations: Steps after which the search gives up, with converged False.
 
 Returns:
-    The fit; look at converged and reason before use.
+    The fit; check converged and reason before use.
 
 Raises:
     ArgumentError: As fit_modes.

@@ -11,9 +11,9 @@ void define_mass(py::module_& m) {
   py::class_<EquivalentMass>(m, "EquivalentMass", "Mass whose simulated response has the measured RMS.")
       .def_readonly("mass_kg", &EquivalentMass::mass_kg, "Equivalent mass in kg.")
       .def_readonly("measured_rms", &EquivalentMass::measured_rms, "RMS of the measured response, in its unit.")
-      .def_readonly("simulated_rms", &EquivalentMass::simulated_rms, "RMS of the simulated one, in the same unit.")
+      .def_readonly("simulated_rms", &EquivalentMass::simulated_rms, "RMS of the simulated response, in the same unit.")
       .def_readonly("halvings", &EquivalentMass::halvings,
-                    "How often the range was halved before its middle was right; 0 in closed form.")
+                    "Number of halvings of the range of masses; 0 in closed form.")
       .def_readonly("converged", &EquivalentMass::converged, "True if both RMS agree within the tolerance.");
 }
 
@@ -39,7 +39,7 @@ Args:
     stiffness_n_per_m: Stiffness, above 0.
     force_n: Force in N, shape (n,).
     period_s: Time between samples in s, above 0.
-    theta: Section of the step over which the acceleration is linear, at least 1; stable from 1.37 on.
+    theta: Number of periods over which the acceleration is linear, at least 1; stable from 1.37 on.
     displacement_m: At the first sample.
     velocity_m_per_s: At the first sample.
 
@@ -76,14 +76,14 @@ Args:
     omega_rad_s: Undamped natural frequency in rad/s, above 0.
     damping_ratio: 0 to 1.
     quantity: "acceleration", "velocity" or "displacement".
-    theta: Of the Wilson theta method.
+    theta: Parameter of the Wilson theta method, at least 1.
     impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
 
 Returns:
     The mass that makes the RMS of simulated and measured response equal.
 
 Raises:
-    ArgumentError: A value outside its range, or a force or response that is zero throughout.
+    ArgumentError: A value outside its range, a response that is zero throughout, or such a force without an impulse.
 
 Source: paper 003, section 2.2.)");
 }
@@ -106,7 +106,7 @@ void define_bisection(py::module_& m) {
       py::arg("force_n"), py::arg("response"), py::arg("period_s"), py::arg("omega_rad_s"), py::arg("damping_ratio"),
       py::arg("low_kg") = 1e-3, py::arg("high_kg") = 1e3, py::arg("tolerance") = 0.01, py::arg("most_halvings") = 100,
       py::arg("quantity") = "acceleration", py::arg("theta") = 1.4, py::arg("impulse_n_s") = 0.0,
-      R"(Equivalent mass by bisection: paper 003's steps 1 to 7, the check of the closed form.
+      R"(Equivalent mass by bisection: paper 003, steps 1 to 7; a check of the closed form.
 
 Args:
     force_n: Measured force in N, shape (n,).
@@ -116,17 +116,17 @@ Args:
     damping_ratio: 0 to 1.
     low_kg: Lower end of the range, above 0.
     high_kg: Upper end of the range.
-    tolerance: Of the RMS, relative to the measured one.
-    most_halvings: After which the search gives up, with converged False.
+    tolerance: Tolerance of the RMS, relative to the measured one.
+    most_halvings: Number of halvings after which the search gives up, with converged False.
     quantity: "acceleration", "velocity" or "displacement".
-    theta: Of the Wilson theta method.
+    theta: Parameter of the Wilson theta method, at least 1.
     impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
 
 Returns:
     The mass, the number of halvings and both RMS.
 
 Raises:
-    ArgumentError: A value outside its range, or a force or response that is zero throughout.
+    ArgumentError: A value outside its range, a response that is zero throughout, or such a force without an impulse.
 
 Source: paper 003, section 2.2, steps 1-7.)");
 }

@@ -13,7 +13,7 @@ namespace shapegcode::bindings {
 
 void register_follow(py::module_& module) {
   py::class_<PathFollower>(module, "PathFollower",
-                           "By how much, and in which direction, a table leaves the path that its command follows.")
+                           "Deviation vectors of a response from the path that its command follows.")
       .def(py::init([](const std::shared_ptr<Path>& path) { return std::make_unique<PathFollower>(*path); }),
            py::arg("path").none(false), "Raises ArgumentError on a path without segments.")
       .def(
@@ -25,9 +25,8 @@ void register_follow(py::module_& module) {
             return self.step(command.positions_mm, response.positions_mm);
           },
           py::arg("command_mm"), py::arg("response_mm"),
-          "The next samples of both, (k, 3), mm: from foot on the path to response, (k, 3), mm. Raises ArgumentError "
-          "on "
-          "other shapes or values that are not finite.");
+          "Takes the next samples of command and response, (k, 3), mm. Returns the vectors from the foot on the path "
+          "to the response, (k, 3), mm. Raises ArgumentError on other shapes or values that are not finite.");
   module.def(
       "thin_curves",
       [](const Eigen::VectorXd& times, const Eigen::Ref<const Eigen::MatrixXd>& values,
@@ -40,18 +39,18 @@ void register_follow(py::module_& module) {
         return py::array_t<std::int64_t>(py::array(py::cast(kept)));
       },
       py::arg("times"), py::arg("values"), py::arg("tolerances"),
-      R"(Fewer samples of curves over time, which look the same (Douglas and Peucker 1973, distance along the value).
+      R"(Selects samples of curves over time that look the same (Douglas and Peucker 1973, distance along the value).
 
 Args:
-    times: Of the rows, (n,), rising.
+    times: Times of the rows, (n,), rising.
     values: Samples of the curves, (n, curves).
-    tolerances: How far each curve may be from a straight line between two kept samples, (curves,), above 0.
+    tolerances: Permitted distance of each curve from straight lines between selected samples, (curves,), above 0.
 
 Returns:
-    Which rows remain, rising, the first and the last among them, (k,).
+    Indices of the selected rows, ascending, including the first and the last, (k,).
 
 Raises:
-    ArgumentError: Another shape, times that do not rise, a tolerance that is not above 0, or a value that is not finite.)");
+    ArgumentError: Another shape, times that do not rise, a tolerance not above 0, or a value that is not finite.)");
 }
 
 }  // namespace shapegcode::bindings

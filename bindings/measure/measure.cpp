@@ -39,12 +39,12 @@ py::array points(const std::vector<Eigen::Vector2d>& list) {
 }
 
 void register_sections(py::module_& module) {
-  py::enum_<SectionKind>(module, "SectionKind", "What a section of a path is.")
+  py::enum_<SectionKind>(module, "SectionKind", "Kind of a section of a path.")
       .value("line", SectionKind::line, "Lines of one direction.")
       .value("arc", SectionKind::arc, "Arcs about one centre.")
       .value("curve", SectionKind::curve, "Anything else.");
 
-  py::class_<PathSection>(module, "PathSection", "A section of a path that is measured by itself.")
+  py::class_<PathSection>(module, "PathSection", "A section of a path that is measured separately.")
       .def_readonly("first", &PathSection::first, "Index of its first segment.")
       .def_readonly("last", &PathSection::last, "Index of its last segment.")
       .def_readonly("begin_mm", &PathSection::begin_mm, "Distance of its start from the path's start, mm.")
@@ -59,8 +59,8 @@ void register_sections(py::module_& module) {
       "path_sections",
       [](const std::shared_ptr<Path>& path, double short_mm) { return path_sections(*path, short_mm); },
       py::arg("path").none(false), py::arg("short_mm") = 0.5,
-      "The whole path as runs of lines of one direction and of arcs about one centre; neighbours shorter than "
-      "`short_mm` become one curve.");
+      "The whole path as sections: sequences of lines of one direction and of arcs about one centre. Successive "
+      "sequences shorter than `short_mm` are one section of the kind `curve`.");
   module.def(
       "line_sections",
       [](const std::shared_ptr<Path>& path, const std::vector<std::pair<std::uint32_t, std::uint32_t>>& ranges) {
@@ -72,12 +72,12 @@ void register_sections(py::module_& module) {
         return line_sections(*path, lines);
       },
       py::arg("path").none(false), py::arg("ranges"),
-      "The parts of a path that come from source lines, pairs of first and last. Raises ArgumentError if a range runs "
-      "backwards or two overlap.");
+      "The parts of a path that come from `ranges` of source lines, pairs of first and last line. Raises ArgumentError "
+      "if a range runs backwards or two overlap.");
 }
 
 void register_fits(py::module_& module) {
-  py::class_<CircleFit>(module, "CircleFit", "The circle of least squares of radial distance through points.")
+  py::class_<CircleFit>(module, "CircleFit", "Least-squares circle through points (radial distances).")
       .def_readonly("centre_mm", &CircleFit::centre_mm, "(2,), mm.")
       .def_readonly("radius_mm", &CircleFit::radius_mm, "mm.")
       .def_readonly("form_mm", &CircleFit::form_mm, "Largest less smallest radial distance from the circle, mm.")
@@ -100,7 +100,7 @@ void register_fits(py::module_& module) {
 
   py::class_<Roughness>(module, "Roughness", "Figures of a profile after ISO 4287.")
       .def_readonly("cutoff_mm", &Roughness::cutoff_mm, "Cut-off lambda c, mm.")
-      .def_readonly("evaluated_mm", &Roughness::evaluated_mm, "Length that the figures speak of, mm.")
+      .def_readonly("evaluated_mm", &Roughness::evaluated_mm, "Evaluation length: without one cut-off at each end, mm.")
       .def_readonly("ra_mm", &Roughness::ra_mm, "Arithmetic mean height of the roughness, mm.")
       .def_readonly("rz_mm", &Roughness::rz_mm, "Mean peak-to-valley height over sampling lengths, mm.")
       .def_readonly("wa_mm", &Roughness::wa_mm, "Arithmetic mean height of the waviness, mm.");
@@ -110,69 +110,72 @@ void register_fits(py::module_& module) {
         return vector(gaussian_low_pass(profile_of(profile), spacing_mm, cutoff_mm));
       },
       py::arg("profile_mm"), py::arg("spacing_mm"), py::arg("cutoff_mm"),
-      "Gaussian filter of ISO 16610-21: what is longer than the cut-off, (n,), mm.");
+      "Gaussian low-pass filter of ISO 16610-21: the part of a profile with wavelengths above the cut-off, (n,), mm.");
   module.def(
       "measure_roughness",
       [](const VectorArray& profile, double spacing_mm, double cutoff_mm, double lambda_s_mm) {
         return measure_roughness(profile_of(profile), spacing_mm, cutoff_mm, lambda_s_mm);
       },
       py::arg("profile_mm"), py::arg("spacing_mm"), py::arg("cutoff_mm"), py::arg("lambda_s_mm") = 0.0,
-      "Ra, Rz and Wa of an evenly spaced profile (n,), mm, one cut-off at either end left out. Raises ArgumentError if "
+      "Ra, Rz and Wa of an evenly spaced profile (n,), mm, without one cut-off at each end. Raises ArgumentError if "
       "less than one sampling length remains.");
 }
 
 void register_figures(py::module_& module) {
-  py::class_<RestVibration>(module, "RestVibration", "What a plant does while its command stands still.")
-      .def_readonly("begin_s", &RestVibration::begin_s, "The command stands still from here on, s.")
-      .def_readonly("observed_s", &RestVibration::observed_s, "For so long, s.")
+  py::class_<RestVibration>(module, "RestVibration", "Vibration of a plant while its command is at rest.")
+      .def_readonly("begin_s", &RestVibration::begin_s, "Start of the rest of the command, s.")
+      .def_readonly("observed_s", &RestVibration::observed_s, "Duration of the rest, s.")
       .def_readonly("residual_mm", &RestVibration::residual_mm, "Largest |response - command|, (3,), mm.")
       .def_readonly("settling_s", &RestVibration::settling_s,
-                    "Until |response - command| stays within the band, (3,), s; NaN where that was not seen.");
+                    "Time until |response - command| stays within the band, (3,), s; NaN if it left the band in the "
+                    "last eighth of the rest.");
 
   py::class_<WallFigures>(module, "WallFigures", "One wall of a section, or the width between both.")
       .def_readonly("least_mm", &WallFigures::least_mm, "mm.")
       .def_readonly("mean_mm", &WallFigures::mean_mm, "mm.")
       .def_readonly("largest_mm", &WallFigures::largest_mm, "mm.")
-      .def_readonly("stations", &WallFigures::stations, "Positions at which it could be measured.")
+      .def_readonly("stations", &WallFigures::stations, "Number of positions at which it could be measured.")
       .def_property_readonly("band_mm", &WallFigures::band_mm, "Largest less least, mm.");
 
-  py::class_<ArcFigures>(module, "ArcFigures", "A circle through what was moved or cut on an arc.")
+  py::class_<ArcFigures>(module, "ArcFigures", "A circle fitted to the motion or to the wall cut on an arc.")
       .def_readonly("fit", &ArcFigures::fit, "Least-squares circle.")
       .def_readonly("mean_radius_mm", &ArcFigures::mean_radius_mm, "Mean distance from the programmed centre, mm.");
 
   py::class_<SideFigures>(module, "SideFigures", "Largest distance from the path on each side of it.")
       .def_readonly("left_mm", &SideFigures::left_mm, "mm.")
       .def_readonly("right_mm", &SideFigures::right_mm, "mm.")
-      .def_readonly("above_mm", &SideFigures::above_mm, "More along Z than across the path, mm.")
-      .def_readonly("below_mm", &SideFigures::below_mm, "Likewise, mm.");
+      .def_readonly("above_mm", &SideFigures::above_mm, "Above: more along Z than across the path, mm.")
+      .def_readonly("below_mm", &SideFigures::below_mm, "Below: likewise, mm.");
 
   py::class_<SectionFigures>(module, "SectionFigures", "What was measured in one section.")
-      .def_readonly("section", &SectionFigures::section, "Where.")
-      .def_readonly("time_s", &SectionFigures::time_s, "While the command moves in it, s.")
-      .def_readonly("peak_mm", &SectionFigures::peak_mm, "Largest |response - command| while it moves, (3,), mm.")
-      .def_readonly("rest", &SectionFigures::rest, "The stop of the command in it, or None.")
+      .def_readonly("section", &SectionFigures::section, "The section.")
+      .def_readonly("time_s", &SectionFigures::time_s, "Time in which the command moves in it, s.")
+      .def_readonly("peak_mm", &SectionFigures::peak_mm, "Largest |response - command| during motion, (3,), mm.")
+      .def_readonly("rest", &SectionFigures::rest, "Worst stop of the command in it (largest residual), or None.")
       .def_readonly("command", &SectionFigures::command, "Deviation of the command from the path.")
       .def_readonly("response", &SectionFigures::response, "Deviation of the response from the path.")
-      .def_readonly("command_sides", &SectionFigures::command_sides, "The same by sides.")
-      .def_readonly("response_sides", &SectionFigures::response_sides, "The same by sides.")
+      .def_readonly("command_sides", &SectionFigures::command_sides, "Deviation of the command, by side of the path.")
+      .def_readonly("response_sides", &SectionFigures::response_sides,
+                    "Deviation of the response, by side of the path.")
       .def_readonly("command_orbit_percent", &SectionFigures::command_orbit_percent, "Orbit error; arcs only.")
       .def_readonly("response_orbit_percent", &SectionFigures::response_orbit_percent, "Orbit error; arcs only.")
-      .def_readonly("nominal_radius_mm", &SectionFigures::nominal_radius_mm, "Programmed, mm; arcs only.")
+      .def_readonly("nominal_radius_mm", &SectionFigures::nominal_radius_mm, "Programmed radius, mm; arcs only.")
       .def_readonly("turns_left", &SectionFigures::turns_left, "The left wall is the inside one; arcs only.")
       .def_readonly("nominal_centre_mm", &SectionFigures::nominal_centre_mm, "(2,) in the plane of the arc, mm.")
-      .def_readonly("command_arc", &SectionFigures::command_arc, "Circle through the command; arcs of 10 degrees on.")
+      .def_readonly("command_arc", &SectionFigures::command_arc, "Circle through the command; arcs from 10 degrees on.")
       .def_readonly("response_arc", &SectionFigures::response_arc, "Circle through the response.")
       .def_readonly("left_wall_arc", &SectionFigures::left_wall_arc, "Circle through the left wall; XY plane only.")
       .def_readonly("right_wall_arc", &SectionFigures::right_wall_arc, "Circle through the right wall.")
-      .def_readonly("left", &SectionFigures::left, "Left wall from where it should be, positive to the left.")
-      .def_readonly("right", &SectionFigures::right, "Right wall from where it should be, positive to the left.")
-      .def_readonly("width", &SectionFigures::width, "Left less right wall, with the tool's diameter.")
-      .def_readonly("left_roughness", &SectionFigures::left_roughness, "Of the left wall, or None if too short.")
-      .def_readonly("right_roughness", &SectionFigures::right_roughness, "Of the right wall, or None if too short.");
+      .def_readonly("left", &SectionFigures::left, "Left wall less the programmed wall, positive to the left.")
+      .def_readonly("right", &SectionFigures::right, "Right wall less the programmed wall, positive to the left.")
+      .def_readonly("width", &SectionFigures::width, "Left less right wall plus the tool's diameter.")
+      .def_readonly("left_roughness", &SectionFigures::left_roughness, "Roughness of the wall, or None if too short.")
+      .def_readonly("right_roughness", &SectionFigures::right_roughness,
+                    "Roughness of the wall, or None if too short.");
 
   py::class_<TrackFigures, std::shared_ptr<TrackFigures>>(module, "TrackFigures", "Figures of all samples measured.")
       .def_readonly("sections", &TrackFigures::sections, "In the order of the path.")
-      .def_readonly("duration_s", &TrackFigures::duration_s, "Until the command rests for the last time, s.")
+      .def_readonly("duration_s", &TrackFigures::duration_s, "Time until the command rests for the last time, s.")
       .def_readonly("rest", &TrackFigures::rest, "The stop at the end.")
       .def_readonly("command", &TrackFigures::command, "Deviation from the path; missed corners count.")
       .def_readonly("response", &TrackFigures::response, "Deviation from the path; missed corners count.")
@@ -181,20 +184,20 @@ void register_figures(py::module_& module) {
 }
 
 void register_options(py::module_& module) {
-  py::class_<MetrologyOptions>(module, "MetrologyOptions", "With what a run is measured.")
+  py::class_<MetrologyOptions>(module, "MetrologyOptions", "Options of SectionMetrology.")
       .def(py::init<>())
-      .def_readwrite("period_s", &MetrologyOptions::period_s, "Between two samples, s.")
-      .def_readwrite("tool_radius_mm", &MetrologyOptions::tool_radius_mm, "Of the disc that is swept, mm.")
-      .def_readwrite("station_spacing_mm", &MetrologyOptions::station_spacing_mm, "Largest, mm.")
-      .def_readwrite("band_mm", &MetrologyOptions::band_mm, "Settled is what stays within it, mm.")
-      .def_readwrite("least_rest_s", &MetrologyOptions::least_rest_s, "A shorter standstill is no stop, s.")
-      .def_readwrite("cutoff_mm", &MetrologyOptions::cutoff_mm, "Cut-off lambda c, mm; 0: by the section's length.")
+      .def_readwrite("period_s", &MetrologyOptions::period_s, "Time between two samples, s.")
+      .def_readwrite("tool_radius_mm", &MetrologyOptions::tool_radius_mm, "Radius of the disc that is swept, mm.")
+      .def_readwrite("station_spacing_mm", &MetrologyOptions::station_spacing_mm,
+                     "Largest distance of two stations, mm.")
+      .def_readwrite("band_mm", &MetrologyOptions::band_mm, "Band in which the response counts as settled, mm.")
+      .def_readwrite("least_rest_s", &MetrologyOptions::least_rest_s, "A shorter rest within the path is no stop, s.")
+      .def_readwrite("cutoff_mm", &MetrologyOptions::cutoff_mm, "Cut-off lambda c, mm; 0: as in ISO 4288.")
       .def_readwrite("lambda_s_mm", &MetrologyOptions::lambda_s_mm, "Short-wave cut-off, mm; 0: none.");
 }
 
 void register_section_metrology(py::module_& module) {
-  py::class_<SectionMetrology>(module, "SectionMetrology",
-                               "Measures what a run of samples does to the sections of a path.")
+  py::class_<SectionMetrology>(module, "SectionMetrology", "Measures a motion per section of a path, sample by sample.")
       .def(py::init([](const std::shared_ptr<Path>& path, std::vector<PathSection> sections,
                        const MetrologyOptions& options) {
              return std::make_unique<SectionMetrology>(*path, std::move(sections), options);
@@ -217,7 +220,8 @@ void register_section_metrology(py::module_& module) {
             }
           },
           py::arg("command_mm"), py::arg("response_mm"),
-          "The next samples of both, (n, 3), mm. Raises ArgumentError on other shapes or values that are not finite.")
+          "Takes the next samples of command and response, (n, 3), mm. Raises ArgumentError on other shapes or values "
+          "that are not finite.")
       .def(
           "finish",
           [](const SectionMetrology& self) {
@@ -238,10 +242,9 @@ void register_section_metrology(py::module_& module) {
                                   vector(std::move(profile.right)), point, normal);
           },
           py::arg("section"),
-          "Distance of the first station from the path's start and spacing, mm; deviation of left and right wall, "
-          "(n,), "
-          "mm, positive to the left, NaN where there is no wall; the path's points and left normals seen from above, "
-          "(n, 2).")
+          "Returns distance of the first station from the path's start, mm; spacing, mm; deviations of the left and of "
+          "the right wall, (n,), mm, positive to the left, NaN where there is no wall; the path's points and its left "
+          "normals, both seen from above, (n, 2).")
       .def_property_readonly("station_spacing_mm", &SectionMetrology::station_spacing_mm,
                              "Largest distance of two stations, mm.");
 }

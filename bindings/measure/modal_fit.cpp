@@ -8,21 +8,21 @@ namespace shapegcode::bindings {
 namespace {
 
 void define_modal_fit(py::module_& m) {
-  py::class_<ModalFit> modal(m, "ModalFit", "Modes fitted to taps by fit_modes, with their covariance.");
+  py::class_<ModalFit> modal(m, "ModalFit", "Modes fitted to impacts by fit_modes, with their covariance.");
   add_quality(modal);
   modal
       .def_property_readonly(
           "inverse_mass", [](const ModalFit& self) { return array_of(self.inverse_mass); },
-          "Residues 1/m in 1/kg, shape (n,); negative where the mode shape has opposite signs at tap and sensor.")
+          "Residues 1/m in 1/kg, shape (n,); negative where the mode shape has opposite signs at impact and sensor.")
       .def_property_readonly(
           "covariance", [](const py::object& self) { return view(self.cast<const ModalFit&>().covariance, self); },
           "Covariance, shape (3n, 3n), of omega, zeta, 1/m of the first mode, then of the second, ...")
       .def_property_readonly(
           "mass_line", [](const ModalFit& self) { return self.mass_line; },
-          "What modes far below add: 1/kg of a free mass; 0 without it.")
+          "Contribution of modes far below: inverse mass of a free mass, 1/kg; 0 without it.")
       .def_property_readonly(
           "compliance", [](const ModalFit& self) { return self.compliance; },
-          "What modes far above add: m/N of a spring without mass; 0 without it.");
+          "Contribution of modes far above: compliance of a spring without mass, m/N; 0 without it.");
 }
 
 void define_fit_modes(py::module_& m) {
@@ -43,15 +43,15 @@ void define_fit_modes(py::module_& m) {
       py::kw_only(), py::arg("quantity") = "acceleration", py::arg("with_offset") = true,
       py::arg("with_mass_line") = false, py::arg("with_compliance") = false, py::arg("coloured_residuals") = false,
       py::arg("hold") = "linear", py::arg("force_noise_n") = 0.0, py::arg("most_iterations") = 60,
-      R"(Output-error (for white noise: maximum likelihood) fit of modes to one or several taps of the same point.
+      R"(Output-error fit of modes to one or several impacts at the same point (for white noise: maximum likelihood).
 
 The response is the sum over modes of (1/m) s^q/(s^2 + 2 zeta omega s + omega^2) applied to the force, from rest at the
-first sample. Search by Levenberg-Marquardt in ln omega and ln zeta with exact
-derivatives; everything linear is eliminated.
+first sample. The search is Levenberg-Marquardt in ln omega and ln zeta with exact derivatives; linear parameters are
+eliminated.
 
 Args:
-    forces: Force per tap in N, each of shape (n,).
-    responses: Response per tap at the same instants in SI units, each of shape (n,).
+    forces: Force per impact in N, each of shape (n,).
+    responses: Response per impact at the same instants in SI units, each of shape (n,).
     period_s: Time between samples in s, above 0.
     omega_rad_s: Starts, undamped natural frequencies in rad/s, shape (n_modes,), below Nyquist.
     damping_ratio: Starts, 0 < zeta < 1, shape (n_modes,).
@@ -59,15 +59,15 @@ Args:
     with_offset: Fit a constant offset per record.
     with_mass_line: Add a free mass, for modes far below.
     with_compliance: Add a spring without mass, for modes far above.
-    coloured_residuals: Covariance that holds for residuals correlated over time (stationary) as well.
-    hold: How the force runs between samples: "linear"; "band_limited", as behind an anti-aliasing filter (sinc
-        interpolation); "impulse", blows just before the samples, of force times period.
+    coloured_residuals: The covariance also holds for residuals that are correlated over time (stationary noise).
+    hold: Course of the force between samples: "linear"; "band_limited", as after an anti-aliasing filter (sinc
+        interpolation); "impulse", impulses of force times period just before the samples.
     force_noise_n: Standard deviation of white noise on the force in N. In pulses of up to 128 samples the true force is
-        estimated along with the modes; else its effect is added to the covariance to first order.
+        estimated together with the modes; otherwise the effect of the noise is added to the covariance, to first order.
     most_iterations: Steps after which the search gives up, with converged False.
 
 Returns:
-    The fit; look at converged and reason before use.
+    The fit; check converged and reason before use.
 
 Raises:
     ArgumentError: Records as in arma_driven, a start or option outside its range, or too few samples.
@@ -96,7 +96,7 @@ Args:
     damping_ratio: Damping ratios, 0 < zeta < 1, shape (n_modes,).
     inverse_mass: Residues 1/m in 1/kg, shape (n_modes,).
     quantity: "acceleration", "velocity" or "displacement".
-    hold: How the force runs between samples, as in fit_modes.
+    hold: Course of the force between samples, as in fit_modes.
 
 Returns:
     Response in SI units, shape (n,).

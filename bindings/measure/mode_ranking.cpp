@@ -7,12 +7,12 @@ namespace py = pybind11;
 namespace shapegcode::bindings {
 
 void register_ranking(py::module_& m) {
-  py::class_<ModeRanking>(m, "ModeRanking", "Candidates in the order in which they explain what others leave.")
+  py::class_<ModeRanking>(m, "ModeRanking", "Candidates in the order in which each explains most of the residual.")
       .def_readonly("chosen", &ModeRanking::chosen, "Indices into the candidates, best first.")
       .def_property_readonly(
           "sum_of_squares", [](const ModeRanking& self) { return array_of(self.sum_of_squares); },
-          "What is left after each choice, shape (len(chosen),), in the response's unit squared.")
-      .def_readonly("total", &ModeRanking::total, "Squares of the responses, offsets taken out.");
+          "Sum of squares of the residual after each choice, shape (len(chosen),), in the response's unit squared.")
+      .def_readonly("total", &ModeRanking::total, "Sum of squares of the responses, without offsets.");
   m.def(
       "rank_modes",
       [](const std::vector<VectorArray>& responses, double period_s, const VectorArray& omega_rad_s,
@@ -30,22 +30,22 @@ void register_ranking(py::module_& m) {
       py::arg("forces") = py::none(), py::arg("quantity") = "acceleration", py::arg("kept") = 0,
       R"(Ranks candidate modes by forward selection: starts for fit_modes and fit_decay from the poles of a chart.
 
-At each step the candidate is chosen that, together with those before it, leaves the least squares; residues (of
-decays: amplitudes and phases per record) are fitted, frequencies and damping ratios are not.
+Each step chooses the candidate that, together with those already chosen, gives the smallest sum of squares. Residues
+(for decays: amplitudes and phases per record) are fitted; frequencies and damping ratios are not.
 
 Args:
     responses: Response per record, each of shape (n,).
     period_s: Time between samples in s, above 0.
     omega_rad_s: Candidates, undamped natural frequencies in rad/s, shape (n_candidates,), below Nyquist.
     damping_ratio: Candidates, 0 < zeta < 1, shape (n_candidates,).
-    most: How many to choose, at least 1.
+    most: Number of candidates to choose, at least 1.
     forces: Force per record in N at the same instants; None: the records are free decays.
     quantity: "acceleration", "velocity" or "displacement"; only with forces.
-    kept: The first so many candidates are chosen before all others, in their order; handed over as fitted, they leave
-        only what is new to the rest.
+    kept: Number of candidates at the start of the list that are chosen before all others, in their order: modes
+        already fitted.
 
 Returns:
-    The ranking; shorter than asked for where no candidate explains anything more.
+    The ranking; shorter than `most` if no candidate explains anything more.
 
 Raises:
     ArgumentError: As fit_modes.

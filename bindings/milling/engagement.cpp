@@ -59,23 +59,22 @@ py::array ring_array(const Ring& ring) {
 }
 
 void register_tool(py::module_& module) {
-  py::enum_<SpindleSense>(module, "SpindleSense", "Sense in which the spindle turns, seen towards the work piece.")
+  py::enum_<SpindleSense>(module, "SpindleSense", "Direction of spindle rotation, seen towards the workpiece.")
       .value("clockwise", SpindleSense::clockwise, "M03.")
       .value("counter_clockwise", SpindleSense::counter_clockwise, "M04.");
 
   py::class_<EndMill>(module, "EndMill", "A cylindrical end mill with a flat end.")
-      .def(
-          py::init([](double diameter_mm, int flutes, double helix_rad, std::vector<double> runout_mm) {
-            EndMill tool{diameter_mm, flutes, helix_rad, std::move(runout_mm)};
-            check(tool);
-            return tool;
-          }),
-          py::arg("diameter_mm"), py::arg("flutes"), py::arg("helix_rad") = 0.0,
-          py::arg("runout_mm") = std::vector<double>{},
-          "Helix of a right-hand cutter, rad; runout: how far each flute stands out beyond the mean radius, mm, in the "
-          "order in which they cut. Raises ArgumentError on a value that no tool can have.")
+      .def(py::init([](double diameter_mm, int flutes, double helix_rad, std::vector<double> runout_mm) {
+             EndMill tool{diameter_mm, flutes, helix_rad, std::move(runout_mm)};
+             check(tool);
+             return tool;
+           }),
+           py::arg("diameter_mm"), py::arg("flutes"), py::arg("helix_rad") = 0.0,
+           py::arg("runout_mm") = std::vector<double>{},
+           "`helix_rad`: helix angle of a right-hand cutter; `runout_mm`: radius of each flute less the mean radius, "
+           "in the order in which they cut. Raises ArgumentError on a value outside its range.")
       .def_readonly("diameter_mm", &EndMill::diameter_mm, "mm.")
-      .def_readonly("flutes", &EndMill::flutes, "Their number.")
+      .def_readonly("flutes", &EndMill::flutes, "Number of flutes.")
       .def_readonly("helix_rad", &EndMill::helix_rad, "rad.")
       .def_readonly("runout_mm", &EndMill::runout_mm, "One per flute, or none, mm.")
       .def_property_readonly("radius_mm", &EndMill::radius_mm, "mm.");
@@ -84,23 +83,23 @@ void register_tool(py::module_& module) {
 void register_track(py::module_& module) {
   py::class_<EngagementTrack, std::shared_ptr<EngagementTrack>>(
       module, "EngagementTrack",
-      "What the tool meets along a path, sample by sample. Azimuths in rad from the direction of feed, positive to its "
-      "left; with a clockwise spindle a tooth passes from +pi/2 (up milling) to -pi/2 (down milling).")
+      "Engagement of the tool along a path, sample by sample. Azimuths in rad from the direction of feed, positive to "
+      "its left; with a clockwise spindle a tooth passes from +pi/2 (up milling) to -pi/2 (down milling).")
       .def("__len__", &EngagementTrack::size)
       .def_property_readonly("s_mm", column(&EngagementTrack::s_mm), "Distance along the path, (n,), mm.")
       .def_property_readonly("x_mm", column(&EngagementTrack::x_mm), "Of the tool's axis, (n,), mm.")
       .def_property_readonly("y_mm", column(&EngagementTrack::y_mm), "Of the tool's axis, (n,), mm.")
       .def_property_readonly("direction_rad", column(&EngagementTrack::direction_rad),
-                             "Of feed in the XY plane, from +X, (n,), rad; 0 where the tool only plunges.")
+                             "Direction of feed in the XY plane, from +X, (n,), rad; 0 where the tool only plunges.")
       .def_property_readonly("horizontal", column(&EngagementTrack::horizontal),
-                             "Share of the travel that lies in the XY plane, (n,): 1 level, 0 a plunge.")
+                             "Component of the travel in the XY plane, (n,): 1 level, 0 a plunge.")
       .def_property_readonly("segment", column(&EngagementTrack::segment), "Index of the path's segment, (n,).")
       .def_property_readonly("radial_depth_mm", column(&EngagementTrack::radial_depth_mm),
-                             "Width of what is met, across the direction of feed, (n,), mm.")
+                             "Width of cut, perpendicular to the feed, (n,), mm.")
       .def_property_readonly("section_mm2", column(&EngagementTrack::section_mm2),
-                             "Area across the direction of feed, (n,), mm2; times the feed: material removal rate.")
+                             "Area of cut, perpendicular to the feed, (n,), mm2; times feed: material removal rate.")
       .def_property_readonly("plunged_mm2", column(&EngagementTrack::plunged_mm2),
-                             "Area of material below the end of a tool that goes down, (n,), mm2.")
+                             "Area of material below the end of a descending tool, (n,), mm2.")
       .def_property_readonly("first_arc", column(&EngagementTrack::first_arc),
                              "Index of each sample's first row of `arcs`, (n + 1,).")
       .def_property_readonly(
@@ -124,7 +123,7 @@ void register_track(py::module_& module) {
 void register_material(py::module_& module) {
   py::class_<Material, std::shared_ptr<Material>>(
       module, "Material",
-      "A work piece of horizontal layers, each with its boundary as a field of distances on a grid.")
+      "A workpiece of horizontal layers, each represented by the distance from its boundary on a grid.")
       .def(py::init([](const std::vector<VectorArray>& rings, const std::vector<double>& borders, double resolution,
                        std::size_t memory_limit) {
              std::vector<Ring> outlines;
@@ -135,26 +134,25 @@ void register_material(py::module_& module) {
            }),
            py::arg("rings_mm"), py::arg("borders_mm"), py::arg("resolution_mm"),
            py::arg("memory_limit_bytes") = Material::default_memory_limit_bytes,
-           "Outlines of the stock, each (n, 2), mm, holes included (even-odd rule); heights between the layers from "
-           "bottom to top, mm (see layer_borders); distance of the grid's nodes, mm (a hundredth of the tool's "
-           "diameter is a good choice). Raises ArgumentError on an outline or heights that enclose nothing, or a grid "
-           "that needs more memory than the limit.")
+           "`rings_mm`: outlines of the stock, each (n, 2), holes included (even-odd rule); `borders_mm`: heights "
+           "between the layers from bottom to top (see layer_borders); `resolution_mm`: grid spacing (a hundredth of "
+           "the tool's diameter is a good choice). Raises ArgumentError on an outline or heights that enclose nothing, "
+           "or a grid that needs more memory than the limit.")
       .def("take_whole_layers", &Material::take_whole_layers,
-           "From now on only whole layers are taken away: those whose bottom the tip reaches. What is left is never "
-           "less "
-           "than what is really there, also under a ramp.")
-      .def("compact", &Material::compact, "Gives back the memory of what is uniform by now.")
+           "From now on removes a layer only if the tip reaches its bottom. The remaining material is then never "
+           "underestimated, also under a ramp.")
+      .def("compact", &Material::compact, "Frees the memory of tiles that have become uniform.")
       .def(
           "copy", [](const Material& self) { return std::make_shared<Material>(self); },
-          "The material as it is now; the two are independent from here on.")
+          "An independent copy of the material in its present state.")
       .def("__len__", &Material::size)
       .def_property_readonly("borders_mm", &Material::borders_mm, "Heights between the layers, ascending, mm.")
-      .def_property_readonly("bottom_mm", &Material::bottom_mm, "Of the stock, mm.")
-      .def_property_readonly("top_mm", &Material::top_mm, "Of the stock as it was, mm.")
-      .def_property_readonly("resolution_mm", &Material::resolution_mm, "Distance of the grid's nodes, mm.")
-      .def_property_readonly("low_mm", &Material::low_mm, "Low corner of the stock as it was, (2,), mm.")
-      .def_property_readonly("high_mm", &Material::high_mm, "High corner of the stock as it was, (2,), mm.")
-      .def_property_readonly("volume_mm3", &Material::volume_mm3, "What is left, mm3.")
+      .def_property_readonly("bottom_mm", &Material::bottom_mm, "Bottom of the stock, mm.")
+      .def_property_readonly("top_mm", &Material::top_mm, "Top of the original stock, mm.")
+      .def_property_readonly("resolution_mm", &Material::resolution_mm, "Grid spacing, mm.")
+      .def_property_readonly("low_mm", &Material::low_mm, "Low corner of the original stock, (2,), mm.")
+      .def_property_readonly("high_mm", &Material::high_mm, "High corner of the original stock, (2,), mm.")
+      .def_property_readonly("volume_mm3", &Material::volume_mm3, "Remaining volume, mm3.")
       .def_property_readonly("bytes", &Material::bytes, "Memory in use.")
       .def("is_material", &Material::is_material, py::arg("x_mm"), py::arg("y_mm"), py::arg("z_mm"),
            "Whether there is material at a point.")
@@ -168,7 +166,7 @@ void register_material(py::module_& module) {
           "Distance from the boundary of a layer, positive in material, limited to two nodes of the grid, mm.")
       .def("volume_in_cylinder_mm3", &Material::volume_in_cylinder_mm3, py::arg("x_mm"), py::arg("y_mm"),
            py::arg("radius_mm"), py::arg("bottom_mm"), py::arg("top_mm"),
-           "Material in an upright cylinder, mm3: what a tool would stand in.")
+           "Material in a vertical cylinder, mm3, such as a tool at its start position.")
       .def(
           "heights_mm",
           [](const Material& self, const Eigen::Vector2d& low, const Eigen::Vector2d& high, py::ssize_t rows,
@@ -191,9 +189,9 @@ void register_layer_borders(py::module_& module) {
         return layer_borders(pointers, bottom, top, ramp_step);
       },
       py::arg("paths"), py::arg("bottom_mm"), py::arg("top_mm"), py::arg("ramp_step_mm"),
-      "Heights between layers for these paths in a stock from bottom to top, mm: where the tool moves on a level, the "
-      "lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth "
-      "of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.");
+      "Heights between layers for these paths in a stock from bottom to top, mm: the heights of level moves, the "
+      "lowest points of ramps and plunges, and steps of at most `ramp_step_mm` along ramps and helices (a tenth of the "
+      "tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.");
 }
 
 void register_sweep(py::module_& module) {
@@ -215,11 +213,11 @@ void register_sweep(py::module_& module) {
       },
       py::arg("material"), py::arg("path").none(false), py::arg("tool_diameter_mm"), py::kw_only(),
       py::arg("step_mm") = 0.0, py::arg("touch_mm") = SweepOptions{}.touch_mm, py::arg("progress") = std::nullopt,
-      "Moves a tool along a path through the material, takes away what it sweeps, and tells what it met. Samples stand "
-      "at most `step_mm` apart (0: a fortieth of the diameter) and at the end of every segment; contacts less deep or "
-      "wide than `touch_mm` are none. `progress` is called now and then with the distance travelled, mm. Whatever "
-      "stands in the tool at the start counts as gone; a rapid is swept like any other move. Raises ArgumentError on "
-      "values out of range, an arc outside of the XY plane, or if the material needs more memory than its limit.");
+      "Moves a tool along a path through the material, removes the swept volume and returns the engagement. Samples "
+      "are at most `step_mm` apart (0: a fortieth of the diameter) and at the end of every segment; contacts less deep "
+      "or less wide than `touch_mm` are ignored. `progress` is called from time to time with the distance travelled, "
+      "mm. Material inside the tool at the start counts as removed; a rapid is swept like any other move. Raises "
+      "ArgumentError on values out of range, an arc outside of the XY plane, or if the memory limit is exceeded.");
 }
 
 void register_corner(py::module_& module) {
@@ -227,14 +225,14 @@ void register_corner(py::module_& module) {
       .value("s1", CornerSection::s1, "Straight, the tool enters at the straight rough wall.")
       .value("s2", CornerSection::s2, "Straight, the tool enters in the rough corner.")
       .value("s3", CornerSection::s3, "On the arc of the finished corner.")
-      .value("s4", CornerSection::s4, "On the straight behind it.");
+      .value("s4", CornerSection::s4, "On the straight after it.");
 
-  py::class_<CornerEngagement>(module, "CornerEngagement", "What the tool meets at one position of a corner.")
+  py::class_<CornerEngagement>(module, "CornerEngagement", "Engagement of the tool at one position of a corner.")
       .def_readonly("section", &CornerEngagement::section, "Section of the path.")
       .def_readonly("x_mm", &CornerEngagement::x_mm, "Of the tool's axis, mm.")
       .def_readonly("y_mm", &CornerEngagement::y_mm, "Of the tool's axis, mm.")
-      .def_readonly("direction_rad", &CornerEngagement::direction_rad, "Of feed, from +X, rad.")
-      .def_readonly("turned_rad", &CornerEngagement::turned_rad, "Of the tool centre's arc so far, rad.")
+      .def_readonly("direction_rad", &CornerEngagement::direction_rad, "Direction of feed, from +X, rad.")
+      .def_readonly("turned_rad", &CornerEngagement::turned_rad, "Angle turned on the tool centre's arc so far, rad.")
       .def_readonly("from_rad", &CornerEngagement::from_rad, "Engaged azimuths, from the direction of feed, rad.")
       .def_readonly("to_rad", &CornerEngagement::to_rad, "rad.")
       .def_readonly("radial_depth_mm", &CornerEngagement::radial_depth_mm,
@@ -250,18 +248,18 @@ void register_corner(py::module_& module) {
            py::arg("tool_radius_mm"), py::arg("rough_radius_mm"), py::arg("finish_radius_mm"), py::arg("allowance_mm"),
            py::arg("turn_rad") = CornerCut{}.turn_rad, py::arg("before_mm") = CornerCut{}.before_mm,
            py::arg("after_mm") = CornerCut{}.after_mm, py::arg("mirrored") = false,
-           "The tool comes along +X with the wall to its right, turns left by `turn_rad` and follows the second wall; "
+           "The tool moves along +X with the wall to its right, turns left by `turn_rad` and follows the second wall; "
            "the finished walls meet at the origin. `mirrored`: wall to the left. Equal tool and finish radius: the "
-           "path has a sharp vertex. Raises ArgumentError on radii below the tool's or an allowance above it.")
+           "path has a sharp vertex. Raises ArgumentError on corner radii below the tool's or an allowance above it.")
       .def_readonly("tool_radius_mm", &CornerCut::tool_radius_mm, "mm.")
-      .def_readonly("rough_radius_mm", &CornerCut::rough_radius_mm, "Of the corner as roughing left it, mm.")
-      .def_readonly("finish_radius_mm", &CornerCut::finish_radius_mm, "Of the corner to be made, mm.")
-      .def_readonly("allowance_mm", &CornerCut::allowance_mm, "Left on both walls, mm.")
-      .def_readonly("turn_rad", &CornerCut::turn_rad, "Through which the path turns, rad.")
-      .def_readonly("before_mm", &CornerCut::before_mm, "Straight before the corner, mm.")
-      .def_readonly("after_mm", &CornerCut::after_mm, "Straight behind the corner, mm.")
+      .def_readonly("rough_radius_mm", &CornerCut::rough_radius_mm, "Radius of the corner after roughing, mm.")
+      .def_readonly("finish_radius_mm", &CornerCut::finish_radius_mm, "Radius of the corner to be made, mm.")
+      .def_readonly("allowance_mm", &CornerCut::allowance_mm, "Allowance left on both walls by roughing, mm.")
+      .def_readonly("turn_rad", &CornerCut::turn_rad, "Turning angle of the path, rad.")
+      .def_readonly("before_mm", &CornerCut::before_mm, "Straight path before the corner, mm.")
+      .def_readonly("after_mm", &CornerCut::after_mm, "Straight path after the corner, mm.")
       .def_readonly("mirrored", &CornerCut::mirrored, "The wall is to the left.")
-      .def_property_readonly("length_mm", &corner_length_mm, "Of the tool's path, mm.")
+      .def_property_readonly("length_mm", &corner_length_mm, "Length of the tool's path, mm.")
       .def("path", &corner_path, py::arg("feed_mm_per_s"), py::arg("z_mm") = 0.0,
            "The tool's path: line, arc if the radii differ, line.")
       .def(

@@ -51,7 +51,7 @@ py::dict columns(const Eigen::MatrixXd& table) {
 }
 
 void define_coefficients(py::module_& module) {
-  py::enum_<ChipThickness>(module, "ChipThickness", "Which chip thickness the specific cutting force belongs to.")
+  py::enum_<ChipThickness>(module, "ChipThickness", "Chip thickness used in the specific cutting force.")
       .value("mean", ChipThickness::mean, "Of the whole engagement, as paper 001 fits its coefficients.")
       .value("local", ChipThickness::local, "Of each element of a flute.");
 
@@ -124,8 +124,8 @@ void define_figures(py::module_& module) {
 
   py::class_<ForceCurve>(module, "ForceCurve", "Forces on the tool over one revolution, in the frame of the tool.")
       .def_readonly("turned_rad", &ForceCurve::turned_rad,
-                    "Angle of the spindle in its own sense, (n_angles,); at 0 the first flute's tip looks along the "
-                    "feed.")
+                    "Spindle angle in its direction of rotation, rad, (n_angles,); at 0 the first flute's tip points "
+                    "along the feed.")
       .def_readonly("force_n", &ForceCurve::force_n, "(n_angles, 2), N.")
       .def_readonly("torque_nm", &ForceCurve::torque_nm, "(n_angles,), N m.")
       .def_readonly("flute_n", &ForceCurve::flute_n, "Of each flute, (n_angles, 2), N.");
@@ -134,12 +134,12 @@ void define_figures(py::module_& module) {
 /// The members come with define_force_members and define_track_figures.
 py::class_<MillingForce> define_force(py::module_& module) {
   py::class_<MillingForce> type(module, "MillingForce",
-                                R"(Forces of an end mill at one engagement; make one and keep it.
+                                R"(Forces of an end mill at one engagement; reuse one object, which stores tables.
 
-The chip at azimuth p is feed per tooth * cos p thick (paper 001 eq. 1); with runout that of flute i is the least of
+The chip at azimuth p is feed per tooth * cos p thick (paper 001 eq. 1); with runout that of flute i is the minimum of
 m * feed per tooth * cos p + r_i - r_(i-m), m >= 1, and not below 0. A counter-clockwise spindle mirrors everything,
 helix included. `arcs`: (n_arcs, 4): from and to in rad from the direction of feed, positive to its left, bottom and top
-in mm above the tip. `feed_mm_per_min`: along the path. Not for several threads at a time.
+in mm above the tip. `feed_mm_per_min`: along the path. Not thread-safe.
 
 Raises:
     ArgumentError: A speed that is not positive; in all members also an arc beyond -pi/2 ... pi/2 or below the tip, or a
@@ -161,8 +161,8 @@ void define_force_members(py::class_<MillingForce>& type) {
             return self.figures(arcs_from(arcs), feed_mm_per_min);
           },
           py::arg("arcs"), py::arg("feed_mm_per_min"),
-          "Figures over one revolution: means exact, peaks and mean of the magnitude to 0.1 %; zeros where nothing is "
-          "cut.")
+          "Figures over one revolution: means exact, peaks and mean of the magnitude to 0.1 %; zeros without "
+          "engagement.")
       .def(
           "curve",
           [](MillingForce& self, const MatrixArray& arcs, double feed_mm_per_min, int angles) {
@@ -223,22 +223,21 @@ Raises:
 }
 
 void define_machine_frame(py::module_& module) {
-  module.def(
-      "machine_frame", &machine_frame, py::arg("tool_frame"), py::arg("direction_rad"),
-      "A force (2,) in the frame of the tool, in the frame of the machine (paper 001 eq. 4, 5); direction of feed "
-      "from +X towards +Y.");
+  module.def("machine_frame", &machine_frame, py::arg("tool_frame"), py::arg("direction_rad"),
+             "Converts a force (2,) from the frame of the tool to the frame of the machine (paper 001 eq. 4, 5); "
+             "`direction_rad`: direction of feed from +X towards +Y.");
 }
 
 void define_limits(py::module_& module) {
-  py::enum_<FeedLimit>(module, "FeedLimit", "What bounds a feed.")
-      .value("none", FeedLimit::none, "The highest feed asked for is within all limits.")
+  py::enum_<FeedLimit>(module, "FeedLimit", "The limit that determines a feed.")
+      .value("none", FeedLimit::none, "The highest requested feed is within all limits.")
       .value("resultant", FeedLimit::resultant, "Resultant force, mean or peak.")
       .value("deflection", FeedLimit::deflection, "Peak deflection of the tip.")
       .value("torque", FeedLimit::torque, "Peak torque.")
       .value("power", FeedLimit::power, "Mean power.")
       .value("chip_load", FeedLimit::chip_load, "Feed per tooth or thickest chip.");
 
-  py::class_<FeedLimits>(module, "FeedLimits", "What bounds a feed over one revolution; inf: no limit.")
+  py::class_<FeedLimits>(module, "FeedLimits", "Limits of a feed over one revolution of the spindle; inf: no limit.")
       .def(py::init([](double mean_resultant_n, double peak_resultant_n, double peak_deflection_um,
                        double peak_torque_nm, double mean_power_w, double feed_per_tooth_mm, double peak_chip_mm,
                        const std::optional<ToolBeam>& beam) {
@@ -262,10 +261,10 @@ void define_limits(py::module_& module) {
       .def_readonly("peak_chip_mm", &FeedLimits::peak_chip_mm, "Thickest chip, mm.")
       .def_readonly("beam", &FeedLimits::beam, "The tool as a beam, or None.");
 
-  py::class_<LimitedFeed>(module, "LimitedFeed", "A feed and what bounds it.")
+  py::class_<LimitedFeed>(module, "LimitedFeed", "A feed, and the limit that determines it.")
       .def_readonly("feed_mm_per_min", &LimitedFeed::feed_mm_per_min, "mm/min.")
       .def_readonly("limit", &LimitedFeed::limit, "The limit that is reached first.")
-      .def_readonly("within", &LimitedFeed::within, "False: even the lowest feed, which this is, is beyond the limit.");
+      .def_readonly("within", &LimitedFeed::within, "False: this is the lowest feed, and it exceeds the limit.");
 }
 
 void define_largest_feeds(py::module_& module) {
@@ -275,9 +274,8 @@ void define_largest_feeds(py::module_& module) {
         return largest_feed(force, arcs_from(arcs), limits, lowest, highest);
       },
       py::arg("force"), py::arg("arcs"), py::arg("limits"), py::arg("lowest"), py::arg("highest"),
-      "Highest feed between `lowest` and `highest` (mm/min) within all limits: never above, and within 0.1 % of the "
-      "one "
-      "that binds. Raises ArgumentError unless 0 < lowest <= highest.");
+      "Highest feed between `lowest` and `highest` (mm/min) within all limits: never above a limit, and within 0.02 % "
+      "of the limit reached. Raises ArgumentError unless 0 < lowest <= highest.");
   module.def(
       "largest_feeds",
       [](MillingForce& force, const EngagementTrack& track, const FeedLimits& limits, double lowest, double highest) {
@@ -299,9 +297,8 @@ void define_largest_feeds(py::module_& module) {
         return py::make_tuple(feed, limit, within);
       },
       py::arg("force"), py::arg("track"), py::arg("limits"), py::arg("lowest"), py::arg("highest"),
-      "The same for every sample of a track, along the path: (feed_mm_per_min, limit as FeedLimit number, within), "
-      "each "
-      "(n_samples,). The highest where nothing is met or the tool only plunges.");
+      "largest_feed for every sample of a track, along the path: (feed_mm_per_min, limit as FeedLimit number, within), "
+      "each (n_samples,). Without engagement, or if the tool only plunges, the highest feed.");
 }
 
 void define_surface(py::module_& module) {
@@ -316,7 +313,7 @@ void define_surface(py::module_& module) {
       },
       py::arg("force"), py::arg("beam"), py::arg("arcs"), py::arg("feed_mm_per_min"), py::arg("side"),
       py::arg("height_mm"), py::arg("tolerance_rad") = wall_tolerance_rad,
-      R"(Form error of the wall across itself at heights above the tip (paper 001, section 2.3).
+      R"(Form error perpendicular to the wall at heights above the tip (paper 001, section 2.3).
 
 Args:
     force: The force model.
@@ -328,7 +325,7 @@ Args:
     tolerance_rad: An arc that ends this close to +-pi/2 reaches the wall.
 
 Returns:
-    (n,), um: + material is left standing, - the wall is cut too deep; NaN where the engagement does not reach it.
+    (n,), um: + material is left, - the wall is cut too deep; NaN where the engagement does not reach it.
 
 Raises:
     ArgumentError: A height below the tip, or an engagement above the overhang.)");
@@ -347,8 +344,8 @@ Raises:
       },
       py::arg("force"), py::arg("beam"), py::arg("track"), py::arg("feed_mm_per_min"), py::arg("side"),
       py::arg("height_mm"), py::arg("tolerance_rad") = wall_tolerance_rad,
-      "The same along a track, a feed for each sample: (n_samples, n_heights), um, read-only. Raises ArgumentError as "
-      "wall_error_um, and on another number of feeds.");
+      "wall_error_um along a track, with a feed for each sample: (n_samples, n_heights), um, read-only. Raises "
+      "ArgumentError as wall_error_um, and on another number of feeds.");
 }
 
 }  // namespace

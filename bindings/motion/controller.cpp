@@ -107,64 +107,63 @@ py::array_t<double> axis_values(const PyState& self, const std::array<double, ma
 py::array_t<double> set_point_of(const PyState& self) { return axis_values(self, self.state.set_point); }
 
 void register_answers(py::module_& module) {
-  py::enum_<PushResult>(module, "PushResult", "Answer of a MotionController to a segment that was pushed.")
-      .value("accepted", PushResult::accepted, "It waits for its turn.")
-      .value("queue_full", PushResult::queue_full, "Nothing was taken: push it again later.")
+  py::enum_<PushResult>(module, "PushResult", "Result of pushing a segment to a MotionController.")
+      .value("accepted", PushResult::accepted, "It is in the queue.")
+      .value("queue_full", PushResult::queue_full, "It was not accepted: push it again later.")
       .value("not_connected", PushResult::not_connected,
              "It does not start where the one before ended, or an arc misses its end (1e-6 mm).")
       .value("no_length", PushResult::no_length, "It moves no axis by more than 1e-9 mm or degrees.")
       .value("no_feed", PushResult::no_feed, "A feed that is not above zero, or not finite.")
       .value("not_finite", PushResult::not_finite, "A position that is not finite.")
       .value("wrong_axes", PushResult::wrong_axes, "Not as many following axes as the control has.")
-      .value("aborted", PushResult::aborted, "Nothing is taken between abort() and restart().")
-      .value("flushing", PushResult::flushing, "Between flush() and flushed() nothing is taken.")
-      .value("no_time", PushResult::no_time, "A dwell below zero, above 1e6 s, or no number.")
+      .value("aborted", PushResult::aborted, "Nothing is accepted between abort() and restart().")
+      .value("flushing", PushResult::flushing, "Nothing is accepted between flush() and flushed().")
+      .value("no_time", PushResult::no_time, "A dwell below zero, above 1e6 s, or not a number.")
       .value("beyond_travel", PushResult::beyond_travel, "It leads out of the travel of an axis.")
       .value("bad_limit", PushResult::bad_limit, "A limit of the segment that is not above zero.")
-      .value("not_straight", PushResult::not_straight, "Bound to the spindle, and no line.");
+      .value("not_straight", PushResult::not_straight, "Synchronous with the spindle, but not a line.");
 
-  py::enum_<JogResult>(module, "JogResult", "Answer of a MotionController to a jog.")
-      .value("accepted", JogResult::accepted, "The axis goes.")
+  py::enum_<JogResult>(module, "JogResult", "Result of a jog of a MotionController.")
+      .value("accepted", JogResult::accepted, "The axis moves.")
       .value("path_moves", JogResult::path_moves,
-             "The control is neither held nor flushed nor aborted, or does not rest yet.")
+             "The control is neither held nor flushed nor aborted, or not yet at rest.")
       .value("no_axis", JogResult::no_axis, "There is no such axis.")
       .value("not_finite", JogResult::not_finite, "A number that is not finite.")
-      .value("no_speed", JogResult::no_speed, "Of a distance: the speed is not above zero.")
+      .value("no_speed", JogResult::no_speed, "The speed of a jog by a distance is not above zero.")
       .value("beyond_travel", JogResult::beyond_travel,
              "The distance leads out of the travel, or the axis is at its end already.")
-      .value("no_record", JogResult::no_record, "No periods are kept for retrace().");
+      .value("no_record", JogResult::no_record, "No periods are stored for retrace().");
 
-  py::enum_<FeedRate>(module, "FeedRate", "What a programmed feed counts in, and what changes it.")
+  py::enum_<FeedRate>(module, "FeedRate", "Unit of a programmed feed, and the override that applies.")
       .value("per_time", FeedRate::per_time, "Per s; the feed override.")
       .value("rapid", FeedRate::rapid, "Per s; the rapid override.")
       .value("per_revolution", FeedRate::per_revolution, "Per revolution of the spindle; the feed override.")
       .value("synchronous", FeedRate::synchronous,
-             "Likewise, bound to the angle of the spindle from rest to rest; no override.");
+             "Likewise, synchronous with the spindle angle from rest to rest; no override.");
 
-  py::enum_<FeedOf>(module, "FeedOf", "What a feed is of, where X, Y and Z move together with axes that follow.")
+  py::enum_<FeedOf>(module, "FeedOf", "To which motion a feed refers if X, Y and Z move together with following axes.")
       .value("path", FeedOf::path,
-             "X, Y and Z along their path; where these do not move (1e-9 mm), the axis that moves the furthest.")
-      .value("all_axes", FeedOf::all_axes, "The root of the squares of all, degrees counted as mm.")
-      .value("dominant", FeedOf::dominant,
-             "That of X, Y and Z along their path and the others which moves the furthest.")
+             "X, Y and Z along their path; if these do not move (1e-9 mm), the axis with the longest travel.")
+      .value("all_axes", FeedOf::all_axes, "The root of the sum of squares of all axes, degrees counted as mm.")
+      .value("dominant", FeedOf::dominant, "X, Y and Z along their path, or the following axis with a longer travel.")
       .value("time", FeedOf::time, "Inverse time: the segment lasts one over the feed, s or revolutions.");
 
   py::class_<SegmentRules>(module, "SegmentRules",
-                           R"(How a segment is run, beside its geometry and its feed. Immutable.
+                           R"(Rules for running a segment, besides its geometry and its feed. Immutable.
 
 Args:
-    feed_rate: What its feed counts in.
-    feed_of: What its feed is of.
-    max_acceleration: Along its path, beside the limits of the axes, mm/s^2.
+    feed_rate: Unit of its feed, and the override that applies.
+    feed_of: Motion to which its feed refers.
+    max_acceleration: Along its path, besides the limits of the axes, mm/s^2.
     max_jerk: Likewise, mm/s^3.)")
       .def(py::init([](FeedRate feed_rate, FeedOf feed_of, double max_acceleration, double max_jerk) {
              return SegmentRules{feed_rate, feed_of, max_acceleration, max_jerk};
            }),
            py::kw_only(), py::arg("feed_rate") = FeedRate::per_time, py::arg("feed_of") = FeedOf::path,
            py::arg("max_acceleration") = MotionLimits::none, py::arg("max_jerk") = MotionLimits::none,
-           "Checked by the control that takes them.")
-      .def_readonly("feed_rate", &SegmentRules::feed_rate, "What its feed counts in.")
-      .def_readonly("feed_of", &SegmentRules::feed_of, "What its feed is of.")
+           "Values are checked by the control that uses them.")
+      .def_readonly("feed_rate", &SegmentRules::feed_rate, "Unit of its feed, and the override that applies.")
+      .def_readonly("feed_of", &SegmentRules::feed_of, "Motion to which its feed refers.")
       .def_readonly("max_acceleration", &SegmentRules::max_acceleration, "mm/s^2.")
       .def_readonly("max_jerk", &SegmentRules::max_jerk, "mm/s^3.")
       .def("__repr__", [](const SegmentRules& self) {
@@ -174,18 +173,18 @@ Args:
       });
 
   py::class_<OffsetLimits>(module, "OffsetLimits",
-                           R"(Limits of an offset that is added to an axis while the path is run. Immutable.
+                           R"(Limits of an offset that is added to an axis during motion. Immutable.
 
 Args:
     max_feed: Highest speed in the axis' unit (mm or degrees) per s; 0: no offset.
     max_acceleration: Likewise per s^2.
     max_jerk: Likewise per s^3.
-    backlash: Of the drive: taken up by the offset where the axis goes down; the control begins as after a motion upwards.)")
+    backlash: Of the drive, compensated by the offset in negative motion; initially as after positive motion.)")
       .def(py::init([](double max_feed, double max_acceleration, double max_jerk, double backlash) {
              return OffsetLimits{max_feed, max_acceleration, max_jerk, backlash};
            }),
            py::kw_only(), py::arg("max_feed") = 0.0, py::arg("max_acceleration") = 0.0, py::arg("max_jerk") = 0.0,
-           py::arg("backlash") = 0.0, "Checked by the control that takes them.")
+           py::arg("backlash") = 0.0, "Values are checked by the control that uses them.")
       .def_readonly("max_feed", &OffsetLimits::max_feed, "Unit per s.")
       .def_readonly("max_acceleration", &OffsetLimits::max_acceleration, "Unit per s^2.")
       .def_readonly("max_jerk", &OffsetLimits::max_jerk, "Unit per s^3.")
@@ -197,13 +196,13 @@ Args:
 
   py::enum_<Activity>(module, "Activity", "What a MotionController does in a period.")
       .value("idle", Activity::idle, "At rest, nothing left to do.")
-      .value("moving", Activity::moving, "Along the path, or the shaper is still giving out what it holds.")
+      .value("moving", Activity::moving, "Along the path, or the shaper's output is not yet at rest.")
       .value("stopping", Activity::stopping, "Decelerating for hold(), flush() or abort().")
-      .value("held", Activity::held, "At rest after hold(), or at a stop that was pushed.")
+      .value("held", Activity::held, "At rest after hold(), or at a programmed stop.")
       .value("starved", Activity::starved,
-             "Coming to rest: the segments ran out before one that stops. At rest it is idle.")
-      .value("aborted", Activity::aborted, "At rest after abort() or emergency_stop(); the path is gone.")
-      .value("jogging", Activity::jogging, "Away from where the path rests, or back onto it.");
+             "Decelerating: the queue ran empty before a segment with `stop_at_end`. Idle when at rest.")
+      .value("aborted", Activity::aborted, "At rest after abort() or emergency_stop(); the path is discarded.")
+      .value("jogging", Activity::jogging, "Away from the position where the path rests, or back to it.");
 
   py::class_<FollowingLimits>(module, "FollowingLimits", R"(Limits of an axis that follows the path. Immutable.
 
@@ -211,14 +210,14 @@ Args:
     max_feed: Highest speed in its own unit (mm or degrees) per s.
     max_acceleration: Likewise per s^2.
     max_jerk: Likewise per s^3.
-    tolerance: By how much it may deviate where its speed along the path changes at once, in its unit; 0: the motion comes to rest
+    tolerance: Permitted deviation where its speed along the path changes abruptly, in its unit; 0: the motion stops
         there.)")
       .def(py::init([](double max_feed, double max_acceleration, double max_jerk, double tolerance) {
              return FollowingLimits{max_feed, max_acceleration, max_jerk, tolerance};
            }),
            py::kw_only(), py::arg("max_feed") = MotionLimits::none, py::arg("max_acceleration") = MotionLimits::none,
            py::arg("max_jerk") = MotionLimits::none, py::arg("tolerance") = MotionLimits::none,
-           "Checked by the control that takes them.")
+           "Values are checked by the control that uses them.")
       .def_readonly("max_feed", &FollowingLimits::max_feed, "Unit per s.")
       .def_readonly("max_acceleration", &FollowingLimits::max_acceleration, "Unit per s^2.")
       .def_readonly("max_jerk", &FollowingLimits::max_jerk, "Unit per s^3.")
@@ -231,11 +230,11 @@ Args:
 }
 
 void register_state(py::module_& module) {
-  py::class_<PyEvent>(module, "ControllerEvent", "Something that belongs to a place of the path. Immutable.")
+  py::class_<PyEvent>(module, "ControllerEvent", "An event at a position of the path. Immutable.")
       .def_property_readonly(
-          "id", [](const PyEvent& self) { return self.event.id; }, "As it was pushed.")
+          "id", [](const PyEvent& self) { return self.event.id; }, "Identifier of the caller, as it was pushed.")
       .def_property_readonly(
-          "word", [](const PyEvent& self) { return self.event.word; }, "The caller's own.")
+          "word", [](const PyEvent& self) { return self.event.word; }, "Data of the caller, as they were pushed.")
       .def_property_readonly(
           "step", [](const PyEvent& self) { return self.step; }, "The step with which it was reached, from 1.")
       .def("__repr__", [](const PyEvent& self) {
@@ -244,51 +243,51 @@ void register_state(py::module_& module) {
       });
   py::class_<PyState>(module, "ControllerState", "A snapshot of a MotionController. Immutable.")
       .def_property_readonly(
-          "activity", [](const PyState& self) { return self.state.activity; }, "What it does.")
-      .def_property_readonly("set_point", &set_point_of, "Set-point last given, (n_axes,), mm or the axis' unit.")
+          "activity", [](const PyState& self) { return self.state.activity; }, "What the control does.")
+      .def_property_readonly("set_point", &set_point_of, "Last set-point, (n_axes,), mm or the axis' unit.")
       .def_property_readonly(
           "speed_mm_per_s", [](const PyState& self) { return self.state.speed_mm_per_s; },
-          "Along the path, before smoothing and shaper.")
+          "Speed along the path, before smoothing and shaper.")
       .def_property_readonly(
-          "distance_mm", [](const PyState& self) { return self.state.distance_mm; }, "Since the last rest.")
+          "distance_mm", [](const PyState& self) { return self.state.distance_mm; }, "Distance since the last rest.")
       .def_property_readonly(
           "feed_override", [](const PyState& self) { return self.state.feed_override; },
           "Ratio of the programmed feeds.")
       .def_property_readonly(
-          "line", [](const PyState& self) { return self.state.line; }, "Of the segment that is being run.")
+          "line", [](const PyState& self) { return self.state.line; }, "Line of the present segment.")
       .def_property_readonly(
-          "segments_done", [](const PyState& self) { return self.state.segments_done; }, "Run to their ends.")
+          "segments_done", [](const PyState& self) { return self.state.segments_done; }, "Segments run to their ends.")
       .def_property_readonly(
           "segments_waiting", [](const PyState& self) { return self.state.segments_waiting; },
-          "Pushed and not run to their ends.")
+          "Number of segments pushed and not yet run to their ends.")
       .def_property_readonly(
-          "steps", [](const PyState& self) { return self.state.steps; }, "Set-points given so far.")
+          "steps", [](const PyState& self) { return self.state.steps; }, "Number of set-points so far.")
       .def_property_readonly(
-          "starvations", [](const PyState& self) { return self.state.starvations; }, "How often the segments ran out.")
+          "starvations", [](const PyState& self) { return self.state.starvations; }, "How often the queue ran empty.")
       .def_property_readonly(
           "late_plans", [](const PyState& self) { return self.state.late_plans; },
-          "How often the motion slowed down because nothing further was planned in time.")
+          "How often the motion slowed down because no section was planned in time.")
       .def_property_readonly(
           "set_point_distance_mm", [](const PyState& self) { return self.state.set_point_distance_mm; },
-          "`distance_mm` of the set-point that was given: behind smoothing and shaper, `delay_periods` later, rounded.")
+          "`distance_mm` at the last set-point, which smoothing and shaper delay by `delay_periods`, rounded.")
       .def_property_readonly(
-          "set_point_line", [](const PyState& self) { return self.state.set_point_line; }, "Likewise its line.")
+          "set_point_line", [](const PyState& self) { return self.state.set_point_line; }, "`line` at that set-point.")
       .def_property_readonly(
           "travel_stops", [](const PyState& self) { return self.state.travel_stops; },
-          "How often it was held because the path would have left the travel.")
+          "How often the control was held because the path would have left the travel.")
       .def_property_readonly(
           "spindle_speed", [](const PyState& self) { return self.state.spindle_speed; }, "Revolutions per s.")
       .def_property_readonly(
           "spindle_error_mm", [](const PyState& self) { return self.state.spindle_error_mm; },
-          "Of a synchronous segment: the motion less what the angle asks for.")
+          "Of a synchronous segment: the motion less that required by the spindle angle.")
       .def_property_readonly(
           "offset", [](const PyState& self) { return axis_values(self, self.state.offset); },
           "Offset of each axis before smoothing and shaper, (n_axes,), mm or the axis' unit.")
       .def_property_readonly(
-          "rapid_override", [](const PyState& self) { return self.state.rapid_override; }, "Ratio of the rapids.")
+          "rapid_override", [](const PyState& self) { return self.state.rapid_override; }, "Ratio of the rapid rates.")
       .def_property_readonly(
           "shaper", [](const PyState& self) { return self.state.shaper; },
-          "Number of the one that acts, or that is being faded to.")
+          "Number of the active shaper, or of the one being faded to.")
       .def("__repr__", [](const PyState& self) {
         const ControllerState& state = self.state;
         return "ControllerState(activity=" + std::string(text_of(state.activity)) +
@@ -309,39 +308,39 @@ void register_state(py::module_& module) {
 }
 
 constexpr const char* controller_doc =
-    R"(A path that grows while it is run: what a control does between blocks and drives.
+    R"(Runs a path that grows during motion: what a control does between blocks and drives.
 
-Look-ahead over a window of segments: junctions rounded within the tolerance, run nearly as fast as speed, acceleration and
-jerk of every axis allow, one set-point per period through contour correction, smoothing and shaper. Limits that are
-finite are kept by the set-points. One thread may push, one may step, one may plan, any may call the rest but restart();
-step(), run() and plan() release the global lock. It is the C++ class of the same name, which is the real-time form.
+Look-ahead over a window of segments, junctions rounded within the tolerance, motion nearly as fast as the limits of the
+axes allow, one set-point per period through contour correction, smoothing and shaper. The set-points keep every finite
+limit. One thread may push, one may step, one may plan, any may call the rest except restart(); step(), run() and plan()
+release the global interpreter lock. The real-time form is the C++ class of the same name.
 
 Args:
     period_s: Time between set-points in s.
-    limits: Limits, with the rules for corners. None: nothing but what the next three say, under the
-        jerk-limited law if there is an acceleration.
-    max_feed_mm_per_s: Of X, Y and Z, shape (3,), or one number for all; in place of that of `limits`.
+    limits: Limits, with the rules for corners. None: only the next three, under the jerk-limited law if there is an
+        acceleration.
+    max_feed_mm_per_s: Of X, Y and Z, shape (3,), or one number for all; instead of that in `limits`.
     max_acceleration_mm_per_s2: Likewise.
-    max_jerk_mm_per_s3: Likewise; wants an acceleration.
+    max_jerk_mm_per_s3: Likewise; requires an acceleration.
     following: Limits of the axes that follow the path, at most six.
-    contour_tolerance_mm: By how much rounded corners, smoothing and shaper may deviate from the path. 0: corners are
+    contour_tolerance_mm: Permitted deviation from the path by rounded corners, smoothing and shaper. 0: corners are
         exact stops; inf: neighbouring corners are rounded up to the middle between them.
-    smoothing_time_s: Length of each of two moving averages over every axis in s; 0: none.
-    shaper: Shaper on the grid of the period, Fir, or Mode (whose ZV on the grid it is) for all axes, a list of them
-        with one for each axis, FollowingFir; None: none.
-    contour_correction: Take back, to the second order, what smoothing and shaper cut off arcs.
+    smoothing_time_s: Duration of each of two moving averages of every axis in s; 0: none.
+    shaper: A Shaper on the grid of the period, a Fir, or a Mode (for its ZV on the grid) for all axes; a list with one
+        of these for each axis; or a FollowingFir. None: no shaper.
+    contour_correction: Compensate, to the second order, the radius error of arcs caused by smoothing and shaper.
     window: Segments that the look-ahead sees, 8 at least.
-    queue: Segments that may wait in all; rounded up to a power of two, and holds the window.
-    lead_periods: Another thread calls plan(), which plans so many periods ahead of the motion. None: step() plans when what
-        is planned runs out.
-    travel: Where each axis may be, (low, high) of each; empty: anywhere.
-    offset: Limits of the offset of each axis, which the path leaves to it; empty: none.
-    emergency_acceleration: What each axis can do at the most, for emergency_stop(); empty: it brakes as abort() does.
-    spindle_bandwidth_hz: With which a spindle is followed.
-    retrace_periods: Periods of motion that are kept for retrace().
-    other_shapers: What `shaper`, number 0, may be exchanged for in motion, numbers 1 and up: each one for all axes, or a list
-        with one for each.
-    fade_time_s: How long an exchange takes, s; what it may need of the limits, less the longer it takes, is not the path's.
+    queue: Segments in the whole queue, including the window; rounded up to a power of two.
+    lead_periods: Periods by which plan(), called by another thread, is ahead of the motion. None: step() plans when the
+        planned motion runs out.
+    travel: Travel range of each axis, (low, high); empty: no limits.
+    offset: Limits of the offset of each axis, by which the limits of the path are reduced; empty: no offset.
+    emergency_acceleration: Maximum of each axis, for emergency_stop(); empty: it decelerates as abort() does.
+    spindle_bandwidth_hz: Bandwidth for following a spindle in Hz.
+    retrace_periods: Periods of motion stored for retrace().
+    other_shapers: Shapers that can replace `shaper` (number 0) in motion, numbers 1 and up: each one for all axes, or a
+        list with one for each.
+    fade_time_s: Duration of an exchange in s. The limits of the path are reduced for it, less for a longer one.
 
 Raises:
     ArgumentError: A value outside its range.
@@ -353,62 +352,62 @@ void register_pushes(py::class_<PyController>& controller) {
   controller
       .def("push", &PyController::push, py::arg("segment"), py::arg("following") = py::none(),
            py::arg("rules") = py::none(),
-           R"(Hand over the next segment; never waits.
+           R"(Appends the next segment; never waits.
 
 Args:
-    segment: It starts where the one before ended, the first at rest.
-    following: Where the following axes are at its end, (n_axes - 3,); they follow in proportion to the path length. None: they
-        stay.
-    rules: How it is run. None: the feed is per s along the path.
+    segment: Starts where the previous one ended, the first one at the position of rest.
+    following: Positions of the following axes at its end, (n_axes - 3,); they move in proportion to the path length.
+        None: they do not move.
+    rules: Rules for running it. None: the feed is per s along the path.
 
 Returns:
-    PushResult; nothing was taken unless it is `accepted`.)")
+    PushResult; unless it is `accepted`, nothing has changed.)")
       .def("push_path", &PyController::push_path, py::arg("path"), py::arg("first") = 0,
-           R"(The segments of a path, as many as are taken; the following axes stay.
+           R"(Appends the segments of a path, as many as are accepted; the following axes do not move.
 
 Args:
-    path: Its first segment starts where the segment before ended.
-    first: Segment to begin with.
+    path: Its segment `first` starts where the previous segment ended.
+    first: Index of the segment to begin with.
 
 Returns:
-    (index of the segment to go on with, PushResult of the last one that was tried): (len(path), accepted) when all of
-    them were taken.
+    (index of the segment to continue with, PushResult of the last one that was tried): (len(path), accepted) if all
+    were accepted.
 
 Raises:
     ArgumentError: `first` below 0.)")
       .def("push_line", &PyController::push_line, py::arg("end_mm"), py::arg("feed_mm_per_s"),
            py::arg("following") = py::none(), py::kw_only(), py::arg("rules") = py::none(), py::arg("line") = 0,
            py::arg("stop_at_end") = false,
-           R"(A straight move from the end of the segment before, at first from rest.
+           R"(Appends a straight move from the end of the previous segment, at first from the position of rest.
 
 Args:
     end_mm: Shape (3,), mm.
-    feed_mm_per_s: Along the path, as far as `rules` do not say otherwise.
+    feed_mm_per_s: Along the path, unless `rules` state otherwise.
     following: As in push().
-    rules: How it is run. None: the feed is per s along the path.
-    line: What the state shows while it is run.
-    stop_at_end: Exact stop; on the last segment of a program it says that none is missing.
+    rules: Rules for running it. None: the feed is per s along the path.
+    line: Shown by the state while the segment runs.
+    stop_at_end: Exact stop; marks the last segment of a program, after which none is missing.
 
 Returns:
-    PushResult; nothing was taken unless it is `accepted`.)")
+    PushResult; unless it is `accepted`, nothing has changed.)")
       .def("push_arc", &PyController::push_arc, py::arg("end_mm"), py::arg("centre_mm"), py::arg("sweep_rad"),
            py::arg("feed_mm_per_s"), py::arg("normal") = 2, py::arg("following") = py::none(), py::kw_only(),
            py::arg("rules") = py::none(), py::arg("line") = 0, py::arg("stop_at_end") = false,
-           R"(The same along an arc or helix, as Segment.arc makes it.
+           R"(Appends an arc or helix from the end of the previous segment, as Segment.arc makes it.
 
 Args:
     end_mm: Shape (3,), mm.
-    centre_mm: Shape (3,), mm; its value along `normal` has no say.
+    centre_mm: Shape (3,), mm; its value along `normal` has no effect.
     sweep_rad: Above zero: X towards Y about Z, Y towards Z about X, Z towards X about Y.
     feed_mm_per_s: Along the path.
-    normal: Axis across its plane: 0 X, 1 Y, 2 Z.
+    normal: Axis perpendicular to its plane: 0 X, 1 Y, 2 Z.
     following: As in push().
-    rules: How it is run. None: the feed is per s along the path.
-    line: What the state shows while it is run.
+    rules: Rules for running it. None: the feed is per s along the path.
+    line: Shown by the state while the segment runs.
     stop_at_end: Exact stop.
 
 Returns:
-    PushResult; nothing was taken unless it is `accepted`.
+    PushResult; unless it is `accepted`, nothing has changed.
 
 Raises:
     ArgumentError: No radius, no sweep, or a number that is not finite.)");
@@ -431,7 +430,7 @@ void register_controller(py::module_& module) {
       py::arg("travel") = py::tuple(), py::arg("offset") = py::tuple(), py::arg("emergency_acceleration") = py::tuple(),
       py::arg("spindle_bandwidth_hz") = ControllerSettings{}.spindle_bandwidth_hz, py::arg("retrace_periods") = 0,
       py::arg("other_shapers") = py::tuple(), py::arg("fade_time_s") = ControllerSettings{}.fade_time_s,
-      "ArgumentError if it is not what the class asks for.");
+      "Raises ArgumentError or DesignError as the class states.");
   register_pushes(controller);
   controller
       .def(
@@ -440,75 +439,75 @@ void register_controller(py::module_& module) {
             return self.control().push_event({id, word});
           },
           py::arg("id"), py::arg("word") = 0,
-          R"(An event behind the segment that was pushed last: spindle, coolant, an output.
+          R"(Appends an event after the last pushed segment: spindle, coolant, an output.
 
 Args:
-    id: What it is, the caller's own, below 2^32.
-    word: What belongs to it, below 2^64.
+    id: Identifier of the caller, below 2^32.
+    word: Further data of the caller, below 2^64.
 
 Returns:
     `accepted`, `queue_full` (as many may wait as segments), `flushing`, `aborted`.)")
       .def(
           "push_dwell", [](PyController& self, double time_s) { return self.control().push_dwell(time_s); },
-          py::arg("time_s"), R"(Rest behind the segment that was pushed last. A hold in it restarts it.
+          py::arg("time_s"), R"(Appends a dwell after the last pushed segment. A hold during the dwell restarts it.
 
 Args:
-    time_s: For so long the set-points rest, 0 to 1e6.
+    time_s: Time for which the set-points rest in s, 0 to 1e6.
 
 Returns:
     `accepted`, `no_time`, `flushing`, `aborted`.)")
       .def(
           "push_stop", [](PyController& self) { return self.control().push_stop(); },
-          "A programmed stop (M00) behind the segment that was pushed last: at rest there it is held until resume().")
-      .def("take_events", &PyController::take_events, R"(The events that were reached since they were taken last.
+          "Appends a programmed stop (M00) after the last pushed segment: the control is held there until resume().")
+      .def("take_events", &PyController::take_events, R"(Returns the events reached since the last call.
 
-A junction that is passed is reached when its place has come through smoothing and shaper (`delay_periods`, rounded), one at which the
-motion rests when the set-points come to rest.
+A junction passed in motion is reached when its position has come through smoothing and shaper (`delay_periods`,
+rounded); a junction at which the motion stops, when the set-points come to rest.
 
 Returns:
-    In the order of their pushes, each with its step.)")
+    The events in the order in which they were pushed, each with its step.)")
       .def("step", &PyController::step, py::arg("periods") = 1, py::arg("spindle") = py::none(),
            R"(The next set-points, one for each period.
 
 Args:
-    periods: How many, >= 0.
-    spindle: Where the spindle is in each period, revolutions that go on counting, (periods,). None: it is not measured.
+    periods: Number of set-points, >= 0.
+    spindle: Spindle position in each period, in continuously counted revolutions, (periods,). None: not measured.
 
 Returns:
-    (periods, n_axes), mm or the unit of a following axis; `state.activity` says what the last one was.
+    (periods, n_axes), mm or the unit of a following axis; `state.activity` is that of the last one.
 
 Raises:
-    ArgumentError: Periods below 0, or not as many angles.)")
+    ArgumentError: Periods below 0, or another number of spindle positions.)")
       .def("step_motion", &PyController::step_motion, py::arg("periods") = 1,
-           R"(The next set-points with what a drive's feed-forward wants.
+           R"(The next set-points with velocity and acceleration, for the feed-forward of a drive.
 
-They leave the same smoothing and shaper as the positions do. What the changes of a shaper that follows an axis add is not in there.
+All three pass through the same smoothing and shaper. The effect of changing taps of a FollowingFir is not included.
 
 Args:
-    periods: How many, >= 0.
+    periods: Number of set-points, >= 0.
 
 Returns:
-    Positions, velocities (per s) and accelerations (per s^2), each (periods, n_axes), in mm or the unit of a following axis.
+    Positions, velocities (per s) and accelerations (per s^2), each (periods, n_axes), in mm or the axis' unit.
 
 Raises:
     ArgumentError: Periods below 0.)")
       .def(
           "flush", [](PyController& self) { self.control().flush(); },
-          "Comes to rest along the path and forgets the rest of it; when it rests, flushed() makes it go on from "
+          "Decelerates to rest along the path and discards the rest of it; at rest, flushed() lets new segments start "
           "there.")
-      .def("flushed", &PyController::flushed, R"(After flush(): takes segments again, from where the motion rests.
+      .def("flushed", &PyController::flushed, R"(Completes a flush(): accepts segments again, from the position of rest.
 
 Returns:
-    That position, (n_axes,). None: it does not rest yet, or plan() is at work, or there was no flush().)")
-      .def("probe", &PyController::probe, R"(A probe has touched, in the period of the last step: flushes.
+    That position, (n_axes,). None: it is not yet at rest, or plan() is running, or there was no flush().)")
+      .def("probe", &PyController::probe, R"(Reports a probe contact in the period of the last step, and flushes.
 
 Returns:
     The set-point of that period, (n_axes,).)")
       .def("run", &PyController::run, py::arg("max_periods") = 1'000'000,
-           R"(Steps until it rests: idle, held or aborted.
+           R"(Steps until the control is idle, held or aborted.
 
 Args:
-    max_periods: It stops there, at the latest.
+    max_periods: Maximum number of steps.
 
 Returns:
     (n, n_axes), mm or the unit of a following axis.
@@ -516,21 +515,21 @@ Returns:
 Raises:
     ArgumentError: Periods below 0.)")
       .def("plan", &PyController::plan,
-           "Plans on until enough lies ahead; with `lead_periods`, from one thread. False: there was nothing to do.")
+           "Plans until enough motion lies ahead; only with `lead_periods`, from one thread. False: nothing to do.")
       .def(
           "feed_override", [](PyController& self, double ratio) { self.control().feed_override(ratio); },
           py::arg("ratio"),
-          "Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. It acts on what is not "
-          "planned yet, after 8 to 32 periods and the lead; 0 is a hold.")
+          "Sets the feed override, a ratio of 0 to 2; a value outside is limited to this range. It acts on motion not "
+          "yet planned: after 8 to 32 periods and the lead; 0 is a hold.")
       .def(
           "rapid_override", [](PyController& self, double ratio) { self.control().rapid_override(ratio); },
-          py::arg("ratio"), "The same of rapids, which the feed override leaves alone.")
+          py::arg("ratio"), "Sets the override of rapids, likewise. The feed override has no effect on them.")
       .def(
           "exchange_shaper",
           [](PyController& self, std::size_t number) { return self.control().exchange_shaper(number); },
-          py::arg("number"), R"(Fades to another shaper, in motion or at rest; the limits hold.
+          py::arg("number"), R"(Fades to another shaper, in motion or at rest, within the limits.
 
-From the next period on, or when an earlier fade or a synchronous segment ends; a synchronous segment waits for it.
+Begins with the next period, or after an earlier fade or synchronous segment; a synchronous segment waits for the fade.
 
 Args:
     number: 0: `shaper`; 1 and up: `other_shapers`.
@@ -538,58 +537,57 @@ Args:
 Returns:
     False: there is no such number.)")
       .def(
-          "hold", [](PyController& self) { self.control().hold(); }, "Come to rest along the path.")
+          "hold", [](PyController& self) { self.control().hold(); }, "Decelerates to rest along the path.")
       .def(
-          "resume", [](PyController& self) { self.control().resume(); }, "Go on after hold().")
+          "resume", [](PyController& self) { self.control().resume(); }, "Continues after hold() or a programmed stop.")
       .def(
           "abort", [](PyController& self) { self.control().abort(); },
-          "Come to rest along the path and forget the rest of it.")
+          "Decelerates to rest along the path and discards the rest of it; nothing is accepted until restart().")
       .def(
           "emergency_stop", [](PyController& self) { self.control().emergency_stop(); },
-          "Come to rest along the path with all that `emergency_acceleration` allows, whatever the jerk; then as "
-          "abort().")
+          "Decelerates to rest along the path with `emergency_acceleration`, without a jerk limit; then as abort().")
       .def(
           "jog", [](PyController& self, int axis, double speed) { return self.control().jog(axis, speed); },
-          py::arg("axis"), py::arg("speed"), R"(Moves an axis by hand while the path rests.
+          py::arg("axis"), py::arg("speed"), R"(Jogs an axis while the path rests; it stops at the end of its travel.
 
-That is after hold(), at a stop that was pushed, after flush() until flushed(), after abort(). resume() leads back onto the path, each axis as
-fast as it was jogged last; flushed() and restart() begin at the new place.
+Allowed after hold(), at a programmed stop, after flush() until flushed(), and after abort(). resume() first leads back
+to the path, each axis at its last jog speed; flushed() and restart() begin at the new position.
 
 Args:
     axis: Its index, from 0.
-    speed: With its sign, unit per s; given again it counts from the next period; 0: to rest.
+    speed: With its sign, unit per s; a new speed acts from the next period; 0: stop.
 
 Returns:
-    JogResult; unless it is `accepted` nothing has happened. It comes to rest at the end of the travel.)")
+    JogResult; unless it is `accepted`, nothing has changed.)")
       .def(
           "jog_by",
           [](PyController& self, int axis, double distance, double speed) {
             return self.control().jog_by(axis, distance, speed);
           },
-          py::arg("axis"), py::arg("distance"), py::arg("speed"), R"(Likewise by a distance.
+          py::arg("axis"), py::arg("distance"), py::arg("speed"), R"(Jogs an axis by a distance, where jog() is allowed.
 
 Args:
     axis: Its index, from 0.
-    distance: With its sign; those that are given before it ends add up.
+    distance: With its sign; further distances before its end are added.
     speed: Unit per s.
 
 Returns:
-    JogResult; unless it is `accepted` nothing has happened.)")
+    JogResult; unless it is `accepted`, nothing has changed.)")
       .def(
           "retrace", [](PyController& self, double distance_mm) { return self.control().retrace(distance_mm); },
-          py::arg("distance_mm"), R"(Back along the path, at half the speed with which it was run.
+          py::arg("distance_mm"), R"(Moves back along the path, at half the original speed.
 
-When a jog may; resume() leads to where the path rests, then it goes on.
+Allowed when a jog is; resume() returns to the position where the path rests, then continues.
 
 Args:
-    distance_mm: From where it rests, as far as it is kept; less than before: forward.
+    distance_mm: From the position of rest, as far as periods are stored; a smaller one than before: forward.
 
 Returns:
-    JogResult; unless it is `accepted` nothing has happened.)")
+    JogResult; unless it is `accepted`, nothing has changed.)")
       .def(
           "offset", [](PyController& self, int axis, double value) { return self.control().offset(axis, value); },
           py::arg("axis"), py::arg("value"),
-          R"(An offset of an axis: it goes there within its own limits, at rest and while the path is run.
+          R"(Sets an offset, which the axis approaches within the limits of its offset, at rest and in motion.
 
 Args:
     axis: Its index, from 0.
@@ -602,9 +600,9 @@ Returns:
           [](PyController& self, int axis, double low, double high) {
             return self.control().travel(axis, {low, high});
           },
-          py::arg("axis"), py::arg("low"), py::arg("high"), R"(Where an axis may be from now on.
+          py::arg("axis"), py::arg("low"), py::arg("high"), R"(Sets the travel range of an axis.
 
-Where the path that is planned would leave it, the control is held, with the stop that is planned.
+If the planned path would leave it, the control is held, with the planned stop.
 
 Args:
     axis: Its index, from 0.
@@ -614,20 +612,20 @@ Args:
 Returns:
     False: there is no such axis, or `low` is above `high`.)")
       .def("restart", &PyController::restart, py::arg("position"),
-           "At rest at a position (n_axes,), the queue empty. ArgumentError on another shape or a value that is not "
-           "finite.")
+           "Sets the control at rest at a position (n_axes,), with an empty queue. Raises ArgumentError on another "
+           "shape or a value that is not finite.")
       .def_property_readonly("state", &PyController::state, "A snapshot: ControllerState.")
       .def_property_readonly(
-          "n_axes", [](const PyController& self) { return self.control().axes(); }, "Axes of a set-point.")
-      .def_property_readonly("end_mm", &PyController::end, "Where the next segment must start, (3,), mm.")
+          "n_axes", [](const PyController& self) { return self.control().axes(); }, "Number of axes of a set-point.")
+      .def_property_readonly("end_mm", &PyController::end, "Start of the next segment, (3,), mm.")
       .def_property_readonly("following_end", &PyController::following_end,
-                             "Where the following axes are at the end of the last segment, (n_axes - 3,).")
+                             "Positions of the following axes at the end of the last segment, (n_axes - 3,).")
       .def_property_readonly(
           "delay_periods", [](const PyController& self) { return self.control().delay_periods(); },
           "Mean delay of correction, smoothing and shaper, in periods.")
       .def_property_readonly(
           "correction_delay", [](const PyController& self) { return self.control().correction_delay(); },
-          "Periods of that which are the contour correction's.");
+          "Part of `delay_periods` caused by the contour correction, in periods.");
 }
 
 }  // namespace shapegcode::bindings

@@ -76,23 +76,23 @@ struct PyVaryingStream {
 };
 
 void register_varying(py::module_& module) {
-  py::class_<VaryingFir>(module, "VaryingFir", R"(A set of filters on one grid between which the input moves.
+  py::class_<VaryingFir>(module, "VaryingFir", R"(A set of filters on one grid, with a varying choice among them.
 
 Each increment of the input is replaced by the whole impulse train of the filter that is valid where it begins (scatter
 form), so that every increment keeps the zeros of its own filter, however often the filters change. Place k is filter k
-of the set; place k + w shares an increment between filters k and k + 1.
+of the set; place k + w (0 < w < 1) gives the part 1 - w of an increment to filter k and w to filter k + 1.
 
 Args:
     set: The filters (Fir), at least one.
 
 Raises:
     ArgumentError: An empty set.)")
-      .def(py::init<std::vector<Fir>>(), py::arg("set"), "Make a set; ArgumentError if it is empty.")
+      .def(py::init<std::vector<Fir>>(), py::arg("set"), "Raises ArgumentError if the set is empty.")
       .def_property_readonly("set", &VaryingFir::set, "The filters.")
       .def_property_readonly("duration_samples", &VaryingFir::duration_samples, "Largest delay in samples.")
       .def_property_readonly("mean_samples", &VaryingFir::mean_samples, "Mean delay, average of the set, in samples.")
       .def_property_readonly("variance_samples2", &VaryingFir::variance_samples2,
-                             "Largest second central moment in samples squared: the contour cost.")
+                             "Largest second central moment of the set in samples squared.")
       .def("on_finer_grid", &VaryingFir::on_finer_grid, py::arg("factor"),
            "The same set on a grid `factor` times as fine. Raises ArgumentError below 1.")
       .def(
@@ -136,10 +136,10 @@ Raises:
           },
           py::arg("position"), py::arg("place"), "Filtered sample, n_axes values.");
 
-  py::class_<FollowingFir>(module, "FollowingFir", R"(A set of filters followed along an axis.
+  py::class_<FollowingFir>(module, "FollowingFir", R"(A set of filters along an axis, whose position selects the filter.
 
-Filter k of the set is valid where the axis is at position k; in between the increments are shared, beyond the ends the
-last filter holds. Each increment goes by its own middle in the input.
+Filter k of the set is valid where the axis is at position k; in between the increments are divided, beyond the ends the
+nearest filter is valid. The middle of each increment selects its filter.
 
 Args:
     fir: The set.
@@ -149,9 +149,9 @@ Args:
 Raises:
     ArgumentError: No such axis, another number of positions, or positions that do not ascend.)")
       .def(py::init<VaryingFir, int, std::vector<double>>(), py::arg("fir"), py::arg("axis"), py::arg("position_mm"),
-           "Place the filters of a set; ArgumentError if the positions do not fit.")
+           "Raises ArgumentError if axis or positions do not fit.")
       .def_property_readonly("fir", &FollowingFir::fir, "The set.")
-      .def_property_readonly("axis", &FollowingFir::axis, "Axis whose position counts.")
+      .def_property_readonly("axis", &FollowingFir::axis, "Axis whose position selects the filter.")
       .def_property_readonly("position_mm", &FollowingFir::position_mm, "Positions of the filters, mm.")
       .def("place", &FollowingFir::place, py::arg("position_mm"), "Place in the set for a position (mm) of the axis.")
       .def("on_finer_grid", &FollowingFir::on_finer_grid, py::arg("factor"),
@@ -183,15 +183,15 @@ void register_filter(py::module_& module) {
       .def_static("moving_average", &Fir::moving_average, py::arg("length"),
                   "Equal weights over `length` samples; costs the same for any length. Raises ArgumentError below 1.")
       .def_static("exponential", &Fir::exponential, py::arg("time_constant_samples"), py::arg("rest") = 1e-6,
-                  "Geometric weights exp(-k / time_constant), cut off where less than the share `rest` of them is left "
-                  "and scaled to a sum of 1; costs the same for any length. Raises ArgumentError on a time constant "
-                  "that is not > 0 or a share outside 0 ... 1.")
+                  "Geometric weights exp(-k / time_constant), cut off where less than the ratio `rest` of their sum "
+                  "remains and scaled to a sum of 1; costs the same for any length. Raises ArgumentError on a time "
+                  "constant that is not > 0 or a ratio outside 0 ... 1.")
       .def_property_readonly("delays", &Fir::delays, "Delays in samples.")
       .def_property_readonly("taps", &Fir::taps, "Weights, adding up to 1.")
       .def_property_readonly("duration_samples", &Fir::duration_samples, "Largest delay in samples.")
       .def_property_readonly("mean_samples", &Fir::mean_samples, "Mean delay in samples.")
       .def_property_readonly("variance_samples2", &Fir::variance_samples2,
-                             "Second central moment in samples squared: the contour cost.")
+                             "Second central moment in samples squared; on a circle dR/R = variance*(v/R)^2/2.")
       .def("apply", &apply, py::arg("samples"),
            "Filter samples of shape (n,) or (n, n_axes); the result has duration_samples more rows. The input is held "
            "at "

@@ -64,8 +64,8 @@ void register_trajectory(py::module_& module) {
       py::arg("feed_mm_per_s") = py::none(), py::arg("period_s") = 0.001,
       R"(Set-points of a whole path from rest to rest, nearly as fast as the limits of every axis allow.
 
-Junctions are rounded within the tolerance, jerk is limited, and the motion rests at segments with `stop_at_end`. Limits
-hold for the differences of the set-points (1.001); programmed feeds are kept. Bit for bit the set-points of a
+Junctions are rounded within the tolerance, jerk is limited, and the motion rests at segments with `stop_at_end`. The
+differences of the set-points keep the limits to a factor of 1.001, and the programmed feeds. Bit for bit those of a
 `MotionController` without filters that is given all segments at once. See docs/concepts/time_optimal.md.
 
 Args:
@@ -73,15 +73,15 @@ Args:
     max_feed_mm_per_s: Limit of every axis, mm/s: a number for all, or one for each, shape (3,).
     max_acceleration_mm_per_s2: Likewise, mm/s^2.
     max_jerk_mm_per_s3: Likewise, mm/s^3.
-    contour_tolerance_mm: By which the path may be left where its direction or curvature jumps, mm; 0: rest there.
-    feed_mm_per_s: Feed along the polyline through points, mm/s; None: as fast as the axes can be.
-    period_s: Between two set-points, s.
+    contour_tolerance_mm: Permitted deviation where direction or curvature of the path jumps, mm; 0: stop there.
+    feed_mm_per_s: Feed along the polyline through points, mm/s; None: as fast as the limits allow.
+    period_s: Time between two set-points, s.
 
 Returns:
-    Set-points, (n_samples, 3), mm, read-only: the start first, the end to the last bit last.
+    Set-points, (n_samples, 3), mm, read-only; the first is the start, the last exactly the end.
 
 Raises:
-    ArgumentError: A limit or a period that is not above zero and finite, a tolerance below zero, a segment without feed.
+    ArgumentError: A limit or period that is not above zero and finite, a tolerance below zero, a segment without feed.
     NumericError: The limits cannot be kept.)");
 }
 
@@ -92,7 +92,7 @@ void register_motion(py::module_& module) {
       .value("constant_time", AccelerationLaw::constant_time)
       .value("jerk_limited", AccelerationLaw::jerk_limited);
 
-  py::class_<MotionLimits>(module, "MotionLimits", "What look-ahead keeps; infinity switches a limit off.")
+  py::class_<MotionLimits>(module, "MotionLimits", "Limits of the look-ahead; infinity switches a limit off.")
       .def(py::init<>())
       .def_readwrite("law", &MotionLimits::law, "Law of a change of speed.")
       .def_readwrite("time_constant_s", &MotionLimits::time_constant_s, "Ramp from rest to the programmed feed, s.")
@@ -101,33 +101,33 @@ void register_motion(py::module_& module) {
       .def_readwrite("max_acceleration_mm_per_s2", &MotionLimits::max_acceleration_mm_per_s2, "Per axis, shape (3,).")
       .def_readwrite("max_jerk_mm_per_s3", &MotionLimits::max_jerk_mm_per_s3, "Per axis, shape (3,).")
       .def_readwrite("corner_speed_difference_mm_per_s", &MotionLimits::corner_speed_difference_mm_per_s,
-                     "Speed step per axis at a corner, shape (3,).")
+                     "Maximum speed difference per axis at a corner, shape (3,), mm/s.")
       .def_readwrite("centripetal_acceleration_mm_per_s2", &MotionLimits::centripetal_acceleration_mm_per_s2,
-                     "Across the path on arcs.")
+                     "Centripetal acceleration on arcs, mm/s^2.")
       .def_readwrite("polyline_acceleration_mm_per_s2", &MotionLimits::polyline_acceleration_mm_per_s2,
-                     "Across the path along polylines.")
+                     "Centripetal acceleration along polylines, mm/s^2.")
       .def_readwrite("corner_stop_angle_rad", &MotionLimits::corner_stop_angle_rad,
                      "A corner that turns by as much or more is a stop.")
       .def_readwrite("junction_deviation_mm", &MotionLimits::junction_deviation_mm,
-                     "A corner is passed as an arc that cuts it by so much.")
-      .def_readwrite("block_time_s", &MotionLimits::block_time_s, "No block is run off faster, s.")
+                     "A corner is passed as an arc that cuts it by this distance.")
+      .def_readwrite("block_time_s", &MotionLimits::block_time_s, "Minimum duration of a block, s.")
       .def_readwrite("contour_acceleration_mm_per_s2", &MotionLimits::contour_acceleration_mm_per_s2,
                      "Of a change of direction, per axis, on arcs and along polylines, shape (3,).")
       .def_readwrite("feed_override", &MotionLimits::feed_override, "Scales the programmed feeds.")
       .def_readwrite("arc_feed_ratio", &MotionLimits::arc_feed_ratio, "Feed on arcs relative to the programmed one.")
       .def_readwrite("feed_spread_s", &MotionLimits::feed_spread_s,
-                     "Time by which a lower programmed feed is reached before its segment and kept behind it, s.")
+                     "Time by which a lower programmed feed is reached before its segment and held after it, s.")
       .def_readwrite("feed_excess_ratio", &MotionLimits::feed_excess_ratio,
-                     "Share by which a neighbour may be faster without that.");
+                     "Neighbours faster by up to this ratio need no `feed_spread_s`.");
 
   py::class_<FilterTolerance>(
       module, "FilterTolerance",
-      "Within what a filter behind the interpolation must stay at corners and on arcs; without spread no limit.")
+      "Deviation permitted to a filter after the interpolation at corners and on arcs; with zero variance no limit.")
       .def(py::init<>())
       .def_readwrite("contour_tolerance_mm", &FilterTolerance::contour_tolerance_mm,
                      "Deviation allowed to the filter, mm; infinity: any.")
       .def_readwrite("corner_share", &FilterTolerance::corner_share,
-                     "Share of the tolerance for one corner: several may fall into one filter.")
+                     "Part of the tolerance for one corner: deviations of corners within one filter length add up.")
       .def_readwrite("variance_s2", &FilterTolerance::variance_s2, "Second central moment of the filter, s^2.")
       .def_readwrite("mean_deviation_s", &FilterTolerance::mean_deviation_s, "Its mean absolute deviation, s.");
 
@@ -145,8 +145,8 @@ void register_motion(py::module_& module) {
         return std::make_shared<SpeedProfile>(plan_speed(*path, limits, tolerance));
       },
       py::arg("path").none(false), py::arg("limits"), py::arg("tolerance") = FilterTolerance{},
-      "Tangential speed profile over a whole path from rest to rest, with a filter behind it that must stay within its "
-      "tolerance. Raises ArgumentError on a limit that is not > 0.");
+      "Tangential speed profile over a whole path from rest to rest; `tolerance`: the filter after the interpolation, "
+      "and the deviation permitted to it. Raises ArgumentError on a limit that is not > 0.");
 
   py::class_<Interpolator>(module, "Interpolator",
                            "Set-points of a path, one per interpolation period (real-time form).")
@@ -162,7 +162,7 @@ void register_motion(py::module_& module) {
             const bool moving = self.step(position);
             return std::make_pair(moving, position);
           },
-          "(moving, position of shape (3,)); moving is False once the last set-point was given.")
+          "Returns (moving, position of shape (3,)); moving is False after the last set-point.")
       .def_property_readonly("sample_count", &Interpolator::sample_count, "Set-points from start to end.");
 
   module.def(

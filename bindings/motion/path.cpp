@@ -95,9 +95,8 @@ void register_path(py::module_& module) {
           },
           py::arg("start_mm"), py::arg("end_mm"), py::arg("centre_mm"), py::arg("sweep_rad"), py::arg("feed_mm_per_s"),
           py::arg("normal") = 2,
-          "An arc or helix about the axis `normal` (0 X, 1 Y, 2 Z); `sweep_rad` > 0 turns counter-clockwise seen along "
-          "it. "
-          "Raises ArgumentError on a zero radius or sweep.")
+          "An arc or helix about the axis `normal` (0 X, 1 Y, 2 Z); `sweep_rad` > 0 turns counter-clockwise seen from "
+          "its positive end. Raises ArgumentError on a zero radius or sweep.")
       .def_readonly("start_mm", &Segment::start_mm, "Start, shape (3,), mm.")
       .def_readonly("end_mm", &Segment::end_mm, "End, shape (3,), mm.")
       .def_readonly("centre_mm", &Segment::centre_mm, "Centre of an arc, shape (3,), mm.")
@@ -107,7 +106,7 @@ void register_path(py::module_& module) {
       .def_readonly("feed_mm_per_s", &Segment::feed_mm_per_s, "Programmed feed, mm/s; 0 for a rapid.")
       .def_readonly("line_number", &Segment::line, "Source line, from 1; 0 if there is none.")
       .def_readonly("kind", &Segment::kind, "Kind of the move.")
-      .def_readonly("normal", &Segment::normal, "Axis across the plane of an arc: 0 X, 1 Y, 2 Z.")
+      .def_readonly("normal", &Segment::normal, "Axis perpendicular to the plane of an arc: 0 X, 1 Y, 2 Z.")
       .def(
           "point_at", [](const Segment& self, double s) { return point_at(self, s); }, py::arg("s_mm"),
           "Position at a distance from the start, shape (3,), mm.")
@@ -120,10 +119,10 @@ void register_path(py::module_& module) {
             return chords_within(self, tolerance_mm);
           },
           py::arg("tolerance_mm"),
-          "How many equal chords of an arc lie within a tolerance of it; 1 for a line.\n\n"
-          "Raises ArgumentError if the tolerance is not above 0.");
+          "Number of equal chords that approximate an arc within a tolerance; 1 for a line.\n\nRaises ArgumentError if "
+          "the tolerance is not above 0.");
 
-  py::class_<Path, std::shared_ptr<Path>>(module, "Path", "A connected run of segments.")
+  py::class_<Path, std::shared_ptr<Path>>(module, "Path", "A connected sequence of segments.")
       .def(py::init<std::vector<Segment>>(), py::arg("segments"),
            "Raises ArgumentError if a segment does not start where its predecessor ends.")
       .def("__len__", &Path::size)
@@ -141,7 +140,7 @@ void register_path(py::module_& module) {
           },
           py::arg("index"), "Segment at an index.")
       .def("moves_as", &Path::moves_as, py::arg("other"),
-           "Whether the motion is the same: geometry, feeds and stops, whatever lines they come from.")
+           "Whether the motion is the same: geometry, feeds and stops, regardless of line numbers.")
       .def_property_readonly("length_mm", &Path::length_mm, "Whole length, mm.")
       .def_property_readonly(
           "start_mm", [](const Path& self) { return self.size() > 0 ? self.start_mm(0) : Vector3(Vector3::Zero()); },

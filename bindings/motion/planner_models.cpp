@@ -12,7 +12,7 @@ namespace py = pybind11;
 namespace shapegcode::bindings {
 
 void register_planner_models(py::module_& module) {
-  py::enum_<ControllerKind>(module, "ControllerKind", "Whose rules plan a program.")
+  py::enum_<ControllerKind>(module, "ControllerKind", "The control whose rules plan a program.")
       .value("fanuc", ControllerKind::fanuc)
       .value("linuxcnc", ControllerKind::linuxcnc)
       .value("klipper", ControllerKind::klipper)
@@ -20,37 +20,37 @@ void register_planner_models(py::module_& module) {
 
   py::class_<PlannerRules>(module, "PlannerRules", "Settings of the open planners.")
       .def(py::init<>())
-      .def_readwrite("kind", &PlannerRules::kind, "Whose rules.")
+      .def_readwrite("kind", &PlannerRules::kind, "The control whose rules are used.")
       .def_readwrite("arc_resolution_mm", &PlannerRules::arc_resolution_mm, "klipper: length of the chords of an arc.")
       .def_readwrite("chord_tolerance_mm", &PlannerRules::chord_tolerance_mm,
                      "klipper, grbl: arcs are emitted as chords within it; 0: as arcs.")
       .def_readwrite("square_corner_velocity_mm_per_s", &PlannerRules::square_corner_velocity_mm_per_s,
                      "klipper: speed at a corner of 90 degrees.")
       .def_readwrite("minimum_cruise_ratio", &PlannerRules::minimum_cruise_ratio,
-                     "klipper: max_accel_to_decel is max_accel times what it leaves of 1.")
+                     "klipper: max_accel_to_decel is max_accel times (1 - ratio).")
       .def_readwrite("arc_tolerance_mm", &PlannerRules::arc_tolerance_mm, "grbl: chords of an arc lie within it ($12).")
       .def_readwrite("junction_deviation_mm", &PlannerRules::junction_deviation_mm,
-                     "grbl: a corner is passed as an arc that cuts it by so much ($11).")
+                     "grbl: a corner is passed as an arc that cuts it by this distance ($11).")
       .def_readwrite("period_s", &PlannerRules::period_s, "linuxcnc: of the servo thread, in which it plans.")
-      .def_readwrite("blend_tolerance_mm", &PlannerRules::blend_tolerance_mm, "linuxcnc: G64 P; 0: not limited.")
+      .def_readwrite("blend_tolerance_mm", &PlannerRules::blend_tolerance_mm, "linuxcnc: G64 P; 0: half of a segment.")
       .def_readwrite("naive_cam_tolerance_mm", &PlannerRules::naive_cam_tolerance_mm,
-                     "linuxcnc: G64 Q: lines of one feed within it are one, an arc in XY within it is two lines.")
+                     "linuxcnc: G64 Q: lines of one feed within it are joined, an arc in XY becomes two lines.")
       .def_readwrite("ramp_frequency_hz", &PlannerRules::ramp_frequency_hz, "linuxcnc: shorter segments are ramps.")
-      .def_readwrite("kink_ratio", &PlannerRules::kink_ratio, "linuxcnc: share of the acceleration for a kink.")
-      .def_readwrite("max_feed_override", &PlannerRules::max_feed_override, "linuxcnc: it plans for that.")
+      .def_readwrite("kink_ratio", &PlannerRules::kink_ratio, "linuxcnc: ratio of the acceleration for a kink.")
+      .def_readwrite("max_feed_override", &PlannerRules::max_feed_override, "linuxcnc: override for which it plans.")
       .def_readwrite("rapid_follows", &PlannerRules::rapid_follows,
-                     "linuxcnc: else the last segment has half of the acceleration.")
-      .def_readwrite("optimization_depth", &PlannerRules::optimization_depth, "linuxcnc: segments that it looks ahead.")
+                     "linuxcnc: a rapid follows the path; otherwise its last segment has half of the acceleration.")
+      .def_readwrite("optimization_depth", &PlannerRules::optimization_depth, "linuxcnc: segments in its look-ahead.")
       .def_readwrite("look_ahead_blocks", &PlannerRules::look_ahead_blocks, "grbl: blocks of its planner's buffer.");
 
-  py::class_<LinuxcncSlowing>(module, "LinuxcncSlowing", "What LinuxCNC's rules for short segments do to a path.")
-      .def_readonly("segments", &LinuxcncSlowing::segments, "How many there are.")
-      .def_readonly("kinks", &LinuxcncSlowing::kinks, "Junctions above the kink ratio.")
-      .def_readonly("largest_ratio", &LinuxcncSlowing::largest_ratio, "Of the acceleration, that a junction asks for.")
-      .def_readonly("speed_mm_per_s", &LinuxcncSlowing::speed_mm_per_s, "There.")
-      .def_readonly("angle_rad", &LinuxcncSlowing::angle_rad, "There.")
-      .def_readonly("line", &LinuxcncSlowing::line, "There.")
-      .def_readonly("ramps", &LinuxcncSlowing::ramps, "Segments whose speed is a ramp.");
+  py::class_<LinuxcncSlowing>(module, "LinuxcncSlowing", "Effect of LinuxCNC's two rules for short segments on a path.")
+      .def_readonly("segments", &LinuxcncSlowing::segments, "Number of segments.")
+      .def_readonly("kinks", &LinuxcncSlowing::kinks, "Junctions that need more than the kink ratio.")
+      .def_readonly("largest_ratio", &LinuxcncSlowing::largest_ratio, "Largest ratio of acceleration at a junction.")
+      .def_readonly("speed_mm_per_s", &LinuxcncSlowing::speed_mm_per_s, "Speed at that junction, mm/s.")
+      .def_readonly("angle_rad", &LinuxcncSlowing::angle_rad, "Change of direction at that junction, rad.")
+      .def_readonly("line", &LinuxcncSlowing::line, "Source line of that junction.")
+      .def_readonly("ramps", &LinuxcncSlowing::ramps, "Number of segments whose speed is a ramp.");
   module.def(
       "linuxcnc_slowing",
       [](const std::shared_ptr<Path>& path, const MotionLimits& limits, const PlannerRules& rules, double corner_rad) {
@@ -58,7 +58,8 @@ void register_planner_models(py::module_& module) {
         return linuxcnc_slowing(*path, limits, rules, corner_rad);
       },
       py::arg("path").none(false), py::arg("limits"), py::arg("rules"), py::arg("corner_rad"),
-      "What LinuxCNC's two rules for short segments do to a path at its feeds; larger turns are corners.");
+      "Effect of LinuxCNC's two rules for short segments on a path at its feeds. Turns above `corner_rad` do not "
+      "count.");
 
   module.def(
       "controlled_motion",
@@ -74,7 +75,7 @@ void register_planner_models(py::module_& module) {
       },
       py::arg("path").none(false), py::arg("limits"), py::arg("rules"),
       "The path that a control follows, and its speed along it from rest to rest: (Path, SpeedProfile). Raises "
-      "ArgumentError on a segment without feed, or a setting that the planner does not take.");
+      "ArgumentError on a segment without feed, or an invalid setting.");
 }
 
 }  // namespace shapegcode::bindings

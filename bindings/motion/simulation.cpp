@@ -35,7 +35,7 @@ void register_simulation(py::module_& module) {
       .def(py::init([](const std::shared_ptr<Path>& path) { return ContourTracker(*path); }),
            py::arg("path").none(false), "Raises ArgumentError on a path without segments.");
 
-  py::class_<SimulationOptions>(module, "SimulationOptions", "What a run of set-points is measured with.")
+  py::class_<SimulationOptions>(module, "SimulationOptions", "Options of a simulation and of its measurements.")
       .def(py::init<>())
       .def_readwrite("period_s", &SimulationOptions::period_s, "Interpolation period, s.")
       .def_readwrite("axis_filters", &SimulationOptions::axis_filters, "Filters after the set-points, in order.")
@@ -43,78 +43,80 @@ void register_simulation(py::module_& module) {
           "tracker",
           [](const SimulationOptions& self) { return std::const_pointer_cast<ContourTracker>(self.tracker); },
           [](SimulationOptions& self, std::shared_ptr<ContourTracker> tracker) { self.tracker = std::move(tracker); },
-          "Tracker of the path, whose geometry several runs share; None: each run makes its own.")
+          "Tracker of the path, whose geometry several simulations share; None: each makes its own.")
       .def_readwrite("modes", &SimulationOptions::modes, "Modes of X, Y and Z.")
       .def_readwrite("mode_tables", &SimulationOptions::mode_tables,
                      "How the modes of X, Y and Z vary with position, one table per mode; none: constant modes.")
       .def_readwrite("drives", &SimulationOptions::drives,
                      "Feed drives of X, Y and Z in place of the modes; none: modes alone.")
-      .def_readwrite("settling_band_mm", &SimulationOptions::settling_band_mm, "Of the settling time, mm; 0: none.")
-      .def_readwrite(
-          "arrived_mm", &SimulationOptions::arrived_mm,
-          "Drives: the residual is the vibration of the table against its motor once that is so near, mm; 0: the "
-          "whole error from the stop on.")
+      .def_readwrite("settling_band_mm", &SimulationOptions::settling_band_mm,
+                     "Band of the settling time, mm; 0: not measured.")
+      .def_readwrite("arrived_mm", &SimulationOptions::arrived_mm,
+                     "Drives: the residual is the vibration of the table relative to its motor once the motor is "
+                     "within this distance of the command, mm; 0: |response - command| from the stop on.")
       .def_readwrite("settling_limit_s", &SimulationOptions::settling_limit_s,
-                     "How long behind the stop it is looked for; with drives the residual too, s.")
-      .def_readwrite("measure_contour", &SimulationOptions::measure_contour, "Deviations and orbit errors.")
+                     "Time after the stop in which the settling time is determined; with drives also the residual, s.")
+      .def_readwrite("measure_contour", &SimulationOptions::measure_contour,
+                     "Whether deviations and orbit errors are measured.")
       .def_readwrite("measure_response", &SimulationOptions::measure_response,
                      "False: the command alone; no figures of the response.")
       .def_readwrite("measure_command", &SimulationOptions::measure_command,
                      "False: the deviation of the response alone, no orbit errors.")
       .def_readwrite("feed_window_s", &SimulationOptions::feed_window_s,
-                     "Time over which the speed is held against the programmed feed, beside four and sixteen times it, "
-                     "s; 0: not measured.")
+                     "Averaging time of the largest speed relative to the programmed feed, also with four and sixteen "
+                     "times it, s; 0: not measured.")
       .def_readwrite("feed_slack_mm", &SimulationOptions::feed_slack_mm,
-                     "Distance within that time that rounding may add, mm.")
+                     "Distance that rounding may add within `feed_window_s`, mm.")
       .def_readwrite("last_seconds", &SimulationOptions::last_seconds,
-                     "Blocks only: simulate the last so many seconds; 0: all.")
+                     "Blocks only: simulate only this time before the end, s; 0: all.")
       .def_readwrite("starved_blocks", &SimulationOptions::starved_blocks,
-                     "Blocks only: what if the block buffer ran empty behind one of these blocks (ascending)?")
+                     "Blocks only: also simulate a buffer underrun after each of these (ascending), one at a time.")
       .def_readwrite("measure_response_orbit", &SimulationOptions::measure_response_orbit,
-                     "Orbit errors of the response too, where the contour is measured.")
-      .def_readwrite("starved_s", &SimulationOptions::starved_s, "How long the set-points then wait, s.")
+                     "Also orbit errors of the response, if the contour is measured.")
+      .def_readwrite("starved_s", &SimulationOptions::starved_s, "Duration of the wait in a buffer underrun, s.")
       .def_readwrite("starved_memory_s", &SimulationOptions::starved_memory_s,
-                     "How much of the run behind such a wait is looked at, s; 0: all.")
+                     "Time simulated after such a wait, s; 0: all.")
       .def_readwrite("other_overrides", &SimulationOptions::other_overrides,
-                     "Blocks only: the largest deviations at these feed overrides too.")
-      .def_readwrite("record_samples", &SimulationOptions::record_samples, "Samples kept for pictures; 0: none.");
+                     "Blocks only: also compute the largest deviations at these feed overrides.")
+      .def_readwrite("record_samples", &SimulationOptions::record_samples,
+                     "Maximum number of stored samples; 0: none.");
 
   py::class_<FeedExcess>(module, "FeedExcess",
-                         "Where a motion is fastest against the programmed feed at the same position.")
+                         "The largest ratio of the speed to the programmed feed at the same position.")
       .def_readonly("speed_mm_per_s", &FeedExcess::speed_mm_per_s, "Speed there, mm/s.")
       .def_readonly("programmed_mm_per_s", &FeedExcess::programmed_mm_per_s, "Feed programmed there, mm/s.")
       .def_readonly("line", &FeedExcess::line, "Line of the segment that is programmed there.")
       .def_property_readonly("ratio", &FeedExcess::ratio, "Speed over feed; 0 where nothing was measured.");
 
-  py::class_<StarvedFigures>(module, "StarvedFigures", "What a wait for the next block does to a run.")
-      .def_readonly("block", &StarvedFigures::block, "The set-points wait behind it.")
+  py::class_<StarvedFigures>(module, "StarvedFigures", "Effect of a buffer underrun.")
+      .def_readonly("block", &StarvedFigures::block, "Block after which the set-points wait.")
       .def_readonly("residual_mm", &StarvedFigures::residual_mm,
-                    "Largest |response - command| while the set-points rest, in the wait and at the end, (3,), mm.")
+                    "Largest |response - command| while the set-points rest, during the wait and at the end, (3,), mm.")
       .def_readonly("command", &StarvedFigures::command, "Deviation of the command from the path.")
       .def_readonly("response", &StarvedFigures::response, "Deviation of the response from the path.");
 
-  py::class_<OverrideFigures>(module, "OverrideFigures", "The largest deviations of a run at another feed override.")
+  py::class_<OverrideFigures>(module, "OverrideFigures", "The largest deviations at another feed override.")
       .def_readonly("override_ratio", &OverrideFigures::override_ratio, "1 = 100 %.")
       .def_readonly("command_mm", &OverrideFigures::command_mm, "Of the command from the path, mm.")
       .def_readonly("response_mm", &OverrideFigures::response_mm, "Of the response from the path, mm.");
 
   py::class_<SimulationFigures, std::shared_ptr<SimulationFigures>>(module, "SimulationFigures",
-                                                                    "Figures of one run from rest to rest.")
-      .def_readonly("duration_s", &SimulationFigures::duration_s, "Until the set-points rest, s.")
+                                                                    "Figures of one motion from rest to rest.")
+      .def_readonly("duration_s", &SimulationFigures::duration_s, "Time until the set-points rest, s.")
       .def_readonly("residual_mm", &SimulationFigures::residual_mm,
                     "Largest |response - command| from the instant at which the set-points rest, (3,), mm.")
       .def_readonly("settling_s", &SimulationFigures::settling_s,
-                    "From that instant until |response - command| stays within the band, (3,), s; inf: not within the "
-                    "limit.")
-      .def_readonly("peak_mm", &SimulationFigures::peak_mm, "Largest |response - command| before it, (3,), mm.")
+                    "Time from the rest of the set-points until |response - command| stays within the band, (3,), s; "
+                    "inf: not within the limit.")
+      .def_readonly("peak_mm", &SimulationFigures::peak_mm, "Largest |response - command| in motion, (3,), mm.")
       .def_readonly("peak_acceleration_mm_per_s2", &SimulationFigures::peak_acceleration_mm_per_s2,
                     "Of the command, (3,), mm/s^2.")
       .def_readonly("command", &SimulationFigures::command, "Deviation of the command from the path.")
       .def_readonly("response", &SimulationFigures::response, "Deviation of the response from the path.")
-      .def_readonly("orbit_error_percent", &SimulationFigures::orbit_error_percent, "Per arc of the path.")
+      .def_readonly("orbit_error_percent", &SimulationFigures::orbit_error_percent, "Orbit error per arc, in percent.")
       .def_readonly("response_orbit_error_percent", &SimulationFigures::response_orbit_error_percent,
-                    "The same of the response, where asked for.")
-      .def_readonly("feed_excess", &SimulationFigures::feed_excess, "Of the command, where asked for.")
+                    "Orbit error of the response per arc of the path, in percent, if requested.")
+      .def_readonly("feed_excess", &SimulationFigures::feed_excess, "Of the command, if requested.")
       .def_readonly("end_mm", &SimulationFigures::end_mm, "Last set-point, (3,), mm.")
       .def_readonly("starved", &SimulationFigures::starved, "One per SimulationOptions.starved_blocks.")
       .def_readonly("other_overrides", &SimulationFigures::other_overrides,
@@ -149,7 +151,7 @@ void register_simulation(py::module_& module) {
         return std::make_shared<SimulationFigures>(simulate_planned(path, limits, *programmed, options));
       },
       py::arg("path").none(false), py::arg("limits"), py::arg("options"), py::arg("programmed").none(false),
-      "simulate_path under the profile of plan_speed, which is not kept as a whole where it need not be.");
+      "simulate_path with the profile of plan_speed under the limits, without storing the profile if possible.");
 
   module.def(
       "simulate_blocks",
@@ -185,7 +187,8 @@ void register_simulation(py::module_& module) {
   module.def(
       "fastest_block_ends", [](const std::shared_ptr<Path>& blocks) { return fastest_block_ends(blocks->segments()); },
       py::arg("blocks").none(false),
-      "Per axis the block, but for the last, at whose end it is fastest; ascending, each once.");
+      "Blocks after which a stop excites most: for each axis the block with the highest speed at its end, except the "
+      "last block; ascending, without repetition.");
 
   module.def(
       "count_slowed_blocks",
@@ -194,7 +197,7 @@ void register_simulation(py::module_& module) {
         return count_slowed_blocks(blocks->segments(), {corner_speed_difference, max_feed});
       },
       py::arg("blocks").none(false), py::arg("corner_speed_difference_mm_per_s"), py::arg("max_feed_mm_per_s"),
-      "Blocks that a controller with look-ahead would run slower than programmed.");
+      "Number of blocks that a controller with look-ahead would run slower than programmed.");
 }
 
 }  // namespace shapegcode::bindings

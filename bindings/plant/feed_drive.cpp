@@ -52,7 +52,7 @@ py::array simulate_in_real_time(FeedDriveRealTime& drive, const VectorArray& set
 }
 
 void register_friction(py::module_& module) {
-  py::enum_<FrictionModel>(module, "FrictionModel", "How a sliding pair resists.")
+  py::enum_<FrictionModel>(module, "FrictionModel", "Friction of a sliding pair.")
       .value("viscous", FrictionModel::viscous, "In proportion to the speed alone.")
       .value("stribeck", FrictionModel::stribeck, "Coulomb, static and Stribeck, smooth through zero speed.")
       .value("lugre", FrictionModel::lugre, "The same with bristles: presliding, stick, frictional lag.");
@@ -64,7 +64,7 @@ Args:
     viscous_n_s_per_m: Viscous friction in N s/m, >= 0.
     coulomb_n: Sliding friction in N, > 0 unless viscous.
     static_n: Friction to be overcome from rest in N, >= coulomb_n.
-    stribeck_velocity_m_per_s: Speed in m/s at which static has given way to sliding friction, > 0 unless viscous.
+    stribeck_velocity_m_per_s: Speed of the transition from static to sliding friction in m/s, > 0 unless viscous.
     smoothing_velocity_m_per_s: Stribeck: sign(v) is tanh(v / this), m/s, > 0.
     bristle_stiffness_n_per_m: LuGre: force over displacement before sliding in N/m, > 0.
     bristle_damping_n_s_per_m: LuGre: damping of the bristles in N s/m, >= 0.
@@ -82,7 +82,7 @@ Raises:
            py::arg("viscous_n_s_per_m") = 0.0, py::arg("coulomb_n") = 0.0, py::arg("static_n") = 0.0,
            py::arg("stribeck_velocity_m_per_s") = 0.0, py::arg("smoothing_velocity_m_per_s") = 0.0,
            py::arg("bristle_stiffness_n_per_m") = 0.0, py::arg("bristle_damping_n_s_per_m") = 0.0,
-           "ArgumentError if it is not what the class asks for.")
+           "Raises ArgumentError on a value outside its range.")
       .def_readonly("model", &FrictionParameters::model, "Model.")
       .def_readonly("viscous_n_s_per_m", &FrictionParameters::viscous_n_s_per_m, "N s/m.")
       .def_readonly("coulomb_n", &FrictionParameters::coulomb_n, "N.")
@@ -103,20 +103,20 @@ the table. Immutable.
 
 Args:
     motor_mass_kg: Inertia of motor, coupling and screw in kg, > 0.
-    table_mass_kg: Table with what it carries in kg, > 0.
+    table_mass_kg: Table with its load in kg, > 0.
     stiffness_n_per_m: Motor to table, axial, in N/m, > 0.
-    damping_n_s_per_m: Beside the stiffness in N s/m, >= 0.
+    damping_n_s_per_m: Damping parallel to the stiffness in N s/m, >= 0.
     position_gain_per_s: Gain of the position loop in 1/s, > 0.
     velocity_gain_n_s_per_m: Force over speed error in N s/m, > 0.
-    velocity_integral_time_s: Of the speed controller in s; 0: none.
-    velocity_feed_forward_ratio: Share of the set-points' speed that is fed forward, 0 ... 1.
-    acceleration_feed_forward_ratio: Share of acceleration times both masses that is fed forward, 0 ... 1.
+    velocity_integral_time_s: Integral time of the speed controller in s; 0: none.
+    velocity_feed_forward_ratio: Ratio of the set-points' speed that is fed forward, 0 ... 1.
+    acceleration_feed_forward_ratio: Ratio of acceleration times both masses that is fed forward, 0 ... 1.
     position_feedback: What the position loop measures; the speed is always taken from the motor.
     backlash_m: Whole gap between motor and table in m, >= 0.
-    force_limit_n: Of the motor in N; 0: none.
+    force_limit_n: Force limit of the motor in N; 0: none.
     table_friction: Friction of the guideways.
     motor_friction: Friction of bearings, seals and nut.
-    modes: Modes of the structure, excited by the motion of the table.
+    modes: Modes of the structure, excited by the table.
 
 Raises:
     ArgumentError: A value outside its range.)")
@@ -151,7 +151,7 @@ Raises:
            py::arg_v("position_feedback", PositionFeedback::motor, "PositionFeedback.motor"),
            py::arg("backlash_m") = 0.0, py::arg("force_limit_n") = 0.0,
            py::arg("table_friction") = FrictionParameters(), py::arg("motor_friction") = FrictionParameters(),
-           py::arg("modes") = std::vector<Mode>{}, "ArgumentError if it is not what the class asks for.")
+           py::arg("modes") = std::vector<Mode>{}, "Raises ArgumentError on a value outside its range.")
       .def_readonly("motor_mass_kg", &FeedDriveParameters::motor_mass_kg, "kg.")
       .def_readonly("table_mass_kg", &FeedDriveParameters::table_mass_kg, "kg.")
       .def_readonly("stiffness_n_per_m", &FeedDriveParameters::stiffness_n_per_m, "N/m.")
@@ -167,7 +167,7 @@ Raises:
       .def_readonly("acceleration_feed_forward_ratio", &FeedDriveParameters::acceleration_feed_forward_ratio,
                     "0 ... 1.")
       .def_readonly("force_limit_n", &FeedDriveParameters::force_limit_n, "N; 0: none.")
-      .def_readonly("modes", &FeedDriveParameters::modes, "Of the structure, on the table.");
+      .def_readonly("modes", &FeedDriveParameters::modes, "Modes of the structure, excited by the table.");
 
   module.def(
       "linear_model",
@@ -178,12 +178,12 @@ Raises:
       py::arg("parameters"), R"(The drive as x' = A x + B w, y = C x + D w with inputs linear between the set-points.
 
 Args:
-    parameters: Without friction other than viscous, backlash and force limit.
+    parameters: The drive, with viscous friction only and without backlash and force limit.
 
 Returns:
     A, B, C, D. Input 0 is the set-point; input 1, only with acceleration feed-forward, the speed of the set-points,
-    whose sample is the difference to the one before over the period. The output is the response. Lengths in any one
-    unit, time in s.
+    sampled as the difference from the previous set-point divided by the period. The output is the response. Lengths in
+    any one unit, time in s.
 
 Raises:
     ArgumentError: The drive is not linear.)");
@@ -211,8 +211,9 @@ Raises:
            py::arg("rtol") = 1e-6, py::arg("atol_mm") = 1e-6, "ArgumentError on a value outside its range.")
       .def("reset", &FeedDrive::reset, py::arg("position_mm"), "At rest at a position (mm).")
       .def("step", &FeedDrive::step, py::arg("setpoint_mm"),
-           "Next set-point (mm); the response at that instant in mm. NumericError with CVODE's flag and the time.")
-      .def("respond", &respond, py::arg("setpoints_mm"), R"(Runs on over many set-points.
+           "Takes the next set-point (mm) and returns the response at that instant in mm. Raises ArgumentError on a "
+           "set-point that is not finite, NumericError with CVODE's flag and the time if the integrator fails.")
+      .def("respond", &respond, py::arg("setpoints_mm"), R"(Takes many set-points and returns the motion of the drive.
 
 Args:
     setpoints_mm: Shape (n,), mm.
@@ -223,18 +224,18 @@ Returns:
 
 Raises:
     ArgumentError: Another shape or a value that is not finite.
-    NumericError: The integrator failed; with CVODE's flag and the time.)")
+    NumericError: The integrator failed; the message carries CVODE's flag and the time.)")
       .def_property_readonly("response_mm", &FeedDrive::response_mm, "Table and modes, mm.")
       .def_property_readonly("table_mm", &FeedDrive::table_mm, "mm.")
       .def_property_readonly("motor_mm", &FeedDrive::motor_mm, "Angle of the motor as travel, mm.")
-      .def_property_readonly("time_s", &FeedDrive::time_s, "Since reset(), s.")
+      .def_property_readonly("time_s", &FeedDrive::time_s, "Time since reset(), s.")
       .def_property_readonly("parameters", &FeedDrive::parameters, "The drive.")
       .def_property_readonly("steps", &FeedDrive::steps, "Internal steps so far.")
       .def_property_readonly("rhs_evaluations", &FeedDrive::rhs_evaluations, "Evaluations of the equations so far.")
       .def("__copy__", [](const FeedDrive& self) { return FeedDrive(self); });
 
   py::class_<FeedDriveRealTime>(module, "FeedDriveRealTime",
-                                R"(The same with fixed steps and without error control: the real-time form.
+                                R"(FeedDrive with fixed steps and without error control: the real-time form.
 
 Args:
     parameters: The drive.
@@ -247,9 +248,9 @@ Raises:
            py::arg("substeps") = FeedDriveRealTime::default_substeps, "ArgumentError on a value outside its range.")
       .def("reset", &FeedDriveRealTime::reset, py::arg("position_mm"), "At rest at a position (mm).")
       .def("step", py::overload_cast<double>(&FeedDriveRealTime::step), py::arg("setpoint_mm"),
-           "Next set-point (mm); the response at that instant in mm.")
+           "Takes the next set-point (mm) and returns the response at that instant in mm.")
       .def("respond", &simulate_in_real_time, py::arg("setpoints_mm"),
-           "Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.");
+           "Responses (n,) in mm at many set-points (n,) in mm. Raises ArgumentError on another shape.");
 }
 
 }  // namespace shapegcode::bindings

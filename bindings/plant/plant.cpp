@@ -49,9 +49,9 @@ void register_linear_plant(py::module_& module) {
   py::class_<LinearPlant>(module, "LinearPlant",
                           R"(A linear plant x' = A x + B u, y = C x + D u, propagated exactly from sample to sample.
 
-The input is linear between samples (first-order hold), as a servo's set-points are; the state goes over a period by the
-matrix exponential, so stiff, undamped and integrating plants are as exact as any other. Units: whatever fits together,
-time in s.
+The input is linear between samples (first-order hold), as a servo's set-points are. The matrix exponential propagates
+the state over a period, so stiff, undamped and integrating plants are as exact as any other. Any consistent units, time
+in s.
 
 Args:
     a: System matrix, (n, n).
@@ -62,42 +62,42 @@ Args:
 
 Raises:
     ArgumentError: Shapes that do not fit, an empty one, a value that is not finite, or a period not above 0.
-    NumericError: The plant outgrows all numbers within a period.)")
+    NumericError: The plant overflows within a period.)")
       .def(py::init([](Eigen::MatrixXd a, Eigen::MatrixXd b, Eigen::MatrixXd c, Eigen::MatrixXd d, double period_s) {
              return LinearPlant({std::move(a), std::move(b), std::move(c), std::move(d)}, period_s);
            }),
            py::arg("a"), py::arg("b"), py::arg("c"), py::arg("d"), py::arg("period_s"),
            "Make a plant, at rest with state and input 0.")
       .def("reset", &LinearPlant::reset, py::arg("state"), py::arg("input"),
-           "State (n,) at the instant at which the input is `input` (m,); ArgumentError on another shape.")
+           "Sets the state (n,) and the input (m,) at that instant. Raises ArgumentError on another shape.")
       .def(
           "reset_at_rest",
           [](LinearPlant& self, const Eigen::VectorXd& input, const std::optional<Eigen::VectorXd>& near) {
             near ? self.reset_at_rest(input, *near) : self.reset_at_rest(input);
           },
           py::arg("input"), py::arg("near") = py::none(),
-          R"(Steady state under a constant input.
+          R"(Sets the steady state under a constant input.
 
 Args:
     input: Input, (m,).
-    near: Where integrators leave a choice, the state of rest nearest to this one, (n,), is taken; none: to zero.
+    near: If integrators leave the state undetermined, the steady state nearest to this one, (n,); None: nearest to 0.
 
 Raises:
-    ArgumentError: No state rests under this input (an integrator fills), or another shape.)")
+    ArgumentError: There is no steady state (the input makes an integrator grow), or another shape.)")
       .def("step", &stepped, py::arg("input"),
-           "One period later, with `input` (m,) at its end: the output (p,) there. In C++ real-time safe.")
+           "Advances by a period, with `input` (m,) at its end. Returns the output (p,) there.")
       .def("respond", &response, py::arg("inputs"), py::arg("state") = py::none(),
-           R"(Outputs for a whole record of inputs; what step() gives, to the last bit.
+           R"(Outputs for a whole record of inputs; identical to step(), to the last bit.
 
 Args:
     inputs: One row per sample, (n_samples, m), at least one row.
-    state: State at the first row, (n,); none: at rest under the first row.
+    state: State at the first row, (n,); None: at rest under the first row.
 
 Returns:
     Output at each row, (n_samples, p).
 
 Raises:
-    ArgumentError: Another shape, a value that is not finite, or no state of rest.)")
+    ArgumentError: Another shape, a value that is not finite, or no steady state.)")
       .def_property_readonly("state", &LinearPlant::state, "State at the last sample, (n,).")
       .def_property_readonly("output", &LinearPlant::output, "Output at the last sample, (p,).")
       .def_property_readonly("period_s", &LinearPlant::period_s, "Time between samples in s.");
@@ -106,7 +106,7 @@ Raises:
 
 Raises:
     ArgumentError: Not square or not finite.
-    NumericError: The result exceeds all numbers.)");
+    NumericError: The result overflows.)");
 }
 
 // NumPy owns the result, in the memory order of the command.
@@ -139,7 +139,7 @@ void register_plant(py::module_& module) {
   module.def("plant_response", &modal_response, py::arg("command_mm"), py::arg("modes"), py::arg("period_s"),
              R"(Response of base-excited modes to a whole record of set-points, exact for set-points linear in between.
 
-What the real-time plant of the core gives sample by sample, to the last bit, at the speed of a batch. At rest at the
+Identical to the real-time plant of the core, to the last bit, but computed as a batch. The plant is at rest at the
 first row.
 
 Args:
@@ -153,12 +153,12 @@ Returns:
 Raises:
     ArgumentError: Not as many lists of modes as axes, a command that is not finite, an invalid mode or period.)");
   register_linear_plant(module);
-  py::class_<ModeTable>(module, "ModeTable", R"(How a mode depends on where an axis stands. Immutable.
+  py::class_<ModeTable>(module, "ModeTable", R"(Dependence of a mode on the position of an axis. Immutable.
 
-Linear in frequency and damping ratio between the rows, constant beyond the ends; without rows the mode stays as it is.
+Frequency and damping ratio are linear between the rows and constant beyond the ends; without rows the mode is constant.
 
 Args:
-    axis: Whose position counts: 0, 1, 2 for X, Y, Z.
+    axis: Axis of the position: 0, 1, 2 for X, Y, Z.
     position_mm: Strictly ascending positions in mm, shape (n,).
     frequency_hz: Undamped natural frequencies in Hz, one per position, above 0.
     damping_ratio: Damping ratios (no unit), one per position, 0 <= zeta < 1; none: that of the mode.
@@ -167,15 +167,15 @@ Raises:
     ArgumentError: Unequal lengths, positions that do not ascend, or a value outside its range.)")
       .def(py::init(&checked_table), py::arg("axis") = 0, py::arg("position_mm") = std::vector<double>{},
            py::arg("frequency_hz") = std::vector<double>{}, py::arg("damping_ratio") = std::vector<double>{},
-           "Make a table; ArgumentError if it is not what the class asks for.")
-      .def_readonly("axis", &ModeTable::axis, "Axis whose position counts.")
+           "Raises ArgumentError on a value outside its range.")
+      .def_readonly("axis", &ModeTable::axis, "Axis of the position.")
       .def_readonly("position_mm", &ModeTable::position_mm, "Positions in mm.")
       .def_readonly("frequency_hz", &ModeTable::frequency_hz, "Frequencies in Hz.")
       .def_readonly("damping_ratio", &ModeTable::damping_ratio, "Damping ratios, or none.")
       .def(
           "mode_at",
           [](const ModeTable& self, const Mode& mode, double position_mm) { return mode_at(mode, self, position_mm); },
-          py::arg("mode"), py::arg("position_mm"), "The mode at a position (mm) of the axis; its participation stays.");
+          py::arg("mode"), py::arg("position_mm"), "Mode at a position (mm) of the axis, with the same participation.");
 }
 
 }  // namespace shapegcode::bindings

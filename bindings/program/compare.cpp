@@ -12,7 +12,7 @@ namespace shapegcode::bindings {
 namespace {
 
 void define_kinds(py::module_& module) {
-  py::enum_<ComparedKind>(module, "ComparedKind", "What is compared of two programs, and what a difference is of.")
+  py::enum_<ComparedKind>(module, "ComparedKind", "Kinds of program contents compared, and of differences.")
       .value("cuts", ComparedKind::cuts)
       .value("rapids", ComparedKind::rapids)
       .value("tools", ComparedKind::tools)
@@ -51,9 +51,9 @@ void register_compare(py::module_& module) {
             }
             return counts;
           },
-          "(ComparedKind, in the original, in the emitted program, unchanged) of every kind.")
+          "For each kind (ComparedKind, number in the original, in the emitted program, unchanged).")
       .def_readonly("path_mm", &ProgramComparison::path_mm,
-                    "Largest distance of the paths of a cut that both have, seen from either, mm.")
+                    "Largest distance between the paths of a cut in both programs, in either direction, mm.")
       .def_property_readonly(
           "differences",
           [](const ProgramComparison& self) {
@@ -64,8 +64,8 @@ void register_compare(py::module_& module) {
             }
             return differences;
           },
-          "(ComparedKind, line of the original, line of the emitted program, what the one has, what the other has, "
-          "distance of the paths in mm) each; a line is 0 where the program has nothing.");
+          "For each difference (ComparedKind, line of the original, line of the emitted program, contents of the "
+          "original, of the emitted program, distance of the paths in mm); line 0: the program has nothing there.");
 
   module.def(
       "compare_programs",
@@ -81,8 +81,9 @@ void register_compare(py::module_& module) {
       },
       py::arg("original").none(false), py::arg("emitted").none(false), py::arg("reader"), py::arg("emission_lines"),
       py::arg("joint_path_mm") = 0.0,
-      "Compare two programs that were read with these options; `emission_lines`: capitals without blanks, lines that "
-      "do not end a cut; `joint_path_mm`: within it cuts of other lengths are the same, run through side by side.");
+      "Compares two programs read with these options. `emission_lines`: capitals without blanks, lines that do not end "
+      "a cut; `joint_path_mm`: cuts of different lengths are the same if their paths, followed in parallel, stay "
+      "within it.");
 }
 
 }  // namespace shapegcode::bindings

@@ -14,7 +14,7 @@ namespace shapegcode::bindings {
 void register_expanded_program(py::module_& module) {
   py::class_<ExpandedProgram>(module, "ExpandedProgram", "A program for another control, in FANUC's words.")
       .def_property_readonly(
-          "text", [](const ExpandedProgram& self) { return py::bytes(self.text); }, "From one line `%` to the other.")
+          "text", [](const ExpandedProgram& self) { return py::bytes(self.text); }, "The program between lines `%`.")
       .def_readonly("lines", &ExpandedProgram::lines, "For each line of the text the line of the source, from 1.")
       .def_readonly("files", &ExpandedProgram::files, "Names of other files whose lines are in it.")
       .def_readonly("line_files", &ExpandedProgram::line_files,

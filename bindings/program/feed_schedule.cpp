@@ -28,15 +28,14 @@ py::array column(const std::vector<double>& values) {
 }
 
 void register_travel(py::module_& module) {
-  py::class_<Travel>(module, "Travel", "How a path is really travelled, per section between two stations.")
+  py::class_<Travel>(module, "Travel", "Actual speeds along a path, per section from one station to the next.")
       .def_property_readonly(
           "highest_mm_per_s", [](const Travel& self) { return column(self.highest_mm_per_s); },
-          "Largest travel within a window, over the window, (n,), mm/s: what was travelled in the present direction "
-          "and "
-          "in XY, as travel along the path.")
+          "Largest distance within a window, divided by the window, (n,), mm/s. Only travel in XY in the present "
+          "direction counts, converted to travel along the path.")
       .def_property_readonly(
           "time_s", [](const Travel& self) { return column(self.time_s); }, "Time on each section, (n,), s.")
-      .def_readonly("duration_s", &Travel::duration_s, "Until the set-points rest, s.");
+      .def_readonly("duration_s", &Travel::duration_s, "Time until the set-points rest, s.");
 
   module.def(
       "travel_path",
@@ -49,9 +48,9 @@ void register_travel(py::module_& module) {
       },
       py::arg("path").none(false), py::arg("profile").none(false), py::arg("along").none(false), py::arg("stations_mm"),
       py::arg("period_s"), py::arg("filters") = std::vector<Fir>{}, py::arg("window_s") = 0.0,
-      "How a path under a speed profile is travelled, followed along another one of which it is made, or along itself; "
-      "`stations_mm` (n,) ascend to the length of that, `filters` stand behind "
-      "the set-points, speeds are taken over `window_s`. Raises ArgumentError on stations that do not ascend.");
+      "Actual speeds of a path under a speed profile, followed along `along`, the same path or the one from which it "
+      "was made. `stations_mm` (n,) ascend to the length of `along`; `filters` act after the set-points; speeds are "
+      "averaged over `window_s`. Raises ArgumentError on stations that do not ascend.");
   module.def(
       "travel_blocks",
       [](const std::shared_ptr<Path>& blocks, const std::shared_ptr<Path>& along, BlockEnd block_end,
@@ -62,7 +61,7 @@ void register_travel(py::module_& module) {
       },
       py::arg("blocks").none(false), py::arg("along").none(false), py::arg("block_end"), py::arg("stations_mm"),
       py::arg("period_s"), py::arg("filters") = std::vector<Fir>{}, py::arg("window_s") = 0.0,
-      "How blocks at their feed are travelled, followed along `along`; else as travel_path.");
+      "Actual speeds of blocks at their feed, followed along `along`, from which they were made; else as travel_path.");
 }
 
 void define_sections(py::module_& module) {
@@ -96,12 +95,10 @@ void define_schedule(py::module_& module) {
       py::arg("feeds_mm_per_min"), py::arg("least_length_mm") = FeedScheduleOptions{}.least_length_mm,
       py::arg("most_change_mm_per_min") = FeedScheduleOptions{}.most_change_mm_per_min,
       py::arg("resolution_mm_per_min") = FeedScheduleOptions{}.resolution_mm_per_min,
-      "Feeds of a path in the shortest time that the stations allow: sections not shorter than the least length, each "
-      "at the lowest feed of its stations. Per block its end (n,), the feed that it keeps (0: it may change) and "
-      "whether "
-      "it may be divided; feeds (m,) hold up to their station. Raises ArgumentError on values that do not ascend or "
-      "are "
-      "not above 0.");
+      "Feeds of a path for the shortest time within the feeds of the stations: sections not shorter than the minimum "
+      "length, each at the lowest feed of its stations. Per block: its end (n,), its fixed feed (0: it may change) and "
+      "whether it may be divided. Feeds (m,) are valid up to their station. Raises ArgumentError on values that do not "
+      "ascend or are not above 0.");
   module.def(
       "with_feeds",
       [](const std::shared_ptr<Path>& path, const std::vector<FeedStretch>& sections) {
@@ -120,9 +117,9 @@ void define_schedule(py::module_& module) {
       },
       py::arg("stations_mm"), py::arg("feeds_mm_per_min"), py::arg("load_mm_per_min"), py::arg("before_s"),
       py::arg("behind_s"),
-      "The feeds (n,), mm/min, lowered around each station whose load allows less (`load_mm_per_min`, (n,)), because "
-      "the "
-      "travel lags behind a change: `before_s` and `behind_s` (n,) times the feed that the load allows.");
+      "Returns the feeds (n,), mm/min, lowered around each station that is limited by its load (`load_mm_per_min`, "
+      "(n,)), because the motion lags behind a change of feed. A lower feed is commanded earlier by `before_s` (n,) "
+      "times the feed that the load allows, a higher one later by `behind_s` (n,) times it.");
 }
 
 void define_feed_writer(py::module_& module) {
@@ -134,16 +131,16 @@ void define_feed_writer(py::module_& module) {
            }),
            py::arg("increment_mm"), py::arg("unit_mm"), py::arg("position_decimals"), py::arg("absolute_centres"),
            py::arg("modal_feed") = 0.0, py::arg("restore_feed") = true,
-           "Least increment, mm; unit of position words and of the length in F, mm; decimals of a position; whether "
-           "I J K are positions; F that holds before the region (0: as in the original), and whether that of the "
-           "original "
-           "is left behind.");
+           "`increment_mm`: least increment; `unit_mm`: unit of position words and of the length in F; "
+           "`position_decimals`: of a position word; `absolute_centres`: I J K are positions; `modal_feed`: F in "
+           "effect before the region (0: as in the original); `restore_feed`: restore the modal feed of the original "
+           "at the end.");
   py::class_<RefedRegion>(module, "RefedRegion", "A region's text with other feeds.")
       .def_property_readonly(
           "text", [](const RefedRegion& self) { return py::bytes(self.text); }, "Whole lines.")
       .def_readonly("blocks", &RefedRegion::blocks, "Blocks with a cutting move.")
-      .def_readonly("modal_feed", &RefedRegion::modal_feed, "F that holds behind it.")
-      .def_readonly("lines", &RefedRegion::lines, "Per block its line, counted from the text's first one = 0.");
+      .def_readonly("modal_feed", &RefedRegion::modal_feed, "F in effect after it.")
+      .def_readonly("lines", &RefedRegion::lines, "Per block its line, counted from 0 for the first of the text.");
   module.def(
       "divisible_segments",
       [](const Program& program, const Region& region, const FeedWriterOptions& options) {
@@ -161,8 +158,8 @@ void define_feed_writer(py::module_& module) {
       [](const Program& program, const Region& region, const std::vector<FeedStretch>& sections,
          const FeedWriterOptions& options) { return write_feeds(program, region, sections, options); },
       py::arg("program").none(false), py::arg("region"), py::arg("stretches"), py::arg("options"),
-      "The region's lines with the feeds of sections that cover its path; what else stands in them stays. Raises "
-      "ArgumentError if they do not cover it, or end within a block that cannot be divided.");
+      "The region's lines with the feeds of sections that cover its path; everything else in them does not change. "
+      "Raises ArgumentError if they do not cover it, or end within a block that cannot be divided.");
 }
 
 }  // namespace

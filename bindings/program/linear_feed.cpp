@@ -13,8 +13,7 @@ namespace py = pybind11;
 namespace shapegcode::bindings {
 
 void register_linear_feed(py::module_& module) {
-  py::class_<LinearBlock>(module, "LinearBlock",
-                          "A block of linear feed that takes the place of some of constant feed.")
+  py::class_<LinearBlock>(module, "LinearBlock", "A block of linear feed that replaces blocks of constant feed.")
       .def(py::init([](const Vector3& end_mm, double length_mm, double start_feed, double feed, double radius_mm,
                        double sweep_rad) {
              return LinearBlock{.end_mm = end_mm,
@@ -35,18 +34,18 @@ void register_linear_feed(py::module_& module) {
       .def_readonly("start_feed_mm_per_min", &LinearBlock::start_feed_mm_per_min, "At its start, mm/min.")
       .def_readonly("feed_mm_per_min", &LinearBlock::feed_mm_per_min, "At its end, mm/min.")
       .def_readonly("sets_feed", &LinearBlock::sets_feed,
-                    "The feed at its start is not that of the block before: a line before it sets it.")
+                    "Its start feed differs from the feed of the block before: a line before it sets the feed.")
       .def_readonly("is_linear", &LinearBlock::is_linear, "False: its feed is constant.")
-      .def_property_readonly("duration_s", &LinearBlock::duration_s, "How long it lasts, s.");
+      .def_property_readonly("duration_s", &LinearBlock::duration_s, "Duration, s.");
 
   module.def("linear_duration_s", &linear_duration_s, py::arg("length_mm"), py::arg("start_mm_per_s"),
              py::arg("end_mm_per_s"), "Time of a block whose speed is linear along its path, s.");
-  module.def(
-      "linear_end_speed", &linear_end_speed, py::arg("length_mm"), py::arg("start_mm_per_s"), py::arg("time_s"),
-      "Speed at the end of a block that lasts a given time, or at its start where these are swapped, mm/s; None: "
-      "no such speed.");
+  module.def("linear_end_speed", &linear_end_speed, py::arg("length_mm"), py::arg("start_mm_per_s"), py::arg("time_s"),
+             "Speed at one end of a block of a given duration from the speed at its other end, mm/s; None: there is no "
+             "such speed.");
   module.def("linear_distance_mm", &linear_distance_mm, py::arg("length_mm"), py::arg("start_mm_per_s"),
-             py::arg("end_mm_per_s"), py::arg("time_s"), "Distance along such a block at a time since its start, mm.");
+             py::arg("end_mm_per_s"), py::arg("time_s"),
+             "Distance along a block whose speed is linear along its path, at a time since its start, mm.");
   module.def(
       "linear_positions_mm",
       [](const Vector3& start_mm, const std::vector<LinearBlock>& blocks, const std::vector<double>& times_s) {
@@ -56,7 +55,7 @@ void register_linear_feed(py::module_& module) {
         return positions;
       },
       py::arg("start_mm"), py::arg("blocks"), py::arg("times_s"),
-      "(n, 3) positions of the motion of blocks at ascending times, mm; after the last block its end.");
+      "Positions of the motion of blocks at ascending times, (n, 3), mm; after the last block its end.");
   module.def(
       "linear_blocks",
       [](const std::shared_ptr<Path>& path, double period_s, double tolerance_mm,
@@ -65,18 +64,16 @@ void register_linear_feed(py::module_& module) {
         return linear_blocks(*path, period_s, tolerance_mm, joints, modes);
       },
       py::arg("path").none(false), py::arg("period_s"), py::arg("tolerance_mm"), py::arg("joints"), py::arg("modes"),
-      "Join blocks of constant feed, each of whole periods, into blocks of linear feed, where the motion stays within "
-      "a "
-      "tolerance of the ends of their periods. A block begins at each of `joints` (ascending); speeds at the end of "
-      "the "
-      "path are chosen so that `modes` of X, Y and Z are at rest there.");
+      "Joins blocks of constant feed, each of whole periods, into blocks of linear feed. At the ends of the periods "
+      "the motion stays within a tolerance of the original motion. A block begins at each of `joints` (ascending); "
+      "speeds at the end of the path are chosen so that `modes` of X, Y and Z are at rest there.");
   module.def(
       "largest_difference_mm",
       [](const std::shared_ptr<Path>& path, const std::vector<LinearBlock>& blocks, double period_s) {
         return largest_difference_mm(*path, blocks, period_s);
       },
       py::arg("path").none(false), py::arg("blocks"), py::arg("period_s"),
-      "By how much the motion of joined blocks differs from the blocks of constant feed at the ends of their periods.");
+      "Largest difference of the joined blocks from the blocks of constant feed at the ends of their periods.");
 }
 
 }  // namespace shapegcode::bindings

@@ -185,20 +185,20 @@ void register_gcode(py::module_& module) {
       .def_readwrite("m_subprograms", &CodeBindings::m_subprograms, "M code to program, called like M98.")
       .def_readwrite("tool_program", &CodeBindings::tool_program, "T calls it with T in #149; -1: none.");
 
-  py::class_<WorkLimits>(module, "WorkLimits", "What a program may ask at most, counted while it is read.")
+  py::class_<WorkLimits>(module, "WorkLimits", "Limits of the work that a program may cause, checked while it is read.")
       .def(py::init<>())
-      .def_readwrite("steps", &WorkLimits::steps, "Lines executed, each beyond its first time.")
+      .def_readwrite("steps", &WorkLimits::steps, "Lines executed, not counting the first time of each.")
       .def_readwrite("moves", &WorkLimits::moves, "Moves, dwells, and blocks with machine functions.")
-      .def_readwrite("bytes", &WorkLimits::bytes, "Of texts that are read.")
+      .def_readwrite("bytes", &WorkLimits::bytes, "Bytes of program texts read.")
       .def_readwrite("expansion_moves", &WorkLimits::expansion_moves, "Moves beyond one for each line of the texts.")
-      .def_readwrite("expansion_bytes", &WorkLimits::expansion_bytes, "Of the plain text beyond those of the texts.")
-      .def_readwrite("seconds", &WorkLimits::seconds, "Least time, s.")
+      .def_readwrite("expansion_bytes", &WorkLimits::expansion_bytes, "Bytes by which the expanded program is longer.")
+      .def_readwrite("seconds", &WorkLimits::seconds, "Minimum time: moves at their feed, and dwells, s.")
       .def_readwrite("feed_mm_per_s", &WorkLimits::feed_mm_per_s, "Highest speed of each axis while cutting, mm/s.")
-      .def_readwrite("rapid_mm_per_s", &WorkLimits::rapid_mm_per_s, "Of each axis in a rapid, mm/s.")
+      .def_readwrite("rapid_mm_per_s", &WorkLimits::rapid_mm_per_s, "Highest speed of each axis in a rapid, mm/s.")
       .def_readwrite("tool_change_s", &WorkLimits::tool_change_s, "Time of an M06, s.")
       .def_readwrite("m_function_s", &WorkLimits::m_function_s, "Time of any other M code, s.");
 
-  py::class_<ReaderOptions>(module, "ReaderOptions", "The controller's settings that change how a text is read.")
+  py::class_<ReaderOptions>(module, "ReaderOptions", "Settings of the control that change the meaning of a program.")
       .def(py::init<>())
       .def_readwrite("calculator_decimal_point", &ReaderOptions::calculator_decimal_point,
                      "True: X10 is 10 mm; False: 10 least increments (parameter 3401#0).")
@@ -209,63 +209,63 @@ void register_gcode(py::module_& module) {
                      "Largest difference of an arc's radii, mm (parameter 3410).")
       .def_readwrite("arc_without_centre_is_line", &ReaderOptions::arc_without_centre_is_line,
                      "G02, G03 without R, I, J, K are lines (parameter 3403#5 = 0); False: alarm 0022.")
-      .def_readwrite("max_line_length", &ReaderOptions::max_line_length, "Characters.")
+      .def_readwrite("max_line_length", &ReaderOptions::max_line_length, "Maximum length of a line in characters.")
       .def_readwrite("unknown_after_tool_change", &ReaderOptions::unknown_after_tool_change,
                      "Axes whose position is not known after M06.")
       .def_readwrite("work_offsets_mm", &ReaderOptions::work_offsets_mm, "G54 ... G59, mm; empty: not known.")
       .def_readwrite("extra_work_offsets_mm", &ReaderOptions::extra_work_offsets_mm, "G54.1 P number to offsets, mm.")
-      .def_readwrite("tool_offsets", &ReaderOptions::tool_offsets, "Number to ToolOffset.")
+      .def_readwrite("tool_offsets", &ReaderOptions::tool_offsets, "H or D number to ToolOffset.")
       .def_property(
           "offset_memory", [](const ReaderOptions& self) { return std::string(1, self.offset_memory); },
           [](ReaderOptions& self, const std::string& memory) { self.offset_memory = one_letter(memory, "ABC"); },
           "Offset memory A, B or C.")
       .def_readwrite("retained_variables", &ReaderOptions::retained_variables, "#500 ... #999.")
       .def_readwrite("bindings", &ReaderOptions::bindings, "Codes bound to programs.")
-      .def_readwrite("program", &ReaderOptions::program, "O number to run of a file with several; -1: the first.")
+      .def_readwrite("program", &ReaderOptions::program, "O number of the program to read; -1: the first.")
       .def_readwrite("program_index", &ReaderOptions::program_index,
-                     "The same by its index in `list_programs`, whatever its name, and alone; -1: by number.")
+                     "Index in `list_programs` of the program, of which alone `text` consists; -1: by number.")
       .def_property(
           "load_program", [](const ReaderOptions& self) { return static_cast<bool>(self.load_program); },
           [](ReaderOptions& self, py::object loader) {
             self.load_program = source_loader<std::int64_t>(std::move(loader));
           },
-          "Called with an O number that the file does not hold; gives (name, bytes) or None.")
+          "Called with an O number that the file does not contain; returns (name, bytes) or None.")
       .def_readwrite("opaque_programs", &ReaderOptions::opaque_programs,
-                     "First and last program number whose calls are kept if the program is not found.")
+                     "First and last number of the programs whose calls are left unchanged if they are not found.")
       .def_readwrite("subprogram_nesting", &ReaderOptions::subprogram_nesting, "Deepest nesting of M98.")
-      .def_readwrite("limits", &ReaderOptions::limits, "What a program may ask at most.")
+      .def_readwrite("limits", &ReaderOptions::limits, "Limits of the work that a program may cause.")
       .def_readwrite("block_skip", &ReaderOptions::block_skip, "Switch of / ... /9: on, off, or None: not known.")
       .def_readwrite("expand_compensation", &ReaderOptions::expand_compensation,
-                     "G41/G42 become plain moves; False: kept as they stand.")
+                     "G41/G42 become simple moves; False: left unchanged.")
       .def_property(
           "compensation_start_up", [](const ReaderOptions& self) { return std::string(1, self.compensation_start_up); },
           [](ReaderOptions& self, const std::string& type) { self.compensation_start_up = one_letter(type, "AB"); },
           "Start-up of cutter compensation, A or B (parameter 5003).")
-      .def_readwrite("scale_unit", &ReaderOptions::scale_unit, "Of the factors of G51 without a point.")
+      .def_readwrite("scale_unit", &ReaderOptions::scale_unit, "Unit of the factors of G51 without a decimal point.")
       .def_readwrite("peck_clearance_mm", &ReaderOptions::peck_clearance_mm,
-                     "To which a peck of G73 and G83 returns, mm (parameters 5114, 5115).")
+                     "Clearance to which a peck of G73 and G83 returns, mm (parameters 5114, 5115).")
       .def_readwrite("collect_alarms", &ReaderOptions::collect_alarms,
-                     "Go on behind an alarm and keep all in ProgramText.alarms.")
+                     "Continue after an alarm, and store all in ProgramText.alarms.")
       .def_readwrite("power_on", &ReaderOptions::power_on, "Modal state before the first block.")
       .def_readwrite("probe_lines", &ReaderOptions::probe_lines,
-                     "Ascending lines of the source behind which the state is kept.");
+                     "Ascending lines of the source after which the modal state is stored (ProgramText.probed).");
 
   py::class_<RegionNote>(module, "RegionNote", "An N word or a comment inside a region.")
-      .def_readonly("segment", &RegionNote::segment, "Index of the segment before which it stood.")
+      .def_readonly("segment", &RegionNote::segment, "Index of the segment that follows it.")
       .def_readonly("n_number", &RegionNote::n_number, "-1: none.")
       .def_readonly("n_digits", &RegionNote::n_digits, "Digits of it as written: N0010 has four.")
       .def_readonly("comment_offset", &RegionNote::comment_offset, "Byte offset of its comment in the text.")
       .def_readonly("comment_length", &RegionNote::comment_length, "Bytes; 0: no comment.");
 
-  py::class_<Region, std::shared_ptr<Region>>(module, "Region", "A run of cutting moves between two stops.")
+  py::class_<Region, std::shared_ptr<Region>>(module, "Region", "Cutting moves between two stops.")
       .def(py::init(&one_line_region), py::kw_only(), py::arg("path").none(false), py::arg("entry"), py::arg("exit"),
            py::arg("line"), py::arg("text_begin"), py::arg("text_end"),
-           "One line of a text as a region that ends with an exact stop: what takes the place of a rapid. `path`: its "
-           "move; `entry`, `exit`: modal state before and behind it; `text_begin`, `text_end`: its bytes.")
+           "One line of a text as a region that ends with an exact stop: cutting moves instead of a rapid. `path`: its "
+           "move; `entry`, `exit`: modal state before and after it; `text_begin`, `text_end`: its bytes.")
       .def_readonly("first_line", &Region::first_line, "From 1.")
       .def_readonly("last_line", &Region::last_line, "From 1, inclusive.")
       .def_readonly("text_begin", &Region::text_begin, "Byte offset of its first line.")
-      .def_readonly("text_end", &Region::text_end, "Byte offset behind its last line.")
+      .def_readonly("text_end", &Region::text_end, "Byte offset after its last line.")
       .def_property_readonly(
           "path", [](const Region& self) { return std::const_pointer_cast<Path>(self.path); }, "Its moves.")
       .def_property_readonly(
@@ -273,28 +273,28 @@ void register_gcode(py::module_& module) {
       .def_readonly("entry", &Region::entry, "Modal state before it.")
       .def_readonly("exit", &Region::exit, "Modal state after it.")
       .def_readonly("incremental", &Region::incremental, "Moves an axis of unknown position: its origin is arbitrary.")
-      .def_readonly("exact_stop_at_end", &Region::exact_stop_at_end, "Ends with G09 or in G61.")
-      .def_readonly("shaped", &Region::shaped, "Whether the program says that these are blocks that were shaped.")
-      .def_readonly("was_rapid", &Region::was_rapid, "Whether these shaped blocks stand in place of a rapid.")
+      .def_readonly("exact_stop_at_end", &Region::exact_stop_at_end, "Whether its last block has G09 or is in G61.")
+      .def_readonly("shaped", &Region::shaped, "Whether the program marks it as shaped blocks.")
+      .def_readonly("was_rapid", &Region::was_rapid, "Whether its shaped blocks replace a rapid.")
       .def_readonly("look_ahead_mode", &Region::look_ahead_mode,
                     "The program switched a look-ahead mode on before it (G05.1 Q1, G08 P1, G05 P10000).")
       .def_readonly("blocks", &Region::blocks, "Source blocks with a cutting move.");
 
   py::class_<Program, std::shared_ptr<Program>>(module, "ProgramText", py::buffer_protocol(),
-                                                "A program read: its text to the letter and its regions.")
+                                                "A program after reading: its exact text and its regions.")
       .def_buffer([](Program& self) {
         return py::buffer_info(reinterpret_cast<unsigned char*>(self.text.data()),  // NOLINT: bytes
                                static_cast<py::ssize_t>(self.text.size()), true);
       })
       .def(
-          "view", [](const py::object& self) { return py::memoryview(self); }, "The text without a copy of it.")
+          "view", [](const py::object& self) { return py::memoryview(self); }, "The text without a copy.")
       .def_property_readonly(
           "unexpanded", [](const Program& self) { return py::bytes(self.unexpanded); },
-          "The text as handed over, where `text` is what it comes to; else empty.")
+          "The original text, if `text` is the expanded program; else empty.")
       .def("find", &find, py::arg("what"), py::arg("begin") = 0,
            "Index of the first occurrence of bytes in the text, or -1.")
       .def("overwrite", &overwrite, py::arg("begin"), py::arg("what"),
-           "Put bytes over as many. Raises ArgumentError beyond the text's end.")
+           "Overwrites as many bytes of the text. Raises ArgumentError beyond the text's end.")
       .def_property_readonly(
           "text", [](const Program& self) { return py::bytes(self.text); }, "The whole text.")
       .def("slice", &slice, py::arg("begin"), py::arg("end"), "Bytes of the text between two offsets.")
@@ -305,13 +305,13 @@ void register_gcode(py::module_& module) {
       .def_readonly("block_count", &Program::block_count, "Lines with at least one word.")
       .def_readonly("move_count", &Program::move_count, "Moves, dwells, and blocks with machine functions.")
       .def_readonly("least_time_s", &Program::least_time_s,
-                    "At its feeds, as far as the axes reach them; with dwells, without acceleration, s.")
-      .def_readonly("header_offset", &Program::header_offset, "Byte offset at which a header comment may stand.")
+                    "Minimum time: moves at their feed within the axis limits, without acceleration, and dwells, s.")
+      .def_readonly("header_offset", &Program::header_offset, "Byte offset at which a header comment may be inserted.")
       .def_readonly("program_number", &Program::program_number, "O number; -1: none.")
       .def_property_readonly(
-          "regions", [](const Program& self) { return self.regions; }, "Runs of cutting moves in order.")
+          "regions", [](const Program& self) { return self.regions; }, "Regions in order.")
       .def_property_readonly("other_moves", &other_moves,
-                             "Rapids, cycles and kept moves as (Segment, dwell_s) pairs, for the cycle time.")
+                             "Moves and waits outside of the regions as (Segment, dwell_s) pairs, for the cycle time.")
       .def_property_readonly("steps", &steps,
                              "(StepKind, index into regions, other_moves or functions, line) in program order.")
       .def_property_readonly("functions", &functions, "(M codes, T or -1, S or -1) of blocks with M, S or T words.")
@@ -322,7 +322,7 @@ void register_gcode(py::module_& module) {
           "alarms", [](const Program& self) { return findings(self.alarms); },
           "What a control would refuse, as `warnings`; only with ReaderOptions.collect_alarms.")
       .def_readonly("expanded", &Program::expanded,
-                    "Whether `text` is the plain program that calls, macros and coordinate modes come to.")
+                    "Whether `text` is the expanded program, with calls, macros and coordinate modes resolved.")
       .def(
           "origin",
           [](const Program& self, std::uint32_t line) -> py::tuple {
@@ -353,22 +353,22 @@ void register_gcode(py::module_& module) {
             lead_back(self, static_cast<std::string>(source), origins, files, std::move(findings));
           },
           py::arg("source"), py::arg("lines"), py::arg("line_files"), py::arg("files"), py::arg("notes"),
-          "Make it the plain program of a text in another control's words. `source`: that text (bytes); `lines`: for "
-          "each line of the text that was read the line of the source; `line_files`: its file, 0 the source, n the "
-          "n-th of `files`; empty: all of the source; `notes`: (line of the source, message), told as warnings. Raises "
-          "ArgumentError if lines are missing.")
+          "Relates the program to `source`, the text (bytes) in another control's dialect from which it was "
+          "translated. `lines`: for each line of the program's original text the line of the source; `line_files`: its "
+          "file, 0 the source, n the n-th of `files`; empty: all of the source; `notes`: (line of the source, "
+          "message), added to the warnings. Raises ArgumentError if lines are missing.")
       .def_readonly("called", &Program::called,
-                    "Positions of programs of the file that others called, see list_programs.")
+                    "Indices in `list_programs` of programs of the file that others called.")
       .def_readonly("program_numbers", &Program::program_numbers, "All O numbers in the file.")
       .def_readonly("expanded_radii_mm", &Program::expanded_radii_mm,
                     "D number to radius, mm, where cutter compensation was expanded.")
       .def_readonly("compensated_moves", &Program::compensated_moves, "Cutting moves under G41 or G42, expanded.")
       .def_readonly("kept_compensated_moves", &Program::kept_compensated_moves,
-                    "Cutting moves under G41 or G42, kept as they stand.")
+                    "Cutting moves under G41 or G42, left unchanged.")
       .def_readonly("final_state", &Program::final_state, "Modal state at the end.")
       .def_property_readonly(
           "probed", [](const Program& self) { return self.probed; },
-          "Modal state behind each of ReaderOptions.probe_lines.")
+          "Modal state after each of ReaderOptions.probe_lines.")
       .def(
           "cutting_path",
           [](const Program& self, std::uint32_t first, std::uint32_t last) {
@@ -377,17 +377,17 @@ void register_gcode(py::module_& module) {
           py::arg("first_line"), py::arg("last_line"),
           "The cutting moves of the regions within a range of lines of the source, as one path.");
 
-  py::class_<ProgramEntry>(module, "ProgramEntry", "A program of a file that may hold several.")
+  py::class_<ProgramEntry>(module, "ProgramEntry", "A program of a file that may contain several.")
       .def_readonly("number", &ProgramEntry::number, "O number; -1: it has none.")
       .def_property_readonly(
           "name", [](const ProgramEntry& self) { return latin1(self.name); },
-          "Of a line <NAME> or O<NAME>, with its brackets; empty: none.")
+          "Name in a line <NAME> or O<NAME>, with its brackets; empty: none.")
       .def_property_readonly(
           "folder", [](const ProgramEntry& self) { return latin1(self.folder); },
-          "Of the &F= line before it, as written; empty: none.")
+          "Folder in the &F= line before it, as written; empty: none.")
       .def_readonly("first_line", &ProgramEntry::first_line, "From 1.")
       .def_readonly("text_begin", &ProgramEntry::text_begin, "Byte offset of its first line.")
-      .def_readonly("text_end", &ProgramEntry::text_end, "Byte offset behind its last line.");
+      .def_readonly("text_end", &ProgramEntry::text_end, "Byte offset after its last line.");
 
   module.def(
       "list_programs",
@@ -397,7 +397,7 @@ void register_gcode(py::module_& module) {
         return list_programs(text);
       },
       py::arg("text"),
-      "The programs of a text (bytes) in the order in which they stand. Raises ProgramError where it cannot be read.");
+      "The programs of a text (bytes) in order. Raises ProgramError if its '%' lines or its O numbers cannot be read.");
 
   module.def(
       "read_program",
@@ -417,8 +417,8 @@ void register_gcode(py::module_& module) {
         return std::make_shared<Program>(read_program(std::move(text), options));
       },
       py::arg("parts"), py::arg("options"),
-      "The same of a text in parts (a list of bytes); the list is empty behind it, so that the text stands in memory "
-      "once.");
+      "Reads a program text in parts (a list of bytes). The list is emptied meanwhile, so that the text is in memory "
+      "only once.");
 }
 
 }  // namespace shapegcode::bindings

@@ -35,14 +35,14 @@ void register_emission(py::module_& module) {
       .def_readwrite("feed_unit_mm_per_s", &FitOptions::feed_unit_mm_per_s, "One step of the last F digit, mm/s.")
       .def_readwrite("minimum_feed", &FitOptions::minimum_feed, "In feed units.")
       .def_readwrite("merge_tolerance_increments", &FitOptions::merge_tolerance_increments,
-                     "Deviation of merged blocks per axis, least increments.")
+                     "Permitted deviation of merged blocks from the shaped command, per axis, least increments.")
       .def_readwrite("most_periods", &FitOptions::most_periods,
-                     "Longest block, block periods. 1: all last the same time, for a feed override that is turned.")
+                     "Longest block, block periods. 1: all blocks have the same duration, for other feed overrides.")
       .def_readwrite("equal_above_increments", &FitOptions::equal_above_increments,
-                     "Distance per interpolation period up to which blocks may be longer than that, increments.")
+                     "Blocks may be longer if the command moves no further per interpolation period, increments.")
       .def_readwrite("equal_periods", &FitOptions::equal_periods,
-                     "Likewise blocks so far from both ends of a steady section, block periods; 0: none.")
-      .def_readwrite("lent_periods", &FitOptions::lent_periods, "Periods that the blocks before did not last.")
+                     "Likewise blocks this far from both ends of a section at constant velocity; 0: none.")
+      .def_readwrite("lent_periods", &FitOptions::lent_periods, "Periods by which the blocks before were too short.")
       .def_readwrite("modes", &FitOptions::modes,
                      "Modes of X, Y, Z, which the rounding of block ends leaves at rest; none: ends are rounded to the "
                      "nearest increment.")
@@ -54,16 +54,15 @@ void register_emission(py::module_& module) {
             self.last_radius_mm = radius_mm;
           },
           py::arg("clockwise"), py::arg("normal"), py::arg("radius_mm"),
-          "The last block must be an arc, so that the modal motion code behind it is G02 or G03.")
-      .def_readwrite(
-          "smooth_arcs_mm", &FitOptions::smooth_arcs_mm,
-          "How far the middle of an arc may be moved so that it meets its neighbours at a smaller angle, mm.")
-      .def_readwrite("arc_min_chord_mm", &FitOptions::arc_min_chord_mm, "Shorter pieces are lines, mm.");
+          "The last block must be an arc, so that the modal motion code after it is G02 or G03.")
+      .def_readwrite("smooth_arcs_mm", &FitOptions::smooth_arcs_mm,
+                     "Distance by which the middle of an arc may be moved to reduce the angle to its neighbours, mm.")
+      .def_readwrite("arc_min_chord_mm", &FitOptions::arc_min_chord_mm, "Arcs with a shorter chord are lines, mm.");
 
   py::class_<FittedBlocks, std::shared_ptr<FittedBlocks>>(module, "FittedBlocks", "Blocks ready to be written.")
       .def("__len__", [](const FittedBlocks& self) { return self.blocks.size(); })
       .def_readonly("left_periods", &FittedBlocks::left_periods,
-                    "Time that the blocks do not last: `FitOptions.lent_periods` of the next piece.")
+                    "Periods by which the blocks are too short: `FitOptions.lent_periods` of the next piece.")
       .def_property_readonly(
           "periods",
           [](const FittedBlocks& self) {
@@ -111,7 +110,7 @@ void register_emission(py::module_& module) {
       "Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. "
       "Raises ArgumentError on a position outside +-99999.999 mm.");
 
-  py::class_<BlockMark>(module, "BlockMark", "An N word or comment to be written before the block that begins there.")
+  py::class_<BlockMark>(module, "BlockMark", "An N word and a comment, written before the block that begins there.")
       .def(py::init([](std::uint32_t period, std::int32_t n_number, const py::bytes& comment, std::uint32_t n_digits) {
              return BlockMark{period, n_number, static_cast<std::string>(comment), n_digits};
            }),
@@ -119,8 +118,8 @@ void register_emission(py::module_& module) {
 
   py::class_<WriterOptions>(module, "WriterOptions", "How fitted blocks are written.")
       .def(py::init<>())
-      .def_readwrite("position_decimals", &WriterOptions::position_decimals, "Digits behind the point.")
-      .def_readwrite("feed_decimals", &WriterOptions::feed_decimals, "Digits behind the point.")
+      .def_readwrite("position_decimals", &WriterOptions::position_decimals, "Decimals of a position word.")
+      .def_readwrite("feed_decimals", &WriterOptions::feed_decimals, "Decimals of F.")
       .def_readwrite("incremental", &WriterOptions::incremental, "G91 words.")
       .def_readwrite("motion", &WriterOptions::motion, "Motion code active before the first block.")
       .def_readwrite("plane", &WriterOptions::plane, "Plane active before the first block.")
@@ -139,7 +138,7 @@ void register_emission(py::module_& module) {
         return std::make_tuple(py::bytes(written.text), written.motion, written.plane);
       },
       py::arg("blocks").none(false), py::arg("start"), py::arg("marks"), py::arg("options"),
-      "(text as bytes, motion code, plane) of fitted blocks; `start` in increments.");
+      "Text of fitted blocks: (bytes, modal motion code after it, modal plane after it); `start` in increments.");
 
   module.def(
       "busiest_per_s",
@@ -155,9 +154,9 @@ void register_emission(py::module_& module) {
         return busiest_per_s(durations, given, stretch_s);
       },
       py::arg("durations_s"), py::arg("amounts"), py::arg("stretch_s"),
-      "Largest amount per second in any time window of a duration; each block's amount is spread evenly over it.\n\n"
-      "`durations_s`: of the blocks, s, (n,); `amounts`: what each of them needs, such as its characters, (n,); None: "
-      "one of each; `stretch_s`: the window, s; all blocks together if they last less.");
+      "Largest amount per second in any time window; each block's amount is spread evenly over its "
+      "duration.\n\n`durations_s`: of the blocks, s, (n,); `amounts`: of each block, such as its characters, (n,); "
+      "None: one each; `stretch_s`: duration of the window, s; all blocks together if they are shorter.");
 }
 
 }  // namespace shapegcode::bindings

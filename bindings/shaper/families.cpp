@@ -27,17 +27,17 @@ Args:
     zeros: Zeros at the mode, 1 to 20: the residual and its first zeros-1 derivatives vanish there.
 
 Returns:
-    A shaper of zeros+1 non-negative taps, half a damped period apart.
+    A shaper of zeros+1 non-negative impulses, half a damped period apart.
 
 Raises:
     ArgumentError: `zeros` is outside its range.
 
 Source: Singer and Seering 1990.)");
   m.def("mzv", &shapegcode::mzv, py::arg("mode"), release_gil(),
-        R"(Modified ZV: three non-negative taps, 3/8 of the damped period apart.
+        R"(Modified ZV: three non-negative impulses, 3/8 of the damped period apart.
 
-Cancels the mode and the pole of the same decay at 5/3 of its damped frequency; half as long again as ZV, and without
-damping .62 of ZV's slope at the mode.
+Cancels the mode and the pole of the same decay at 5/3 of its damped frequency; 1.5 times as long as ZV; without
+damping its residual has 0.62 of ZV's slope at the mode.
 
 Args:
     mode: The mode to cancel.
@@ -73,8 +73,8 @@ Source: Singhose, Singer and Seering 1994; the damped solution: this project.)")
 
 void register_extra_insensitive(py::module_& m) {
   py::class_<ExtraInsensitive>(m, "ExtraInsensitive",
-                               "An extra-insensitive shaper, and where its residual vanishes and peaks.")
-      .def_readonly("shaper", &ExtraInsensitive::shaper, "The shaper, humps+2 non-negative taps.")
+                               "An extra-insensitive shaper, with the zeros and maxima of its residual.")
+      .def_readonly("shaper", &ExtraInsensitive::shaper, "The shaper, humps+2 non-negative impulses.")
       .def_readonly("zeros_hz", &ExtraInsensitive::zeros_hz,
                     "Natural frequencies without residual in Hz, ascending, one more than humps.")
       .def_readonly("humps_hz", &ExtraInsensitive::humps_hz,
@@ -87,7 +87,7 @@ Between its outermost zeros the residual rises to exactly the limit at each hump
 middle zero, lies at the mode. Without damping it is the Dolph-Chebyshev window over half periods.
 
 Args:
-    mode: The mode around which little is to be left.
+    mode: The mode around which the residual is to be small.
     vibration_limit: Residual ratio at the humps (no unit), above 0 and below 1.
     humps: Number of humps, 1 to 3.
 
@@ -96,7 +96,7 @@ Returns:
 
 Raises:
     ArgumentError: A value is outside its range.
-    DesignError: No such shaper with non-negative taps was reached (high damping).
+    DesignError: There is no such shaper with non-negative impulses (high damping).
 
 Source: Singhose, Seering and Singer 1994; Singhose, Porter, Tuttle and Singer 1997; the solution: this project.)");
 }
@@ -106,7 +106,7 @@ void register_sensitivity(py::module_& m) {
       .def_readonly("residual_ratio", &WorstResidual::residual_ratio, "Residual ratio at frequency_hz, no unit.")
       .def_readonly("frequency_hz", &WorstResidual::frequency_hz, "Natural frequency in Hz at which it was found.")
       .def_readonly("upper_bound", &WorstResidual::upper_bound,
-                    "No frequency of the band leaves more (no unit); within 1e-6 of residual_ratio, or 1e-12.");
+                    "No frequency of the band has a larger residual ratio; within 1e-6 of residual_ratio, or 1e-12.");
   py::class_<FrequencyBand>(m, "FrequencyBand", "A band of frequencies.")
       .def_readonly("lowest_hz", &FrequencyBand::lowest_hz, "Lower end in Hz.")
       .def_readonly("highest_hz", &FrequencyBand::highest_hz, "Upper end in Hz.");
@@ -158,7 +158,7 @@ Args:
     vibration_limit: Residual ratio (no unit), above 0 and below 1.
 
 Returns:
-    The band; of no width if the limit is exceeded at the mode itself, up to ten times its frequency at most.
+    The band; of zero width if the limit is exceeded at the mode itself; up to at most ten times its frequency.
 
 Raises:
     ArgumentError: The limit is outside its range.

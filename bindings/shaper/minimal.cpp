@@ -21,19 +21,19 @@ void register_search(py::module_& m) {
   py::class_<MinimalShapers>(m, "MinimalShapers", "The minimal shapers of some modes, and what is known about others.")
       .def_readonly("shapers", &MinimalShapers::shapers, "The shapers, ascending in duration, then in the times.")
       .def_readonly("complete", &MinimalShapers::complete,
-                    "True if every box of times was decided: there is no other shaper in the region.")
+                    "True if every box of times was decided: there is no other shaper in the range.")
       .def_readonly("complete_up_to_s", &MinimalShapers::complete_up_to_s,
                     "Duration in s up to which there is no other shaper; 0: nothing is proven.")
-      .def_readonly("max_duration_s", &MinimalShapers::max_duration_s, "The region: largest duration in s.")
-      .def_readonly("max_abs_sum", &MinimalShapers::max_abs_sum, "The region: largest sum of magnitudes (no unit).")
-      .def_readonly("boxes", &MinimalShapers::boxes, "Boxes of times that the proof looked at.")
+      .def_readonly("max_duration_s", &MinimalShapers::max_duration_s, "Range of the search: largest duration in s.")
+      .def_readonly("max_abs_sum", &MinimalShapers::max_abs_sum, "Range of the search: largest sum of magnitudes.")
+      .def_readonly("boxes", &MinimalShapers::boxes, "Boxes of times examined by the proof.")
       .def_readonly("unresolved", &MinimalShapers::unresolved,
-                    "Boxes too small to halve on that could not be decided: solutions there are not isolated.")
+                    "Boxes too small to halve further that could not be decided: solutions there are not isolated.")
       .def_readonly("starts", &MinimalShapers::starts, "Newton starts.")
-      .def_readonly("converged", &MinimalShapers::converged, "Starts that reached a shaper in the region.")
+      .def_readonly("converged", &MinimalShapers::converged, "Starts that reached a shaper in the range.")
       .def_readonly("found_once", &MinimalShapers::found_once,
-                    "Shapers that one start alone reached. Over `converged` it estimates the share of starts that "
-                    "would reach a shaper not listed yet (Good 1953).");
+                    "Shapers reached by one start only. Divided by `converged`, the number estimates the ratio of "
+                    "starts that would reach a shaper not yet listed (Good 1953).");
   m.def(
       "minimal_shapers",
       [](const std::vector<Mode>& modes, double max_duration_s, double max_abs_sum, int max_starts,
@@ -43,25 +43,25 @@ void register_search(py::module_& m) {
       py::arg("modes"), py::arg("max_duration_s"), py::kw_only(), py::arg("max_abs_sum") = MinimalOptions{}.max_abs_sum,
       py::arg("max_starts") = MinimalOptions{}.max_starts, py::arg("max_boxes") = MinimalOptions{}.max_boxes,
       release_gil(),
-      R"(Minimal multi-mode shapers: n+1 taps that cancel n = 1 ... 6 modes, damped or not.
+      R"(Minimal multi-mode shapers: n+1 impulses that cancel n = 1 ... 6 modes, damped or not.
 
 One mode is closed form and two are searched completely. Three and more are searched from many low-discrepancy starts
-and by boxes of times, each of which is proven empty or shrunk onto a solution, in ascending duration: what the result
-says about completeness is `complete` and `complete_up_to_s`. Shapers with fewer taps that serve all modes are listed
-too; solutions that are not isolated (undamped modes at odd ratios, which one ZV serves) are not.
+and by boxes of times in ascending duration, each of which is proven empty or shrunk to one solution; `complete` and
+`complete_up_to_s` tell what is proven. Shapers with fewer impulses that cancel all modes are listed too; solutions that
+are not isolated (undamped modes at odd ratios, which one ZV cancels) are not.
 
 Args:
-    modes: One to six modes, no two alike within 1e-6.
+    modes: One to six modes, no two poles within 1e-6 of one another (relative).
     max_duration_s: Largest duration in s, above 0, at most 100 periods of the fastest mode.
     max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1.
-    max_starts: Most Newton starts; fewer are used once every solution was found three times over.
-    max_boxes: Most boxes of times that the proof may look at (some 2 microseconds each for four modes); 0: no proof.
+    max_starts: Maximum number of Newton starts; fewer are used once every solution was found three times.
+    max_boxes: Maximum number of boxes of times examined (some 2 microseconds each for four modes); 0: no proof.
 
 Returns:
     The shapers, residual_ratio of every mode at most 1e-12, and what was searched.
 
 Raises:
-    ArgumentError: No mode, more than six, two alike, or a value outside its range.
+    ArgumentError: No mode, more than six, two with equal poles, or a value outside its range.
 
 Source: paper 002, eq. 4-11; the searches are this project's.)");
 }
@@ -74,8 +74,8 @@ py::array_t<double> view(const std::vector<double>& values, std::vector<std::siz
 }
 
 void register_branches(py::module_& m) {
-  py::class_<MinimalBranches>(m, "MinimalBranches",
-                              "The minimal shapers of two modes over the ratio of their frequencies, joined to curves.")
+  py::class_<MinimalBranches>(
+      m, "MinimalBranches", "The minimal shapers of two modes over the ratio of their frequencies, joined into curves.")
       .def_property_readonly(
           "ratios",
           [](const py::object& self) {
@@ -89,9 +89,8 @@ void register_branches(py::module_& m) {
             const auto& out = self.cast<const MinimalBranches&>();
             return view(out.times_s, {out.branches, out.ratios.size(), 3}, self);
           },
-          "Times of the taps in s, shape (n_branches, n_ratios, 3), NaN where a curve has no shaper; read-only "
-          "view.\n\n"
-          "[..., 2] is the duration.")
+          "Times of the impulses in s, shape (n_branches, n_ratios, 3), NaN where a curve has no shaper; read-only "
+          "view.\n\n[..., 2] is the duration.")
       .def_property_readonly(
           "amplitudes",
           [](const py::object& self) {
@@ -105,13 +104,13 @@ void register_branches(py::module_& m) {
          double max_abs_sum) { return minimal_branches(first, second_damping, ratios, max_duration_s, max_abs_sum); },
       py::arg("first"), py::arg("second_damping"), py::arg("ratios"), py::arg("max_duration_s"), py::kw_only(),
       py::arg("max_abs_sum") = MinimalOptions{}.max_abs_sum, release_gil(),
-      R"(All minimal two-mode shapers over the ratio of the frequencies, joined to curves (paper 002, fig. 2 and 3).
+      R"(All minimal two-mode shapers over the ratio of the frequencies, joined into curves (paper 002, fig. 2 and 3).
 
 At each ratio the list is that of `minimal_two_mode`; curves are followed by continuation, also through gaps, where the
-sum of magnitudes or the duration exceeds its limit. Where two curves touch, their tails may be exchanged.
+sum of magnitudes or the duration exceeds its limit. Where two curves touch, their ends may be exchanged.
 
 Args:
-    first: The mode whose frequency stays.
+    first: The mode whose frequency is constant.
     second_damping: Damping ratio of the other mode (no unit).
     ratios: Frequencies of the other mode over that of the first, ascending, above 0, shape (n_ratios,).
     max_duration_s: Largest duration in s, at most 100 periods of the faster mode at any ratio.

@@ -60,21 +60,21 @@ void register_mode(py::module_& m) {
 Args:
     frequency_hz: Undamped natural frequency in Hz, above 0.
     damping_ratio: Damping ratio (no unit), 0 <= zeta < 1.
-    participation: Share of this mode's relative deflection in the response (no unit), finite.
-    excited_by: Shares of the accelerations of X, Y and Z that excite it (no unit), finite; all zero: that of the axis
-        which it moves, whole.
+    participation: Factor of this mode's relative deflection in the response (no unit), finite.
+    excited_by: Factors of the accelerations of X, Y and Z that excite it (no unit), finite; all zero: the axis which
+        it moves, with factor one.
 
 Raises:
     ArgumentError: A value is outside its range.)")
       .def(py::init(&checked_mode), py::arg("frequency_hz"), py::arg("damping_ratio") = 0.0,
            py::arg("participation") = 1.0, py::arg("excited_by") = std::array<double, 3>{},
-           "Make a mode; ArgumentError if a value is outside the range that the class states.")
+           "Raises ArgumentError on a value outside its range.")
       .def_readonly("frequency_hz", &Mode::frequency_hz, "Undamped natural frequency in Hz.")
       .def_readonly("damping_ratio", &Mode::damping_ratio, "Damping ratio, no unit.")
       .def_readonly("participation", &Mode::participation,
-                    "Share of this mode's relative deflection in the response, no unit.")
+                    "Factor of this mode's relative deflection in the response, no unit.")
       .def_readonly("excited_by", &Mode::excited_by,
-                    "Shares of the accelerations of X, Y, Z that excite it; all zero: that of the axis it moves.")
+                    "Factors of the accelerations of X, Y, Z that excite it; all zero: 1 for the axis it moves.")
       .def_property_readonly("pole", &shapegcode::pole,
                              "Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (paper 002, eq. 7).")
       .def("__repr__",
@@ -110,39 +110,39 @@ void register_shaper(py::module_& m) {
   py::class_<Shaper>(m, "Shaper", R"(Input shaper: amplitudes at ascending times that add up to one. Immutable.
 
 Args:
-    times_s: Times of the taps in s, shape (n_taps,), n_taps >= 1, strictly ascending from exactly 0.
-    amplitudes: Amplitudes of the taps (no unit), shape (n_taps,), sum 1 within 1e-9; may be negative.
+    times_s: Times of the impulses in s, shape (n,), n >= 1, strictly ascending from exactly 0.
+    amplitudes: Amplitudes of the impulses (no unit), shape (n,), sum 1 within 1e-9; may be negative.
 
 Raises:
-    ArgumentError: Unequal lengths, no tap, a value that is not finite, times that do not ascend from 0, or a sum
+    ArgumentError: Unequal lengths, no impulse, a value that is not finite, times that do not ascend from 0, or a sum
         other than 1.
 
 Source: paper 002, eq. 4 and 9.)")
       .def(py::init(&shapegcode::make_shaper), py::arg("times_s"), py::arg("amplitudes"),
-           "Make a shaper; ArgumentError if the taps are not what the class asks for.")
+           "Raises ArgumentError if the impulses are not as the class states.")
       .def_property_readonly(
           "times_s", [](const py::object& self) { return read_only_view(self.cast<const Shaper&>().times_s, self); },
-          "Times of the taps in s, shape (n_taps,), read-only view.")
+          "Times of the impulses in s, shape (n,), read-only view.")
       .def_property_readonly(
           "amplitudes",
           [](const py::object& self) { return read_only_view(self.cast<const Shaper&>().amplitudes, self); },
-          "Amplitudes of the taps (no unit), shape (n_taps,), read-only view.")
+          "Amplitudes of the impulses (no unit), shape (n,), read-only view.")
       .def_property_readonly("duration_s", &shapegcode::duration_s,
-                             "Time of the last tap in s: how much longer the shaped command moves.")
+                             "Time of the last impulse in s, by which the shaped command is longer.")
       .def_property_readonly("mean_s", &shapegcode::mean_s, "First moment in s: the mean delay of the shaped command.")
       .def_property_readonly("variance_s2", &shapegcode::variance_s2,
-                             "Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2.")
+                             "Second central moment in s^2; radius error of a circle: dR/R = variance*(v/R)^2/2.")
       .def_property_readonly("has_negative", &shapegcode::has_negative, "True if any amplitude is below zero.")
       .def_property_readonly("abs_sum", &shapegcode::abs_sum,
                              "Sum of the amplitudes' magnitudes (no unit): 1 for a non-negative shaper.")
       .def("residual_ratio", &shapegcode::residual_ratio, py::arg("mode"),
-           R"(Residual vibration of a mode after the last tap, relative to the unshaped one.
+           R"(Residual vibration of a mode after the last impulse, relative to the unshaped one.
 
-V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation plays no part. Its
+V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation has no effect. Its
 rounding floor is about 1e-16*(1 + omega*t_N)*abs_sum.
 
 Args:
-    mode: The mode whose vibration is judged; need not be one that the shaper was designed for.
+    mode: The mode that vibrates; it need not be one that the shaper was designed for.
 
 Returns:
     The ratio V (no unit), 0 where the shaper cancels the mode.
@@ -201,11 +201,11 @@ Raises:
 
 Source: paper 002, eq. 1-2 (Smith 1958).)");
   m.def("zv_on_grid", &shapegcode::zv_on_grid, py::arg("mode"), py::arg("period_s"), release_gil(),
-        R"(ZV with impulses at multiples of a period only: the second one split between the two around it.
+        R"(ZV with impulses at multiples of a period only; the second one is divided between two neighbours.
 
 Args:
     mode: The mode to cancel.
-    period_s: Of the grid in s, above 0, at most a quarter of the damped period.
+    period_s: Period of the grid in s, above 0, at most a quarter of the damped period.
 
 Returns:
     A shaper with 3 non-negative impulses, 2 where half the damped period is a multiple; residual exactly zero at the
@@ -217,20 +217,20 @@ Raises:
 
 Source: this project.)");
   m.def("convolve", &shapegcode::convolve, py::arg("first"), py::arg("second"), release_gil(),
-        R"(The two shapers in series: cancels what either cancels, lasts as long as both together.
+        R"(The two shapers in series: cancels the modes of both; the durations add.
 
 Args:
     first: A shaper.
     second: Another one; the order does not matter.
 
 Returns:
-    The series shaper; taps whose times agree within 1e-12 of its duration are merged.
+    The series shaper; impulses whose times agree within 1e-12 of its duration are merged.
 
 Source: paper 002, eq. 3.)");
   m.def(
       "convolved_zv", [](const std::vector<Mode>& modes) { return shapegcode::convolved_zv(modes); }, py::arg("modes"),
       release_gil(),
-      R"(Convolved ZV, the conventional multi-mode shaper: 2^n non-negative taps.
+      R"(Convolved ZV, the conventional multi-mode shaper: 2^n non-negative impulses.
 
 Args:
     modes: The n >= 1 modes to cancel.
@@ -246,16 +246,16 @@ Source: paper 002, section 2.)");
         py::arg("max_duration_s"), py::arg("max_abs_sum") = 10.0, release_gil(),
         R"(All minimal (three-impulse) shapers of two modes, ascending in duration, then in the second time.
 
-Complete: boxes of the plane of the two free times are discarded only where a bound on derivatives proves that they
-hold no solution, and Newton starts from all that are left. Where one ZV serves both modes (undamped, odd ratio) it is
-listed with its two taps; where amplitudes at given times are not unique, those with the smallest sum of squares are.
+Complete: boxes of the plane of the two free times are discarded only if a bound on derivatives proves that they contain
+no solution, and Newton starts from all others. If one ZV cancels both modes (undamped, odd ratio), it is listed with
+its two impulses. If amplitudes at given times are not unique, those with the smallest sum of squares are listed.
 
 Args:
     first: One mode, damped or not.
-    second: The other one, either may be the faster.
+    second: The other one; either may be the faster.
     max_duration_s: Largest duration in s, above 0, at most 100 periods of the faster mode.
-    max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1; 1 is not enough for rounding, use
-        has_negative to pick the non-negative ones.
+    max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1. Rounding may exceed 1: use
+        has_negative to select the non-negative ones.
 
 Returns:
     The shapers, residual_ratio of both modes below 1e-13; empty if there is none in the range.
@@ -268,21 +268,21 @@ Source: paper 002, eq. 12-17; the search is this project's.)");
       "grid_polynomial",
       [](const std::vector<Mode>& modes, double period_s) { return shapegcode::grid_polynomial(modes, period_s); },
       py::arg("modes"), py::arg("period_s"), release_gil(),
-      R"(Shortest shaper with taps at multiples of a period that cancels every mode exactly there.
+      R"(Shortest shaper with impulses at multiples of a period that cancels every mode exactly.
 
 The polynomial with the roots z = exp(s*period) and their conjugates: two periods per mode, one for a mode whose z is
-real, none for one that aliases onto an earlier one. Amplitudes may be negative and large: look at abs_sum before use.
+real, none for one that aliases onto an earlier one. Amplitudes may be negative and large: check abs_sum before use.
 
 Args:
-    modes: The modes to cancel, at least one; one above the grid's Nyquist frequency is fine.
+    modes: The modes to cancel, at least one; one above the grid's Nyquist frequency is allowed.
     period_s: Period of the grid in s, above 0.
 
 Returns:
-    The shaper; residual_ratio of every mode is at most 1e-10, some 1e-16*abs_sum as a rule.
+    The shaper; residual_ratio of every mode is at most 1e-10, usually about 1e-16*abs_sum.
 
 Raises:
     ArgumentError: No mode, or a period that is not positive.
-    DesignError: A z closer to +1 than 0.01, or so large an abs_sum that rounding leaves more than 1e-10.
+    DesignError: A z closer to +1 than 0.01, or round-off that leaves a residual above 1e-10.
 
 Source: this project.)");
 }

@@ -25,7 +25,7 @@ def main() -> int:
 
 
 def _interrupt_once_more(lost: Any) -> None:
-    """Python ignores exceptions in a finalizer: interrupt again after it."""
+    """Interrupt again after a finalizer, in which Python ignores exceptions."""
     if lost.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(lost)
         return

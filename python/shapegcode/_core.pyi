@@ -13,7 +13,7 @@ class ShapegcodeError(Exception):
     """
 class ProgramError(ShapegcodeError):
     """
-    The CNC program cannot be read; `line` and `column` count from 1, 0 if not known; `alarm`: FANUC's number, 0 if it has none; `file`: the text it speaks of, if another.
+    The CNC program cannot be read. `line` and `column` count from 1 (0: not known); `alarm`: FANUC's number (0: none); `file`: name of its file (empty: the program itself).
     """
     alarm: typing.ClassVar[int] = 0
     column: typing.ClassVar[int] = 0
@@ -21,7 +21,7 @@ class ProgramError(ShapegcodeError):
     line: typing.ClassVar[int] = 0
 class DesignError(ShapegcodeError):
     """
-    The shaper asked for does not exist, or not on this grid.
+    The requested shaper does not exist, or not on this grid.
     """
 class ArgumentError(ShapegcodeError, ValueError):
     """
@@ -38,9 +38,9 @@ class Mode:
     Args:
         frequency_hz: Undamped natural frequency in Hz, above 0.
         damping_ratio: Damping ratio (no unit), 0 <= zeta < 1.
-        participation: Share of this mode's relative deflection in the response (no unit), finite.
-        excited_by: Shares of the accelerations of X, Y and Z that excite it (no unit), finite; all zero: that of the axis
-            which it moves, whole.
+        participation: Factor of this mode's relative deflection in the response (no unit), finite.
+        excited_by: Factors of the accelerations of X, Y and Z that excite it (no unit), finite; all zero: the axis which
+            it moves, with factor one.
     
     Raises:
         ArgumentError: A value is outside its range.
@@ -53,7 +53,7 @@ class Mode:
         ...
     def __init__(self, frequency_hz: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, participation: typing.SupportsFloat | typing.SupportsIndex = 1.0, excited_by: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] = [0.0, 0.0, 0.0]) -> None:
         """
-        Make a mode; ArgumentError if a value is outside the range that the class states.
+        Raises ArgumentError on a value outside its range.
         """
     def __repr__(self) -> str:
         ...
@@ -67,7 +67,7 @@ class Mode:
     @property
     def excited_by(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
         """
-        Shares of the accelerations of X, Y, Z that excite it; all zero: that of the axis it moves.
+        Factors of the accelerations of X, Y, Z that excite it; all zero: 1 for the axis it moves.
         """
     @property
     def frequency_hz(self) -> float:
@@ -77,7 +77,7 @@ class Mode:
     @property
     def participation(self) -> float:
         """
-        Share of this mode's relative deflection in the response, no unit.
+        Factor of this mode's relative deflection in the response, no unit.
         """
     @property
     def pole(self) -> complex:
@@ -89,11 +89,11 @@ class Shaper:
     Input shaper: amplitudes at ascending times that add up to one. Immutable.
     
     Args:
-        times_s: Times of the taps in s, shape (n_taps,), n_taps >= 1, strictly ascending from exactly 0.
-        amplitudes: Amplitudes of the taps (no unit), shape (n_taps,), sum 1 within 1e-9; may be negative.
+        times_s: Times of the impulses in s, shape (n,), n >= 1, strictly ascending from exactly 0.
+        amplitudes: Amplitudes of the impulses (no unit), shape (n,), sum 1 within 1e-9; may be negative.
     
     Raises:
-        ArgumentError: Unequal lengths, no tap, a value that is not finite, times that do not ascend from 0, or a sum
+        ArgumentError: Unequal lengths, no impulse, a value that is not finite, times that do not ascend from 0, or a sum
             other than 1.
     
     Source: paper 002, eq. 4 and 9.
@@ -105,7 +105,7 @@ class Shaper:
         ...
     def __init__(self, times_s: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], amplitudes: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         """
-        Make a shaper; ArgumentError if the taps are not what the class asks for.
+        Raises ArgumentError if the impulses are not as the class states.
         """
     def __repr__(self) -> str:
         ...
@@ -127,13 +127,13 @@ class Shaper:
         """
     def residual_ratio(self, mode: Mode) -> float:
         """
-        Residual vibration of a mode after the last tap, relative to the unshaped one.
+        Residual vibration of a mode after the last impulse, relative to the unshaped one.
         
-        V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation plays no part. Its
+        V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation has no effect. Its
         rounding floor is about 1e-16*(1 + omega*t_N)*abs_sum.
         
         Args:
-            mode: The mode whose vibration is judged; need not be one that the shaper was designed for.
+            mode: The mode that vibrates; it need not be one that the shaper was designed for.
         
         Returns:
             The ratio V (no unit), 0 where the shaper cancels the mode.
@@ -148,12 +148,12 @@ class Shaper:
     @property
     def amplitudes(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Amplitudes of the taps (no unit), shape (n_taps,), read-only view.
+        Amplitudes of the impulses (no unit), shape (n,), read-only view.
         """
     @property
     def duration_s(self) -> float:
         """
-        Time of the last tap in s: how much longer the shaped command moves.
+        Time of the last impulse in s, by which the shaped command is longer.
         """
     @property
     def has_negative(self) -> bool:
@@ -168,16 +168,16 @@ class Shaper:
     @property
     def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Times of the taps in s, shape (n_taps,), read-only view.
+        Times of the impulses in s, shape (n,), read-only view.
         """
     @property
     def variance_s2(self) -> float:
         """
-        Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2.
+        Second central moment in s^2; radius error of a circle: dR/R = variance*(v/R)^2/2.
         """
 class ExtraInsensitive:
     """
-    An extra-insensitive shaper, and where its residual vanishes and peaks.
+    An extra-insensitive shaper, with the zeros and maxima of its residual.
     """
     @property
     def humps_hz(self) -> list[float]:
@@ -187,7 +187,7 @@ class ExtraInsensitive:
     @property
     def shaper(self) -> Shaper:
         """
-        The shaper, humps+2 non-negative taps.
+        The shaper, humps+2 non-negative impulses.
         """
     @property
     def zeros_hz(self) -> list[float]:
@@ -211,7 +211,7 @@ class WorstResidual:
     @property
     def upper_bound(self) -> float:
         """
-        No frequency of the band leaves more (no unit); within 1e-6 of residual_ratio, or 1e-12.
+        No frequency of the band has a larger residual ratio; within 1e-6 of residual_ratio, or 1e-12.
         """
 class FrequencyBand:
     """
@@ -234,12 +234,12 @@ class MinimalShapers:
     @property
     def boxes(self) -> int:
         """
-        Boxes of times that the proof looked at.
+        Boxes of times examined by the proof.
         """
     @property
     def complete(self) -> bool:
         """
-        True if every box of times was decided: there is no other shaper in the region.
+        True if every box of times was decided: there is no other shaper in the range.
         """
     @property
     def complete_up_to_s(self) -> float:
@@ -249,22 +249,22 @@ class MinimalShapers:
     @property
     def converged(self) -> int:
         """
-        Starts that reached a shaper in the region.
+        Starts that reached a shaper in the range.
         """
     @property
     def found_once(self) -> int:
         """
-        Shapers that one start alone reached. Over `converged` it estimates the share of starts that would reach a shaper not listed yet (Good 1953).
+        Shapers reached by one start only. Divided by `converged`, the number estimates the ratio of starts that would reach a shaper not yet listed (Good 1953).
         """
     @property
     def max_abs_sum(self) -> float:
         """
-        The region: largest sum of magnitudes (no unit).
+        Range of the search: largest sum of magnitudes.
         """
     @property
     def max_duration_s(self) -> float:
         """
-        The region: largest duration in s.
+        Range of the search: largest duration in s.
         """
     @property
     def shapers(self) -> list[Shaper]:
@@ -279,11 +279,11 @@ class MinimalShapers:
     @property
     def unresolved(self) -> int:
         """
-        Boxes too small to halve on that could not be decided: solutions there are not isolated.
+        Boxes too small to halve further that could not be decided: solutions there are not isolated.
         """
 class MinimalBranches:
     """
-    The minimal shapers of two modes over the ratio of their frequencies, joined to curves.
+    The minimal shapers of two modes over the ratio of their frequencies, joined into curves.
     """
     @property
     def amplitudes(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -298,7 +298,7 @@ class MinimalBranches:
     @property
     def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Times of the taps in s, shape (n_branches, n_ratios, 3), NaN where a curve has no shaper; read-only view.
+        Times of the impulses in s, shape (n_branches, n_ratios, 3), NaN where a curve has no shaper; read-only view.
         
         [..., 2] is the duration.
         """
@@ -309,7 +309,7 @@ class Fir:
     @staticmethod
     def exponential(time_constant_samples: typing.SupportsFloat | typing.SupportsIndex, rest: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> Fir:
         """
-        Geometric weights exp(-k / time_constant), cut off where less than the share `rest` of them is left and scaled to a sum of 1; costs the same for any length. Raises ArgumentError on a time constant that is not > 0 or a share outside 0 ... 1.
+        Geometric weights exp(-k / time_constant), cut off where less than the ratio `rest` of their sum remains and scaled to a sum of 1; costs the same for any length. Raises ArgumentError on a time constant that is not > 0 or a ratio outside 0 ... 1.
         """
     @staticmethod
     def moving_average(length: typing.SupportsInt | typing.SupportsIndex) -> Fir:
@@ -349,7 +349,7 @@ class Fir:
     @property
     def variance_samples2(self) -> float:
         """
-        Second central moment in samples squared: the contour cost.
+        Second central moment in samples squared; on a circle dR/R = variance*(v/R)^2/2.
         """
 class FirStream:
     """
@@ -369,11 +369,11 @@ class FirStream:
         """
 class VaryingFir:
     """
-    A set of filters on one grid between which the input moves.
+    A set of filters on one grid, with a varying choice among them.
     
     Each increment of the input is replaced by the whole impulse train of the filter that is valid where it begins (scatter
     form), so that every increment keeps the zeros of its own filter, however often the filters change. Place k is filter k
-    of the set; place k + w shares an increment between filters k and k + 1.
+    of the set; place k + w (0 < w < 1) gives the part 1 - w of an increment to filter k and w to filter k + 1.
     
     Args:
         set: The filters (Fir), at least one.
@@ -383,7 +383,7 @@ class VaryingFir:
     """
     def __init__(self, set: collections.abc.Sequence[Fir]) -> None:
         """
-        Make a set; ArgumentError if it is empty.
+        Raises ArgumentError if the set is empty.
         """
     def apply(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], place: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> numpy.ndarray:
         """
@@ -411,7 +411,7 @@ class VaryingFir:
     @property
     def variance_samples2(self) -> float:
         """
-        Largest second central moment in samples squared: the contour cost.
+        Largest second central moment of the set in samples squared.
         """
 class VaryingFirStream:
     """
@@ -431,10 +431,10 @@ class VaryingFirStream:
         """
 class FollowingFir:
     """
-    A set of filters followed along an axis.
+    A set of filters along an axis, whose position selects the filter.
     
-    Filter k of the set is valid where the axis is at position k; in between the increments are shared, beyond the ends the
-    last filter holds. Each increment goes by its own middle in the input.
+    Filter k of the set is valid where the axis is at position k; in between the increments are divided, beyond the ends the
+    nearest filter is valid. The middle of each increment selects its filter.
     
     Args:
         fir: The set.
@@ -446,7 +446,7 @@ class FollowingFir:
     """
     def __init__(self, fir: VaryingFir, axis: typing.SupportsInt | typing.SupportsIndex, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         """
-        Place the filters of a set; ArgumentError if the positions do not fit.
+        Raises ArgumentError if axis or positions do not fit.
         """
     def apply(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
         """
@@ -463,7 +463,7 @@ class FollowingFir:
     @property
     def axis(self) -> int:
         """
-        Axis whose position counts.
+        Axis whose position selects the filter.
         """
     @property
     def fir(self) -> VaryingFir:
@@ -532,7 +532,7 @@ class Segment:
     @staticmethod
     def arc(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], centre_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], sweep_rad: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, normal: typing.SupportsInt | typing.SupportsIndex = 2) -> Segment:
         """
-        An arc or helix about the axis `normal` (0 X, 1 Y, 2 Z); `sweep_rad` > 0 turns counter-clockwise seen along it. Raises ArgumentError on a zero radius or sweep.
+        An arc or helix about the axis `normal` (0 X, 1 Y, 2 Z); `sweep_rad` > 0 turns counter-clockwise seen from its positive end. Raises ArgumentError on a zero radius or sweep.
         """
     @staticmethod
     def line(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex) -> Segment:
@@ -541,7 +541,7 @@ class Segment:
         """
     def chords_within(self, tolerance_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
-        How many equal chords of an arc lie within a tolerance of it; 1 for a line.
+        Number of equal chords that approximate an arc within a tolerance; 1 for a line.
         
         Raises ArgumentError if the tolerance is not above 0.
         """
@@ -582,7 +582,7 @@ class Segment:
     @property
     def normal(self) -> int:
         """
-        Axis across the plane of an arc: 0 X, 1 Y, 2 Z.
+        Axis perpendicular to the plane of an arc: 0 X, 1 Y, 2 Z.
         """
     @property
     def radius_mm(self) -> float:
@@ -601,7 +601,7 @@ class Segment:
         """
 class Path:
     """
-    A connected run of segments.
+    A connected sequence of segments.
     """
     def __getitem__(self, index: typing.SupportsInt | typing.SupportsIndex) -> Segment:
         """
@@ -615,7 +615,7 @@ class Path:
         ...
     def moves_as(self, other: Path) -> bool:
         """
-        Whether the motion is the same: geometry, feeds and stops, whatever lines they come from.
+        Whether the motion is the same: geometry, feeds and stops, regardless of line numbers.
         """
     def polyline(self, step_rad: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> numpy.ndarray:
         """
@@ -730,7 +730,7 @@ class AccelerationLaw:
         ...
 class MotionLimits:
     """
-    What look-ahead keeps; infinity switches a limit off.
+    Limits of the look-ahead; infinity switches a limit off.
     """
     def __init__(self) -> None:
         ...
@@ -745,7 +745,7 @@ class MotionLimits:
     @property
     def block_time_s(self) -> float:
         """
-        No block is run off faster, s.
+        Minimum duration of a block, s.
         """
     @block_time_s.setter
     def block_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -753,7 +753,7 @@ class MotionLimits:
     @property
     def centripetal_acceleration_mm_per_s2(self) -> float:
         """
-        Across the path on arcs.
+        Centripetal acceleration on arcs, mm/s^2.
         """
     @centripetal_acceleration_mm_per_s2.setter
     def centripetal_acceleration_mm_per_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -769,7 +769,7 @@ class MotionLimits:
     @property
     def corner_speed_difference_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        Speed step per axis at a corner, shape (3,).
+        Maximum speed difference per axis at a corner, shape (3,), mm/s.
         """
     @corner_speed_difference_mm_per_s.setter
     def corner_speed_difference_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
@@ -785,7 +785,7 @@ class MotionLimits:
     @property
     def feed_excess_ratio(self) -> float:
         """
-        Share by which a neighbour may be faster without that.
+        Neighbours faster by up to this ratio need no `feed_spread_s`.
         """
     @feed_excess_ratio.setter
     def feed_excess_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -801,7 +801,7 @@ class MotionLimits:
     @property
     def feed_spread_s(self) -> float:
         """
-        Time by which a lower programmed feed is reached before its segment and kept behind it, s.
+        Time by which a lower programmed feed is reached before its segment and held after it, s.
         """
     @feed_spread_s.setter
     def feed_spread_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -817,7 +817,7 @@ class MotionLimits:
     @property
     def junction_deviation_mm(self) -> float:
         """
-        A corner is passed as an arc that cuts it by so much.
+        A corner is passed as an arc that cuts it by this distance.
         """
     @junction_deviation_mm.setter
     def junction_deviation_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -857,7 +857,7 @@ class MotionLimits:
     @property
     def polyline_acceleration_mm_per_s2(self) -> float:
         """
-        Across the path along polylines.
+        Centripetal acceleration along polylines, mm/s^2.
         """
     @polyline_acceleration_mm_per_s2.setter
     def polyline_acceleration_mm_per_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -872,7 +872,7 @@ class MotionLimits:
         ...
 class FilterTolerance:
     """
-    Within what a filter behind the interpolation must stay at corners and on arcs; without spread no limit.
+    Deviation permitted to a filter after the interpolation at corners and on arcs; with zero variance no limit.
     """
     def __init__(self) -> None:
         ...
@@ -887,7 +887,7 @@ class FilterTolerance:
     @property
     def corner_share(self) -> float:
         """
-        Share of the tolerance for one corner: several may fall into one filter.
+        Part of the tolerance for one corner: deviations of corners within one filter length add up.
         """
     @corner_share.setter
     def corner_share(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -937,7 +937,7 @@ class Interpolator:
         """
     def step(self) -> tuple[bool, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]]:
         """
-        (moving, position of shape (3,)); moving is False once the last set-point was given.
+        Returns (moving, position of shape (3,)); moving is False after the last set-point.
         """
     @property
     def sample_count(self) -> int:
@@ -946,7 +946,7 @@ class Interpolator:
         """
 class ControllerKind:
     """
-    Whose rules plan a program.
+    The control whose rules plan a program.
     
     Members:
     
@@ -1022,7 +1022,7 @@ class PlannerRules:
     @property
     def blend_tolerance_mm(self) -> float:
         """
-        linuxcnc: G64 P; 0: not limited.
+        linuxcnc: G64 P; 0: half of a segment.
         """
     @blend_tolerance_mm.setter
     def blend_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1038,7 +1038,7 @@ class PlannerRules:
     @property
     def junction_deviation_mm(self) -> float:
         """
-        grbl: a corner is passed as an arc that cuts it by so much ($11).
+        grbl: a corner is passed as an arc that cuts it by this distance ($11).
         """
     @junction_deviation_mm.setter
     def junction_deviation_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1046,7 +1046,7 @@ class PlannerRules:
     @property
     def kind(self) -> ControllerKind:
         """
-        Whose rules.
+        The control whose rules are used.
         """
     @kind.setter
     def kind(self, arg0: ControllerKind) -> None:
@@ -1054,7 +1054,7 @@ class PlannerRules:
     @property
     def kink_ratio(self) -> float:
         """
-        linuxcnc: share of the acceleration for a kink.
+        linuxcnc: ratio of the acceleration for a kink.
         """
     @kink_ratio.setter
     def kink_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1070,7 +1070,7 @@ class PlannerRules:
     @property
     def max_feed_override(self) -> float:
         """
-        linuxcnc: it plans for that.
+        linuxcnc: override for which it plans.
         """
     @max_feed_override.setter
     def max_feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1078,7 +1078,7 @@ class PlannerRules:
     @property
     def minimum_cruise_ratio(self) -> float:
         """
-        klipper: max_accel_to_decel is max_accel times what it leaves of 1.
+        klipper: max_accel_to_decel is max_accel times (1 - ratio).
         """
     @minimum_cruise_ratio.setter
     def minimum_cruise_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1086,7 +1086,7 @@ class PlannerRules:
     @property
     def naive_cam_tolerance_mm(self) -> float:
         """
-        linuxcnc: G64 Q: lines of one feed within it are one, an arc in XY within it is two lines.
+        linuxcnc: G64 Q: lines of one feed within it are joined, an arc in XY becomes two lines.
         """
     @naive_cam_tolerance_mm.setter
     def naive_cam_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1094,7 +1094,7 @@ class PlannerRules:
     @property
     def optimization_depth(self) -> int:
         """
-        linuxcnc: segments that it looks ahead.
+        linuxcnc: segments in its look-ahead.
         """
     @optimization_depth.setter
     def optimization_depth(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -1118,7 +1118,7 @@ class PlannerRules:
     @property
     def rapid_follows(self) -> bool:
         """
-        linuxcnc: else the last segment has half of the acceleration.
+        linuxcnc: a rapid follows the path; otherwise its last segment has half of the acceleration.
         """
     @rapid_follows.setter
     def rapid_follows(self, arg0: bool) -> None:
@@ -1133,52 +1133,52 @@ class PlannerRules:
         ...
 class LinuxcncSlowing:
     """
-    What LinuxCNC's rules for short segments do to a path.
+    Effect of LinuxCNC's two rules for short segments on a path.
     """
     @property
     def angle_rad(self) -> float:
         """
-        There.
+        Change of direction at that junction, rad.
         """
     @property
     def kinks(self) -> int:
         """
-        Junctions above the kink ratio.
+        Junctions that need more than the kink ratio.
         """
     @property
     def largest_ratio(self) -> float:
         """
-        Of the acceleration, that a junction asks for.
+        Largest ratio of acceleration at a junction.
         """
     @property
     def line(self) -> int:
         """
-        There.
+        Source line of that junction.
         """
     @property
     def ramps(self) -> int:
         """
-        Segments whose speed is a ramp.
+        Number of segments whose speed is a ramp.
         """
     @property
     def segments(self) -> int:
         """
-        How many there are.
+        Number of segments.
         """
     @property
     def speed_mm_per_s(self) -> float:
         """
-        There.
+        Speed at that junction, mm/s.
         """
 class PushResult:
     """
-    Answer of a MotionController to a segment that was pushed.
+    Result of pushing a segment to a MotionController.
     
     Members:
     
-      accepted : It waits for its turn.
+      accepted : It is in the queue.
     
-      queue_full : Nothing was taken: push it again later.
+      queue_full : It was not accepted: push it again later.
     
       not_connected : It does not start where the one before ended, or an arc misses its end (1e-6 mm).
     
@@ -1190,17 +1190,17 @@ class PushResult:
     
       wrong_axes : Not as many following axes as the control has.
     
-      aborted : Nothing is taken between abort() and restart().
+      aborted : Nothing is accepted between abort() and restart().
     
-      flushing : Between flush() and flushed() nothing is taken.
+      flushing : Nothing is accepted between flush() and flushed().
     
-      no_time : A dwell below zero, above 1e6 s, or no number.
+      no_time : A dwell below zero, above 1e6 s, or not a number.
     
       beyond_travel : It leads out of the travel of an axis.
     
       bad_limit : A limit of the segment that is not above zero.
     
-      not_straight : Bound to the spindle, and no line.
+      not_straight : Synchronous with the spindle, but not a line.
     """
     __members__: typing.ClassVar[dict[str, PushResult]]
     aborted: typing.ClassVar[PushResult]
@@ -1252,23 +1252,23 @@ class PushResult:
         ...
 class JogResult:
     """
-    Answer of a MotionController to a jog.
+    Result of a jog of a MotionController.
     
     Members:
     
-      accepted : The axis goes.
+      accepted : The axis moves.
     
-      path_moves : The control is neither held nor flushed nor aborted, or does not rest yet.
+      path_moves : The control is neither held nor flushed nor aborted, or not yet at rest.
     
       no_axis : There is no such axis.
     
       not_finite : A number that is not finite.
     
-      no_speed : Of a distance: the speed is not above zero.
+      no_speed : The speed of a jog by a distance is not above zero.
     
       beyond_travel : The distance leads out of the travel, or the axis is at its end already.
     
-      no_record : No periods are kept for retrace().
+      no_record : No periods are stored for retrace().
     """
     __members__: typing.ClassVar[dict[str, JogResult]]
     accepted: typing.ClassVar[JogResult]
@@ -1314,7 +1314,7 @@ class JogResult:
         ...
 class FeedRate:
     """
-    What a programmed feed counts in, and what changes it.
+    Unit of a programmed feed, and the override that applies.
     
     Members:
     
@@ -1324,7 +1324,7 @@ class FeedRate:
     
       per_revolution : Per revolution of the spindle; the feed override.
     
-      synchronous : Likewise, bound to the angle of the spindle from rest to rest; no override.
+      synchronous : Likewise, synchronous with the spindle angle from rest to rest; no override.
     """
     __members__: typing.ClassVar[dict[str, FeedRate]]
     per_revolution: typing.ClassVar[FeedRate]
@@ -1367,15 +1367,15 @@ class FeedRate:
         ...
 class FeedOf:
     """
-    What a feed is of, where X, Y and Z move together with axes that follow.
+    To which motion a feed refers if X, Y and Z move together with following axes.
     
     Members:
     
-      path : X, Y and Z along their path; where these do not move (1e-9 mm), the axis that moves the furthest.
+      path : X, Y and Z along their path; if these do not move (1e-9 mm), the axis with the longest travel.
     
-      all_axes : The root of the squares of all, degrees counted as mm.
+      all_axes : The root of the sum of squares of all axes, degrees counted as mm.
     
-      dominant : That of X, Y and Z along their path and the others which moves the furthest.
+      dominant : X, Y and Z along their path, or the following axis with a longer travel.
     
       time : Inverse time: the segment lasts one over the feed, s or revolutions.
     """
@@ -1420,29 +1420,29 @@ class FeedOf:
         ...
 class SegmentRules:
     """
-    How a segment is run, beside its geometry and its feed. Immutable.
+    Rules for running a segment, besides its geometry and its feed. Immutable.
     
     Args:
-        feed_rate: What its feed counts in.
-        feed_of: What its feed is of.
-        max_acceleration: Along its path, beside the limits of the axes, mm/s^2.
+        feed_rate: Unit of its feed, and the override that applies.
+        feed_of: Motion to which its feed refers.
+        max_acceleration: Along its path, besides the limits of the axes, mm/s^2.
         max_jerk: Likewise, mm/s^3.
     """
     def __init__(self, *, feed_rate: FeedRate = FeedRate.per_time, feed_of: FeedOf = FeedOf.path, max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., max_jerk: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
         """
-        Checked by the control that takes them.
+        Values are checked by the control that uses them.
         """
     def __repr__(self) -> str:
         ...
     @property
     def feed_of(self) -> FeedOf:
         """
-        What its feed is of.
+        Motion to which its feed refers.
         """
     @property
     def feed_rate(self) -> FeedRate:
         """
-        What its feed counts in.
+        Unit of its feed, and the override that applies.
         """
     @property
     def max_acceleration(self) -> float:
@@ -1456,17 +1456,17 @@ class SegmentRules:
         """
 class OffsetLimits:
     """
-    Limits of an offset that is added to an axis while the path is run. Immutable.
+    Limits of an offset that is added to an axis during motion. Immutable.
     
     Args:
         max_feed: Highest speed in the axis' unit (mm or degrees) per s; 0: no offset.
         max_acceleration: Likewise per s^2.
         max_jerk: Likewise per s^3.
-        backlash: Of the drive: taken up by the offset where the axis goes down; the control begins as after a motion upwards.
+        backlash: Of the drive, compensated by the offset in negative motion; initially as after positive motion.
     """
     def __init__(self, *, max_feed: typing.SupportsFloat | typing.SupportsIndex = 0.0, max_acceleration: typing.SupportsFloat | typing.SupportsIndex = 0.0, max_jerk: typing.SupportsFloat | typing.SupportsIndex = 0.0, backlash: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
-        Checked by the control that takes them.
+        Values are checked by the control that uses them.
         """
     def __repr__(self) -> str:
         ...
@@ -1498,17 +1498,17 @@ class Activity:
     
       idle : At rest, nothing left to do.
     
-      moving : Along the path, or the shaper is still giving out what it holds.
+      moving : Along the path, or the shaper's output is not yet at rest.
     
       stopping : Decelerating for hold(), flush() or abort().
     
-      held : At rest after hold(), or at a stop that was pushed.
+      held : At rest after hold(), or at a programmed stop.
     
-      starved : Coming to rest: the segments ran out before one that stops. At rest it is idle.
+      starved : Decelerating: the queue ran empty before a segment with `stop_at_end`. Idle when at rest.
     
-      aborted : At rest after abort() or emergency_stop(); the path is gone.
+      aborted : At rest after abort() or emergency_stop(); the path is discarded.
     
-      jogging : Away from where the path rests, or back onto it.
+      jogging : Away from the position where the path rests, or back to it.
     """
     __members__: typing.ClassVar[dict[str, Activity]]
     aborted: typing.ClassVar[Activity]
@@ -1560,12 +1560,12 @@ class FollowingLimits:
         max_feed: Highest speed in its own unit (mm or degrees) per s.
         max_acceleration: Likewise per s^2.
         max_jerk: Likewise per s^3.
-        tolerance: By how much it may deviate where its speed along the path changes at once, in its unit; 0: the motion comes to rest
+        tolerance: Permitted deviation where its speed along the path changes abruptly, in its unit; 0: the motion stops
             there.
     """
     def __init__(self, *, max_feed: typing.SupportsFloat | typing.SupportsIndex = ..., max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., max_jerk: typing.SupportsFloat | typing.SupportsIndex = ..., tolerance: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
         """
-        Checked by the control that takes them.
+        Values are checked by the control that uses them.
         """
     def __repr__(self) -> str:
         ...
@@ -1591,14 +1591,14 @@ class FollowingLimits:
         """
 class ControllerEvent:
     """
-    Something that belongs to a place of the path. Immutable.
+    An event at a position of the path. Immutable.
     """
     def __repr__(self) -> str:
         ...
     @property
     def id(self) -> int:
         """
-        As it was pushed.
+        Identifier of the caller, as it was pushed.
         """
     @property
     def step(self) -> int:
@@ -1608,7 +1608,7 @@ class ControllerEvent:
     @property
     def word(self) -> int:
         """
-        The caller's own.
+        Data of the caller, as they were pushed.
         """
 class ControllerState:
     """
@@ -1619,12 +1619,12 @@ class ControllerState:
     @property
     def activity(self) -> Activity:
         """
-        What it does.
+        What the control does.
         """
     @property
     def distance_mm(self) -> float:
         """
-        Since the last rest.
+        Distance since the last rest.
         """
     @property
     def feed_override(self) -> float:
@@ -1634,12 +1634,12 @@ class ControllerState:
     @property
     def late_plans(self) -> int:
         """
-        How often the motion slowed down because nothing further was planned in time.
+        How often the motion slowed down because no section was planned in time.
         """
     @property
     def line(self) -> int:
         """
-        Of the segment that is being run.
+        Line of the present segment.
         """
     @property
     def offset(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1649,47 +1649,47 @@ class ControllerState:
     @property
     def rapid_override(self) -> float:
         """
-        Ratio of the rapids.
+        Ratio of the rapid rates.
         """
     @property
     def segments_done(self) -> int:
         """
-        Run to their ends.
+        Segments run to their ends.
         """
     @property
     def segments_waiting(self) -> int:
         """
-        Pushed and not run to their ends.
+        Number of segments pushed and not yet run to their ends.
         """
     @property
     def set_point(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Set-point last given, (n_axes,), mm or the axis' unit.
+        Last set-point, (n_axes,), mm or the axis' unit.
         """
     @property
     def set_point_distance_mm(self) -> float:
         """
-        `distance_mm` of the set-point that was given: behind smoothing and shaper, `delay_periods` later, rounded.
+        `distance_mm` at the last set-point, which smoothing and shaper delay by `delay_periods`, rounded.
         """
     @property
     def set_point_line(self) -> int:
         """
-        Likewise its line.
+        `line` at that set-point.
         """
     @property
     def shaper(self) -> int:
         """
-        Number of the one that acts, or that is being faded to.
+        Number of the active shaper, or of the one being faded to.
         """
     @property
     def speed_mm_per_s(self) -> float:
         """
-        Along the path, before smoothing and shaper.
+        Speed along the path, before smoothing and shaper.
         """
     @property
     def spindle_error_mm(self) -> float:
         """
-        Of a synchronous segment: the motion less what the angle asks for.
+        Of a synchronous segment: the motion less that required by the spindle angle.
         """
     @property
     def spindle_speed(self) -> float:
@@ -1699,53 +1699,53 @@ class ControllerState:
     @property
     def starvations(self) -> int:
         """
-        How often the segments ran out.
+        How often the queue ran empty.
         """
     @property
     def steps(self) -> int:
         """
-        Set-points given so far.
+        Number of set-points so far.
         """
     @property
     def travel_stops(self) -> int:
         """
-        How often it was held because the path would have left the travel.
+        How often the control was held because the path would have left the travel.
         """
 class MotionController:
     """
-    A path that grows while it is run: what a control does between blocks and drives.
+    Runs a path that grows during motion: what a control does between blocks and drives.
     
-    Look-ahead over a window of segments: junctions rounded within the tolerance, run nearly as fast as speed, acceleration and
-    jerk of every axis allow, one set-point per period through contour correction, smoothing and shaper. Limits that are
-    finite are kept by the set-points. One thread may push, one may step, one may plan, any may call the rest but restart();
-    step(), run() and plan() release the global lock. It is the C++ class of the same name, which is the real-time form.
+    Look-ahead over a window of segments, junctions rounded within the tolerance, motion nearly as fast as the limits of the
+    axes allow, one set-point per period through contour correction, smoothing and shaper. The set-points keep every finite
+    limit. One thread may push, one may step, one may plan, any may call the rest except restart(); step(), run() and plan()
+    release the global interpreter lock. The real-time form is the C++ class of the same name.
     
     Args:
         period_s: Time between set-points in s.
-        limits: Limits, with the rules for corners. None: nothing but what the next three say, under the
-            jerk-limited law if there is an acceleration.
-        max_feed_mm_per_s: Of X, Y and Z, shape (3,), or one number for all; in place of that of `limits`.
+        limits: Limits, with the rules for corners. None: only the next three, under the jerk-limited law if there is an
+            acceleration.
+        max_feed_mm_per_s: Of X, Y and Z, shape (3,), or one number for all; instead of that in `limits`.
         max_acceleration_mm_per_s2: Likewise.
-        max_jerk_mm_per_s3: Likewise; wants an acceleration.
+        max_jerk_mm_per_s3: Likewise; requires an acceleration.
         following: Limits of the axes that follow the path, at most six.
-        contour_tolerance_mm: By how much rounded corners, smoothing and shaper may deviate from the path. 0: corners are
+        contour_tolerance_mm: Permitted deviation from the path by rounded corners, smoothing and shaper. 0: corners are
             exact stops; inf: neighbouring corners are rounded up to the middle between them.
-        smoothing_time_s: Length of each of two moving averages over every axis in s; 0: none.
-        shaper: Shaper on the grid of the period, Fir, or Mode (whose ZV on the grid it is) for all axes, a list of them
-            with one for each axis, FollowingFir; None: none.
-        contour_correction: Take back, to the second order, what smoothing and shaper cut off arcs.
+        smoothing_time_s: Duration of each of two moving averages of every axis in s; 0: none.
+        shaper: A Shaper on the grid of the period, a Fir, or a Mode (for its ZV on the grid) for all axes; a list with one
+            of these for each axis; or a FollowingFir. None: no shaper.
+        contour_correction: Compensate, to the second order, the radius error of arcs caused by smoothing and shaper.
         window: Segments that the look-ahead sees, 8 at least.
-        queue: Segments that may wait in all; rounded up to a power of two, and holds the window.
-        lead_periods: Another thread calls plan(), which plans so many periods ahead of the motion. None: step() plans when what
-            is planned runs out.
-        travel: Where each axis may be, (low, high) of each; empty: anywhere.
-        offset: Limits of the offset of each axis, which the path leaves to it; empty: none.
-        emergency_acceleration: What each axis can do at the most, for emergency_stop(); empty: it brakes as abort() does.
-        spindle_bandwidth_hz: With which a spindle is followed.
-        retrace_periods: Periods of motion that are kept for retrace().
-        other_shapers: What `shaper`, number 0, may be exchanged for in motion, numbers 1 and up: each one for all axes, or a list
-            with one for each.
-        fade_time_s: How long an exchange takes, s; what it may need of the limits, less the longer it takes, is not the path's.
+        queue: Segments in the whole queue, including the window; rounded up to a power of two.
+        lead_periods: Periods by which plan(), called by another thread, is ahead of the motion. None: step() plans when the
+            planned motion runs out.
+        travel: Travel range of each axis, (low, high); empty: no limits.
+        offset: Limits of the offset of each axis, by which the limits of the path are reduced; empty: no offset.
+        emergency_acceleration: Maximum of each axis, for emergency_stop(); empty: it decelerates as abort() does.
+        spindle_bandwidth_hz: Bandwidth for following a spindle in Hz.
+        retrace_periods: Periods of motion stored for retrace().
+        other_shapers: Shapers that can replace `shaper` (number 0) in motion, numbers 1 and up: each one for all axes, or a
+            list with one for each.
+        fade_time_s: Duration of an exchange in s. The limits of the path are reduced for it, less for a longer one.
     
     Raises:
         ArgumentError: A value outside its range.
@@ -1755,21 +1755,21 @@ class MotionController:
     """
     def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limits: MotionLimits | None = None, max_feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_acceleration_mm_per_s2: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_jerk_mm_per_s3: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, following: collections.abc.Sequence[FollowingLimits] = (), contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = 0.05, smoothing_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, shaper: Shaper | Fir | Mode | collections.abc.Sequence[Shaper | Fir | Mode] | FollowingFir | None = None, contour_correction: bool = False, window: typing.SupportsInt | typing.SupportsIndex = 128, queue: typing.SupportsInt | typing.SupportsIndex = 1024, lead_periods: typing.SupportsInt | typing.SupportsIndex | None = None, travel: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = (), offset: collections.abc.Sequence[OffsetLimits] = (), emergency_acceleration: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = (), spindle_bandwidth_hz: typing.SupportsFloat | typing.SupportsIndex = 20.0, retrace_periods: typing.SupportsInt | typing.SupportsIndex = 0, other_shapers: collections.abc.Sequence[Shaper | Fir | Mode | collections.abc.Sequence[Shaper | Fir | Mode]] = (), fade_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> None:
         """
-        ArgumentError if it is not what the class asks for.
+        Raises ArgumentError or DesignError as the class states.
         """
     def abort(self) -> None:
         """
-        Come to rest along the path and forget the rest of it.
+        Decelerates to rest along the path and discards the rest of it; nothing is accepted until restart().
         """
     def emergency_stop(self) -> None:
         """
-        Come to rest along the path with all that `emergency_acceleration` allows, whatever the jerk; then as abort().
+        Decelerates to rest along the path with `emergency_acceleration`, without a jerk limit; then as abort().
         """
     def exchange_shaper(self, number: typing.SupportsInt | typing.SupportsIndex) -> bool:
         """
-        Fades to another shaper, in motion or at rest; the limits hold.
+        Fades to another shaper, in motion or at rest, within the limits.
         
-        From the next period on, or when an earlier fade or a synchronous segment ends; a synchronous segment waits for it.
+        Begins with the next period, or after an earlier fade or synchronous segment; a synchronous segment waits for the fade.
         
         Args:
             number: 0: `shaper`; 1 and up: `other_shapers`.
@@ -1779,52 +1779,52 @@ class MotionController:
         """
     def feed_override(self, ratio: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
-        Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. It acts on what is not planned yet, after 8 to 32 periods and the lead; 0 is a hold.
+        Sets the feed override, a ratio of 0 to 2; a value outside is limited to this range. It acts on motion not yet planned: after 8 to 32 periods and the lead; 0 is a hold.
         """
     def flush(self) -> None:
         """
-        Comes to rest along the path and forgets the rest of it; when it rests, flushed() makes it go on from there.
+        Decelerates to rest along the path and discards the rest of it; at rest, flushed() lets new segments start there.
         """
     def flushed(self) -> numpy.typing.NDArray[numpy.float64] | None:
         """
-        After flush(): takes segments again, from where the motion rests.
+        Completes a flush(): accepts segments again, from the position of rest.
         
         Returns:
-            That position, (n_axes,). None: it does not rest yet, or plan() is at work, or there was no flush().
+            That position, (n_axes,). None: it is not yet at rest, or plan() is running, or there was no flush().
         """
     def hold(self) -> None:
         """
-        Come to rest along the path.
+        Decelerates to rest along the path.
         """
     def jog(self, axis: typing.SupportsInt | typing.SupportsIndex, speed: typing.SupportsFloat | typing.SupportsIndex) -> JogResult:
         """
-        Moves an axis by hand while the path rests.
+        Jogs an axis while the path rests; it stops at the end of its travel.
         
-        That is after hold(), at a stop that was pushed, after flush() until flushed(), after abort(). resume() leads back onto the path, each axis as
-        fast as it was jogged last; flushed() and restart() begin at the new place.
+        Allowed after hold(), at a programmed stop, after flush() until flushed(), and after abort(). resume() first leads back
+        to the path, each axis at its last jog speed; flushed() and restart() begin at the new position.
         
         Args:
             axis: Its index, from 0.
-            speed: With its sign, unit per s; given again it counts from the next period; 0: to rest.
+            speed: With its sign, unit per s; a new speed acts from the next period; 0: stop.
         
         Returns:
-            JogResult; unless it is `accepted` nothing has happened. It comes to rest at the end of the travel.
+            JogResult; unless it is `accepted`, nothing has changed.
         """
     def jog_by(self, axis: typing.SupportsInt | typing.SupportsIndex, distance: typing.SupportsFloat | typing.SupportsIndex, speed: typing.SupportsFloat | typing.SupportsIndex) -> JogResult:
         """
-        Likewise by a distance.
+        Jogs an axis by a distance, where jog() is allowed.
         
         Args:
             axis: Its index, from 0.
-            distance: With its sign; those that are given before it ends add up.
+            distance: With its sign; further distances before its end are added.
             speed: Unit per s.
         
         Returns:
-            JogResult; unless it is `accepted` nothing has happened.
+            JogResult; unless it is `accepted`, nothing has changed.
         """
     def offset(self, axis: typing.SupportsInt | typing.SupportsIndex, value: typing.SupportsFloat | typing.SupportsIndex) -> bool:
         """
-        An offset of an axis: it goes there within its own limits, at rest and while the path is run.
+        Sets an offset, which the axis approaches within the limits of its offset, at rest and in motion.
         
         Args:
             axis: Its index, from 0.
@@ -1835,134 +1835,134 @@ class MotionController:
         """
     def plan(self) -> bool:
         """
-        Plans on until enough lies ahead; with `lead_periods`, from one thread. False: there was nothing to do.
+        Plans until enough motion lies ahead; only with `lead_periods`, from one thread. False: nothing to do.
         """
     def probe(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        A probe has touched, in the period of the last step: flushes.
+        Reports a probe contact in the period of the last step, and flushes.
         
         Returns:
             The set-point of that period, (n_axes,).
         """
     def push(self, segment: Segment, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: SegmentRules | None = None) -> PushResult:
         """
-        Hand over the next segment; never waits.
+        Appends the next segment; never waits.
         
         Args:
-            segment: It starts where the one before ended, the first at rest.
-            following: Where the following axes are at its end, (n_axes - 3,); they follow in proportion to the path length. None: they
-                stay.
-            rules: How it is run. None: the feed is per s along the path.
+            segment: Starts where the previous one ended, the first one at the position of rest.
+            following: Positions of the following axes at its end, (n_axes - 3,); they move in proportion to the path length.
+                None: they do not move.
+            rules: Rules for running it. None: the feed is per s along the path.
         
         Returns:
-            PushResult; nothing was taken unless it is `accepted`.
+            PushResult; unless it is `accepted`, nothing has changed.
         """
     def push_arc(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], centre_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], sweep_rad: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, normal: typing.SupportsInt | typing.SupportsIndex = 2, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, *, rules: SegmentRules | None = None, line: typing.SupportsInt | typing.SupportsIndex = 0, stop_at_end: bool = False) -> PushResult:
         """
-        The same along an arc or helix, as Segment.arc makes it.
+        Appends an arc or helix from the end of the previous segment, as Segment.arc makes it.
         
         Args:
             end_mm: Shape (3,), mm.
-            centre_mm: Shape (3,), mm; its value along `normal` has no say.
+            centre_mm: Shape (3,), mm; its value along `normal` has no effect.
             sweep_rad: Above zero: X towards Y about Z, Y towards Z about X, Z towards X about Y.
             feed_mm_per_s: Along the path.
-            normal: Axis across its plane: 0 X, 1 Y, 2 Z.
+            normal: Axis perpendicular to its plane: 0 X, 1 Y, 2 Z.
             following: As in push().
-            rules: How it is run. None: the feed is per s along the path.
-            line: What the state shows while it is run.
+            rules: Rules for running it. None: the feed is per s along the path.
+            line: Shown by the state while the segment runs.
             stop_at_end: Exact stop.
         
         Returns:
-            PushResult; nothing was taken unless it is `accepted`.
+            PushResult; unless it is `accepted`, nothing has changed.
         
         Raises:
             ArgumentError: No radius, no sweep, or a number that is not finite.
         """
     def push_dwell(self, time_s: typing.SupportsFloat | typing.SupportsIndex) -> PushResult:
         """
-        Rest behind the segment that was pushed last. A hold in it restarts it.
+        Appends a dwell after the last pushed segment. A hold during the dwell restarts it.
         
         Args:
-            time_s: For so long the set-points rest, 0 to 1e6.
+            time_s: Time for which the set-points rest in s, 0 to 1e6.
         
         Returns:
             `accepted`, `no_time`, `flushing`, `aborted`.
         """
     def push_event(self, id: typing.SupportsInt | typing.SupportsIndex, word: typing.SupportsInt | typing.SupportsIndex = 0) -> PushResult:
         """
-        An event behind the segment that was pushed last: spindle, coolant, an output.
+        Appends an event after the last pushed segment: spindle, coolant, an output.
         
         Args:
-            id: What it is, the caller's own, below 2^32.
-            word: What belongs to it, below 2^64.
+            id: Identifier of the caller, below 2^32.
+            word: Further data of the caller, below 2^64.
         
         Returns:
             `accepted`, `queue_full` (as many may wait as segments), `flushing`, `aborted`.
         """
     def push_line(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, *, rules: SegmentRules | None = None, line: typing.SupportsInt | typing.SupportsIndex = 0, stop_at_end: bool = False) -> PushResult:
         """
-        A straight move from the end of the segment before, at first from rest.
+        Appends a straight move from the end of the previous segment, at first from the position of rest.
         
         Args:
             end_mm: Shape (3,), mm.
-            feed_mm_per_s: Along the path, as far as `rules` do not say otherwise.
+            feed_mm_per_s: Along the path, unless `rules` state otherwise.
             following: As in push().
-            rules: How it is run. None: the feed is per s along the path.
-            line: What the state shows while it is run.
-            stop_at_end: Exact stop; on the last segment of a program it says that none is missing.
+            rules: Rules for running it. None: the feed is per s along the path.
+            line: Shown by the state while the segment runs.
+            stop_at_end: Exact stop; marks the last segment of a program, after which none is missing.
         
         Returns:
-            PushResult; nothing was taken unless it is `accepted`.
+            PushResult; unless it is `accepted`, nothing has changed.
         """
     def push_path(self, path: Path, first: typing.SupportsInt | typing.SupportsIndex = 0) -> tuple[int, PushResult]:
         """
-        The segments of a path, as many as are taken; the following axes stay.
+        Appends the segments of a path, as many as are accepted; the following axes do not move.
         
         Args:
-            path: Its first segment starts where the segment before ended.
-            first: Segment to begin with.
+            path: Its segment `first` starts where the previous segment ended.
+            first: Index of the segment to begin with.
         
         Returns:
-            (index of the segment to go on with, PushResult of the last one that was tried): (len(path), accepted) when all of
-            them were taken.
+            (index of the segment to continue with, PushResult of the last one that was tried): (len(path), accepted) if all
+            were accepted.
         
         Raises:
             ArgumentError: `first` below 0.
         """
     def push_stop(self) -> PushResult:
         """
-        A programmed stop (M00) behind the segment that was pushed last: at rest there it is held until resume().
+        Appends a programmed stop (M00) after the last pushed segment: the control is held there until resume().
         """
     def rapid_override(self, ratio: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
-        The same of rapids, which the feed override leaves alone.
+        Sets the override of rapids, likewise. The feed override has no effect on them.
         """
     def restart(self, position: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         """
-        At rest at a position (n_axes,), the queue empty. ArgumentError on another shape or a value that is not finite.
+        Sets the control at rest at a position (n_axes,), with an empty queue. Raises ArgumentError on another shape or a value that is not finite.
         """
     def resume(self) -> None:
         """
-        Go on after hold().
+        Continues after hold() or a programmed stop.
         """
     def retrace(self, distance_mm: typing.SupportsFloat | typing.SupportsIndex) -> JogResult:
         """
-        Back along the path, at half the speed with which it was run.
+        Moves back along the path, at half the original speed.
         
-        When a jog may; resume() leads to where the path rests, then it goes on.
+        Allowed when a jog is; resume() returns to the position where the path rests, then continues.
         
         Args:
-            distance_mm: From where it rests, as far as it is kept; less than before: forward.
+            distance_mm: From the position of rest, as far as periods are stored; a smaller one than before: forward.
         
         Returns:
-            JogResult; unless it is `accepted` nothing has happened.
+            JogResult; unless it is `accepted`, nothing has changed.
         """
     def run(self, max_periods: typing.SupportsInt | typing.SupportsIndex = 1000000) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Steps until it rests: idle, held or aborted.
+        Steps until the control is idle, held or aborted.
         
         Args:
-            max_periods: It stops there, at the latest.
+            max_periods: Maximum number of steps.
         
         Returns:
             (n, n_axes), mm or the unit of a following axis.
@@ -1975,45 +1975,45 @@ class MotionController:
         The next set-points, one for each period.
         
         Args:
-            periods: How many, >= 0.
-            spindle: Where the spindle is in each period, revolutions that go on counting, (periods,). None: it is not measured.
+            periods: Number of set-points, >= 0.
+            spindle: Spindle position in each period, in continuously counted revolutions, (periods,). None: not measured.
         
         Returns:
-            (periods, n_axes), mm or the unit of a following axis; `state.activity` says what the last one was.
+            (periods, n_axes), mm or the unit of a following axis; `state.activity` is that of the last one.
         
         Raises:
-            ArgumentError: Periods below 0, or not as many angles.
+            ArgumentError: Periods below 0, or another number of spindle positions.
         """
     def step_motion(self, periods: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
-        The next set-points with what a drive's feed-forward wants.
+        The next set-points with velocity and acceleration, for the feed-forward of a drive.
         
-        They leave the same smoothing and shaper as the positions do. What the changes of a shaper that follows an axis add is not in there.
+        All three pass through the same smoothing and shaper. The effect of changing taps of a FollowingFir is not included.
         
         Args:
-            periods: How many, >= 0.
+            periods: Number of set-points, >= 0.
         
         Returns:
-            Positions, velocities (per s) and accelerations (per s^2), each (periods, n_axes), in mm or the unit of a following axis.
+            Positions, velocities (per s) and accelerations (per s^2), each (periods, n_axes), in mm or the axis' unit.
         
         Raises:
             ArgumentError: Periods below 0.
         """
     def take_events(self) -> list[ControllerEvent]:
         """
-        The events that were reached since they were taken last.
+        Returns the events reached since the last call.
         
-        A junction that is passed is reached when its place has come through smoothing and shaper (`delay_periods`, rounded), one at which the
-        motion rests when the set-points come to rest.
+        A junction passed in motion is reached when its position has come through smoothing and shaper (`delay_periods`,
+        rounded); a junction at which the motion stops, when the set-points come to rest.
         
         Returns:
-            In the order of their pushes, each with its step.
+            The events in the order in which they were pushed, each with its step.
         """
     def travel(self, axis: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsFloat | typing.SupportsIndex, high: typing.SupportsFloat | typing.SupportsIndex) -> bool:
         """
-        Where an axis may be from now on.
+        Sets the travel range of an axis.
         
-        Where the path that is planned would leave it, the control is held, with the stop that is planned.
+        If the planned path would leave it, the control is held, with the planned stop.
         
         Args:
             axis: Its index, from 0.
@@ -2026,7 +2026,7 @@ class MotionController:
     @property
     def correction_delay(self) -> int:
         """
-        Periods of that which are the contour correction's.
+        Part of `delay_periods` caused by the contour correction, in periods.
         """
     @property
     def delay_periods(self) -> float:
@@ -2036,17 +2036,17 @@ class MotionController:
     @property
     def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        Where the next segment must start, (3,), mm.
+        Start of the next segment, (3,), mm.
         """
     @property
     def following_end(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Where the following axes are at the end of the last segment, (n_axes - 3,).
+        Positions of the following axes at the end of the last segment, (n_axes - 3,).
         """
     @property
     def n_axes(self) -> int:
         """
-        Axes of a set-point.
+        Number of axes of a set-point.
         """
     @property
     def state(self) -> ControllerState:
@@ -2322,14 +2322,14 @@ class CodeBindings:
         ...
 class WorkLimits:
     """
-    What a program may ask at most, counted while it is read.
+    Limits of the work that a program may cause, checked while it is read.
     """
     def __init__(self) -> None:
         ...
     @property
     def bytes(self) -> int:
         """
-        Of texts that are read.
+        Bytes of program texts read.
         """
     @bytes.setter
     def bytes(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2337,7 +2337,7 @@ class WorkLimits:
     @property
     def expansion_bytes(self) -> int:
         """
-        Of the plain text beyond those of the texts.
+        Bytes by which the expanded program is longer.
         """
     @expansion_bytes.setter
     def expansion_bytes(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2377,7 +2377,7 @@ class WorkLimits:
     @property
     def rapid_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        Of each axis in a rapid, mm/s.
+        Highest speed of each axis in a rapid, mm/s.
         """
     @rapid_mm_per_s.setter
     def rapid_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
@@ -2385,7 +2385,7 @@ class WorkLimits:
     @property
     def seconds(self) -> float:
         """
-        Least time, s.
+        Minimum time: moves at their feed, and dwells, s.
         """
     @seconds.setter
     def seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -2393,7 +2393,7 @@ class WorkLimits:
     @property
     def steps(self) -> int:
         """
-        Lines executed, each beyond its first time.
+        Lines executed, not counting the first time of each.
         """
     @steps.setter
     def steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2408,7 +2408,7 @@ class WorkLimits:
         ...
 class ReaderOptions:
     """
-    The controller's settings that change how a text is read.
+    Settings of the control that change the meaning of a program.
     """
     def __init__(self) -> None:
         ...
@@ -2463,7 +2463,7 @@ class ReaderOptions:
     @property
     def collect_alarms(self) -> bool:
         """
-        Go on behind an alarm and keep all in ProgramText.alarms.
+        Continue after an alarm, and store all in ProgramText.alarms.
         """
     @collect_alarms.setter
     def collect_alarms(self, arg0: bool) -> None:
@@ -2479,7 +2479,7 @@ class ReaderOptions:
     @property
     def expand_compensation(self) -> bool:
         """
-        G41/G42 become plain moves; False: kept as they stand.
+        G41/G42 become simple moves; False: left unchanged.
         """
     @expand_compensation.setter
     def expand_compensation(self, arg0: bool) -> None:
@@ -2511,7 +2511,7 @@ class ReaderOptions:
     @property
     def limits(self) -> WorkLimits:
         """
-        What a program may ask at most.
+        Limits of the work that a program may cause.
         """
     @limits.setter
     def limits(self, arg0: WorkLimits) -> None:
@@ -2519,7 +2519,7 @@ class ReaderOptions:
     @property
     def load_program(self) -> bool:
         """
-        Called with an O number that the file does not hold; gives (name, bytes) or None.
+        Called with an O number that the file does not contain; returns (name, bytes) or None.
         """
     @load_program.setter
     def load_program(self, arg1: typing.Any) -> None:
@@ -2527,7 +2527,7 @@ class ReaderOptions:
     @property
     def max_line_length(self) -> int:
         """
-        Characters.
+        Maximum length of a line in characters.
         """
     @max_line_length.setter
     def max_line_length(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2543,7 +2543,7 @@ class ReaderOptions:
     @property
     def opaque_programs(self) -> typing.Annotated[list[int], "FixedSize(2)"]:
         """
-        First and last program number whose calls are kept if the program is not found.
+        First and last number of the programs whose calls are left unchanged if they are not found.
         """
     @opaque_programs.setter
     def opaque_programs(self, arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"]) -> None:
@@ -2551,7 +2551,7 @@ class ReaderOptions:
     @property
     def peck_clearance_mm(self) -> float:
         """
-        To which a peck of G73 and G83 returns, mm (parameters 5114, 5115).
+        Clearance to which a peck of G73 and G83 returns, mm (parameters 5114, 5115).
         """
     @peck_clearance_mm.setter
     def peck_clearance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -2567,7 +2567,7 @@ class ReaderOptions:
     @property
     def probe_lines(self) -> list[int]:
         """
-        Ascending lines of the source behind which the state is kept.
+        Ascending lines of the source after which the modal state is stored (ProgramText.probed).
         """
     @probe_lines.setter
     def probe_lines(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
@@ -2575,7 +2575,7 @@ class ReaderOptions:
     @property
     def program(self) -> int:
         """
-        O number to run of a file with several; -1: the first.
+        O number of the program to read; -1: the first.
         """
     @program.setter
     def program(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2583,7 +2583,7 @@ class ReaderOptions:
     @property
     def program_index(self) -> int:
         """
-        The same by its index in `list_programs`, whatever its name, and alone; -1: by number.
+        Index in `list_programs` of the program, of which alone `text` consists; -1: by number.
         """
     @program_index.setter
     def program_index(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2599,7 +2599,7 @@ class ReaderOptions:
     @property
     def scale_unit(self) -> float:
         """
-        Of the factors of G51 without a point.
+        Unit of the factors of G51 without a decimal point.
         """
     @scale_unit.setter
     def scale_unit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -2615,7 +2615,7 @@ class ReaderOptions:
     @property
     def tool_offsets(self) -> dict[int, ToolOffset]:
         """
-        Number to ToolOffset.
+        H or D number to ToolOffset.
         """
     @tool_offsets.setter
     def tool_offsets(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, ToolOffset]) -> None:
@@ -2663,15 +2663,15 @@ class RegionNote:
     @property
     def segment(self) -> int:
         """
-        Index of the segment before which it stood.
+        Index of the segment that follows it.
         """
 class Region:
     """
-    A run of cutting moves between two stops.
+    Cutting moves between two stops.
     """
     def __init__(self, *, path: Path, entry: ModalState, exit: ModalState, line: typing.SupportsInt | typing.SupportsIndex, text_begin: typing.SupportsInt | typing.SupportsIndex, text_end: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
-        One line of a text as a region that ends with an exact stop: what takes the place of a rapid. `path`: its move; `entry`, `exit`: modal state before and behind it; `text_begin`, `text_end`: its bytes.
+        One line of a text as a region that ends with an exact stop: cutting moves instead of a rapid. `path`: its move; `entry`, `exit`: modal state before and after it; `text_begin`, `text_end`: its bytes.
         """
     @property
     def blocks(self) -> int:
@@ -2686,7 +2686,7 @@ class Region:
     @property
     def exact_stop_at_end(self) -> bool:
         """
-        Ends with G09 or in G61.
+        Whether its last block has G09 or is in G61.
         """
     @property
     def exit(self) -> ModalState:
@@ -2726,7 +2726,7 @@ class Region:
     @property
     def shaped(self) -> bool:
         """
-        Whether the program says that these are blocks that were shaped.
+        Whether the program marks it as shaped blocks.
         """
     @property
     def text_begin(self) -> int:
@@ -2736,16 +2736,16 @@ class Region:
     @property
     def text_end(self) -> int:
         """
-        Byte offset behind its last line.
+        Byte offset after its last line.
         """
     @property
     def was_rapid(self) -> bool:
         """
-        Whether these shaped blocks stand in place of a rapid.
+        Whether its shaped blocks replace a rapid.
         """
 class ProgramText:
     """
-    A program read: its text to the letter and its regions.
+    A program after reading: its exact text and its regions.
     """
     def cutting_path(self, first_line: typing.SupportsInt | typing.SupportsIndex, last_line: typing.SupportsInt | typing.SupportsIndex) -> Path:
         """
@@ -2757,7 +2757,7 @@ class ProgramText:
         """
     def lead_back(self, source: bytes, lines: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], line_files: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], files: collections.abc.Sequence[str], notes: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, str]]) -> None:
         """
-        Make it the plain program of a text in another control's words. `source`: that text (bytes); `lines`: for each line of the text that was read the line of the source; `line_files`: its file, 0 the source, n the n-th of `files`; empty: all of the source; `notes`: (line of the source, message), told as warnings. Raises ArgumentError if lines are missing.
+        Relates the program to `source`, the text (bytes) in another control's dialect from which it was translated. `lines`: for each line of the program's original text the line of the source; `line_files`: its file, 0 the source, n the n-th of `files`; empty: all of the source; `notes`: (line of the source, message), added to the warnings. Raises ArgumentError if lines are missing.
         """
     def origin(self, line: typing.SupportsInt | typing.SupportsIndex) -> tuple:
         """
@@ -2765,7 +2765,7 @@ class ProgramText:
         """
     def overwrite(self, begin: typing.SupportsInt | typing.SupportsIndex, what: bytes) -> None:
         """
-        Put bytes over as many. Raises ArgumentError beyond the text's end.
+        Overwrites as many bytes of the text. Raises ArgumentError beyond the text's end.
         """
     def slice(self, begin: typing.SupportsInt | typing.SupportsIndex, end: typing.SupportsInt | typing.SupportsIndex) -> bytes:
         """
@@ -2773,7 +2773,7 @@ class ProgramText:
         """
     def view(self) -> memoryview:
         """
-        The text without a copy of it.
+        The text without a copy.
         """
     @property
     def alarms(self) -> list:
@@ -2788,7 +2788,7 @@ class ProgramText:
     @property
     def called(self) -> list[int]:
         """
-        Positions of programs of the file that others called, see list_programs.
+        Indices in `list_programs` of programs of the file that others called.
         """
     @property
     def compensated_moves(self) -> int:
@@ -2798,7 +2798,7 @@ class ProgramText:
     @property
     def expanded(self) -> bool:
         """
-        Whether `text` is the plain program that calls, macros and coordinate modes come to.
+        Whether `text` is the expanded program, with calls, macros and coordinate modes resolved.
         """
     @property
     def expanded_radii_mm(self) -> dict[int, float]:
@@ -2818,17 +2818,17 @@ class ProgramText:
     @property
     def header_offset(self) -> int:
         """
-        Byte offset at which a header comment may stand.
+        Byte offset at which a header comment may be inserted.
         """
     @property
     def kept_compensated_moves(self) -> int:
         """
-        Cutting moves under G41 or G42, kept as they stand.
+        Cutting moves under G41 or G42, left unchanged.
         """
     @property
     def least_time_s(self) -> float:
         """
-        At its feeds, as far as the axes reach them; with dwells, without acceleration, s.
+        Minimum time: moves at their feed within the axis limits, without acceleration, and dwells, s.
         """
     @property
     def line_count(self) -> int:
@@ -2848,12 +2848,12 @@ class ProgramText:
     @property
     def other_moves(self) -> list:
         """
-        Rapids, cycles and kept moves as (Segment, dwell_s) pairs, for the cycle time.
+        Moves and waits outside of the regions as (Segment, dwell_s) pairs, for the cycle time.
         """
     @property
     def probed(self) -> list[ModalState]:
         """
-        Modal state behind each of ReaderOptions.probe_lines.
+        Modal state after each of ReaderOptions.probe_lines.
         """
     @property
     def program_number(self) -> int:
@@ -2868,7 +2868,7 @@ class ProgramText:
     @property
     def regions(self) -> list[Region]:
         """
-        Runs of cutting moves in order.
+        Regions in order.
         """
     @property
     def size(self) -> int:
@@ -2888,7 +2888,7 @@ class ProgramText:
     @property
     def unexpanded(self) -> bytes:
         """
-        The text as handed over, where `text` is what it comes to; else empty.
+        The original text, if `text` is the expanded program; else empty.
         """
     @property
     def warnings(self) -> list:
@@ -2897,7 +2897,7 @@ class ProgramText:
         """
 class ProgramEntry:
     """
-    A program of a file that may hold several.
+    A program of a file that may contain several.
     """
     @property
     def first_line(self) -> int:
@@ -2907,12 +2907,12 @@ class ProgramEntry:
     @property
     def folder(self) -> str:
         """
-        Of the &F= line before it, as written; empty: none.
+        Folder in the &F= line before it, as written; empty: none.
         """
     @property
     def name(self) -> str:
         """
-        Of a line <NAME> or O<NAME>, with its brackets; empty: none.
+        Name in a line <NAME> or O<NAME>, with its brackets; empty: none.
         """
     @property
     def number(self) -> int:
@@ -2927,15 +2927,15 @@ class ProgramEntry:
     @property
     def text_end(self) -> int:
         """
-        Byte offset behind its last line.
+        Byte offset after its last line.
         """
 class LinearPlant:
     """
     A linear plant x' = A x + B u, y = C x + D u, propagated exactly from sample to sample.
     
-    The input is linear between samples (first-order hold), as a servo's set-points are; the state goes over a period by the
-    matrix exponential, so stiff, undamped and integrating plants are as exact as any other. Units: whatever fits together,
-    time in s.
+    The input is linear between samples (first-order hold), as a servo's set-points are. The matrix exponential propagates
+    the state over a period, so stiff, undamped and integrating plants are as exact as any other. Any consistent units, time
+    in s.
     
     Args:
         a: System matrix, (n, n).
@@ -2946,7 +2946,7 @@ class LinearPlant:
     
     Raises:
         ArgumentError: Shapes that do not fit, an empty one, a value that is not finite, or a period not above 0.
-        NumericError: The plant outgrows all numbers within a period.
+        NumericError: The plant overflows within a period.
     """
     def __init__(self, a: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], c: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], d: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], period_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
@@ -2954,36 +2954,36 @@ class LinearPlant:
         """
     def reset(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
         """
-        State (n,) at the instant at which the input is `input` (m,); ArgumentError on another shape.
+        Sets the state (n,) and the input (m,) at that instant. Raises ArgumentError on another shape.
         """
     def reset_at_rest(self, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], near: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None) -> None:
         """
-        Steady state under a constant input.
+        Sets the steady state under a constant input.
         
         Args:
             input: Input, (m,).
-            near: Where integrators leave a choice, the state of rest nearest to this one, (n,), is taken; none: to zero.
+            near: If integrators leave the state undetermined, the steady state nearest to this one, (n,); None: nearest to 0.
         
         Raises:
-            ArgumentError: No state rests under this input (an integrator fills), or another shape.
+            ArgumentError: There is no steady state (the input makes an integrator grow), or another shape.
         """
     def respond(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None) -> numpy.ndarray:
         """
-        Outputs for a whole record of inputs; what step() gives, to the last bit.
+        Outputs for a whole record of inputs; identical to step(), to the last bit.
         
         Args:
             inputs: One row per sample, (n_samples, m), at least one row.
-            state: State at the first row, (n,); none: at rest under the first row.
+            state: State at the first row, (n,); None: at rest under the first row.
         
         Returns:
             Output at each row, (n_samples, p).
         
         Raises:
-            ArgumentError: Another shape, a value that is not finite, or no state of rest.
+            ArgumentError: Another shape, a value that is not finite, or no steady state.
         """
     def step(self, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
-        One period later, with `input` (m,) at its end: the output (p,) there. In C++ real-time safe.
+        Advances by a period, with `input` (m,) at its end. Returns the output (p,) there.
         """
     @property
     def output(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -3002,12 +3002,12 @@ class LinearPlant:
         """
 class ModeTable:
     """
-    How a mode depends on where an axis stands. Immutable.
+    Dependence of a mode on the position of an axis. Immutable.
     
-    Linear in frequency and damping ratio between the rows, constant beyond the ends; without rows the mode stays as it is.
+    Frequency and damping ratio are linear between the rows and constant beyond the ends; without rows the mode is constant.
     
     Args:
-        axis: Whose position counts: 0, 1, 2 for X, Y, Z.
+        axis: Axis of the position: 0, 1, 2 for X, Y, Z.
         position_mm: Strictly ascending positions in mm, shape (n,).
         frequency_hz: Undamped natural frequencies in Hz, one per position, above 0.
         damping_ratio: Damping ratios (no unit), one per position, 0 <= zeta < 1; none: that of the mode.
@@ -3017,16 +3017,16 @@ class ModeTable:
     """
     def __init__(self, axis: typing.SupportsInt | typing.SupportsIndex = 0, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], frequency_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
         """
-        Make a table; ArgumentError if it is not what the class asks for.
+        Raises ArgumentError on a value outside its range.
         """
     def mode_at(self, mode: Mode, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> Mode:
         """
-        The mode at a position (mm) of the axis; its participation stays.
+        Mode at a position (mm) of the axis, with the same participation.
         """
     @property
     def axis(self) -> int:
         """
-        Axis whose position counts.
+        Axis of the position.
         """
     @property
     def damping_ratio(self) -> list[float]:
@@ -3045,7 +3045,7 @@ class ModeTable:
         """
 class FrictionModel:
     """
-    How a sliding pair resists.
+    Friction of a sliding pair.
     
     Members:
     
@@ -3102,7 +3102,7 @@ class FrictionParameters:
         viscous_n_s_per_m: Viscous friction in N s/m, >= 0.
         coulomb_n: Sliding friction in N, > 0 unless viscous.
         static_n: Friction to be overcome from rest in N, >= coulomb_n.
-        stribeck_velocity_m_per_s: Speed in m/s at which static has given way to sliding friction, > 0 unless viscous.
+        stribeck_velocity_m_per_s: Speed of the transition from static to sliding friction in m/s, > 0 unless viscous.
         smoothing_velocity_m_per_s: Stribeck: sign(v) is tanh(v / this), m/s, > 0.
         bristle_stiffness_n_per_m: LuGre: force over displacement before sliding in N/m, > 0.
         bristle_damping_n_s_per_m: LuGre: damping of the bristles in N s/m, >= 0.
@@ -3112,7 +3112,7 @@ class FrictionParameters:
     """
     def __init__(self, model: FrictionModel = ..., *, viscous_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, coulomb_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, static_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, stribeck_velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, smoothing_velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, bristle_stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, bristle_damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
-        ArgumentError if it is not what the class asks for.
+        Raises ArgumentError on a value outside its range.
         """
     @property
     def bristle_damping_n_s_per_m(self) -> float:
@@ -3208,27 +3208,27 @@ class FeedDriveParameters:
     
     Args:
         motor_mass_kg: Inertia of motor, coupling and screw in kg, > 0.
-        table_mass_kg: Table with what it carries in kg, > 0.
+        table_mass_kg: Table with its load in kg, > 0.
         stiffness_n_per_m: Motor to table, axial, in N/m, > 0.
-        damping_n_s_per_m: Beside the stiffness in N s/m, >= 0.
+        damping_n_s_per_m: Damping parallel to the stiffness in N s/m, >= 0.
         position_gain_per_s: Gain of the position loop in 1/s, > 0.
         velocity_gain_n_s_per_m: Force over speed error in N s/m, > 0.
-        velocity_integral_time_s: Of the speed controller in s; 0: none.
-        velocity_feed_forward_ratio: Share of the set-points' speed that is fed forward, 0 ... 1.
-        acceleration_feed_forward_ratio: Share of acceleration times both masses that is fed forward, 0 ... 1.
+        velocity_integral_time_s: Integral time of the speed controller in s; 0: none.
+        velocity_feed_forward_ratio: Ratio of the set-points' speed that is fed forward, 0 ... 1.
+        acceleration_feed_forward_ratio: Ratio of acceleration times both masses that is fed forward, 0 ... 1.
         position_feedback: What the position loop measures; the speed is always taken from the motor.
         backlash_m: Whole gap between motor and table in m, >= 0.
-        force_limit_n: Of the motor in N; 0: none.
+        force_limit_n: Force limit of the motor in N; 0: none.
         table_friction: Friction of the guideways.
         motor_friction: Friction of bearings, seals and nut.
-        modes: Modes of the structure, excited by the motion of the table.
+        modes: Modes of the structure, excited by the table.
     
     Raises:
         ArgumentError: A value outside its range.
     """
     def __init__(self, *, motor_mass_kg: typing.SupportsFloat | typing.SupportsIndex, table_mass_kg: typing.SupportsFloat | typing.SupportsIndex, stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex, damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, position_gain_per_s: typing.SupportsFloat | typing.SupportsIndex, velocity_gain_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, velocity_integral_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, velocity_feed_forward_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, acceleration_feed_forward_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_feedback: PositionFeedback = ..., backlash_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, table_friction: FrictionParameters = ..., motor_friction: FrictionParameters = ..., modes: collections.abc.Sequence[Mode] = []) -> None:
         """
-        ArgumentError if it is not what the class asks for.
+        Raises ArgumentError on a value outside its range.
         """
     @property
     def acceleration_feed_forward_ratio(self) -> float:
@@ -3253,7 +3253,7 @@ class FeedDriveParameters:
     @property
     def modes(self) -> list[Mode]:
         """
-        Of the structure, on the table.
+        Modes of the structure, excited by the table.
         """
     @property
     def motor_friction(self) -> FrictionParameters:
@@ -3332,7 +3332,7 @@ class FeedDrive:
         """
     def respond(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
         """
-        Runs on over many set-points.
+        Takes many set-points and returns the motion of the drive.
         
         Args:
             setpoints_mm: Shape (n,), mm.
@@ -3343,11 +3343,11 @@ class FeedDrive:
         
         Raises:
             ArgumentError: Another shape or a value that is not finite.
-            NumericError: The integrator failed; with CVODE's flag and the time.
+            NumericError: The integrator failed; the message carries CVODE's flag and the time.
         """
     def step(self, setpoint_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
-        Next set-point (mm); the response at that instant in mm. NumericError with CVODE's flag and the time.
+        Takes the next set-point (mm) and returns the response at that instant in mm. Raises ArgumentError on a set-point that is not finite, NumericError with CVODE's flag and the time if the integrator fails.
         """
     @property
     def motor_mm(self) -> float:
@@ -3382,11 +3382,11 @@ class FeedDrive:
     @property
     def time_s(self) -> float:
         """
-        Since reset(), s.
+        Time since reset(), s.
         """
 class FeedDriveRealTime:
     """
-    The same with fixed steps and without error control: the real-time form.
+    FeedDrive with fixed steps and without error control: the real-time form.
     
     Args:
         parameters: The drive.
@@ -3406,11 +3406,11 @@ class FeedDriveRealTime:
         """
     def respond(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
         """
-        Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.
+        Responses (n,) in mm at many set-points (n,) in mm. Raises ArgumentError on another shape.
         """
     def step(self, setpoint_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
-        Next set-point (mm); the response at that instant in mm.
+        Takes the next set-point (mm) and returns the response at that instant in mm.
         """
 class Arma:
     """
@@ -3431,7 +3431,7 @@ class Arma:
     @property
     def numerator(self) -> numpy.ndarray:
         """
-        b_0, b_1, ...: shape (1, 2n+1) of taps, (records, 2n) of free decays.
+        b_0, b_1, ...: shape (1, 2n+1) for impacts, (records, 2n) for free decays.
         """
     @property
     def phi(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -3455,12 +3455,12 @@ class Arma:
         """
 class ModalFit:
     """
-    Modes fitted to taps by fit_modes, with their covariance.
+    Modes fitted to impacts by fit_modes, with their covariance.
     """
     @property
     def compliance(self) -> float:
         """
-        What modes far above add: m/N of a spring without mass; 0 without it.
+        Contribution of modes far above: compliance of a spring without mass, m/N; 0 without it.
         """
     @property
     def converged(self) -> bool:
@@ -3485,7 +3485,7 @@ class ModalFit:
     @property
     def inverse_mass(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Residues 1/m in 1/kg, shape (n,); negative where the mode shape has opposite signs at tap and sensor.
+        Residues 1/m in 1/kg, shape (n,); negative where the mode shape has opposite signs at impact and sensor.
         """
     @property
     def iterations(self) -> int:
@@ -3500,7 +3500,7 @@ class ModalFit:
     @property
     def mass_line(self) -> float:
         """
-        What modes far below add: 1/kg of a free mass; 0 without it.
+        Contribution of modes far below: inverse mass of a free mass, 1/kg; 0 without it.
         """
     @property
     def offset(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -3628,7 +3628,7 @@ class DecayFit:
         """
 class ModeRanking:
     """
-    Candidates in the order in which they explain what others leave.
+    Candidates in the order in which each explains most of the residual.
     """
     @property
     def chosen(self) -> list[int]:
@@ -3638,12 +3638,12 @@ class ModeRanking:
     @property
     def sum_of_squares(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        What is left after each choice, shape (len(chosen),), in the response's unit squared.
+        Sum of squares of the residual after each choice, shape (len(chosen),), in the response's unit squared.
         """
     @property
     def total(self) -> float:
         """
-        Squares of the responses, offsets taken out.
+        Sum of squares of the responses, without offsets.
         """
 class EquivalentMass:
     """
@@ -3657,7 +3657,7 @@ class EquivalentMass:
     @property
     def halvings(self) -> int:
         """
-        How often the range was halved before its middle was right; 0 in closed form.
+        Number of halvings of the range of masses; 0 in closed form.
         """
     @property
     def mass_kg(self) -> float:
@@ -3672,15 +3672,15 @@ class EquivalentMass:
     @property
     def simulated_rms(self) -> float:
         """
-        RMS of the simulated one, in the same unit.
+        RMS of the simulated response, in the same unit.
         """
 class ContourTarget:
     """
-    What shall follow the programmed path.
+    Which motion is to follow the programmed path.
     
     Members:
     
-      none : Nothing: the path is shaped as it is.
+      none : None: shaping without contour compensation.
     
       command : The shaped command.
     
@@ -3726,13 +3726,13 @@ class ContourTarget:
         ...
 class CommandPlanner:
     """
-    What plans the command of a run before it is shaped.
+    What plans the command of a motion before it is shaped.
     
     Members:
     
       look_ahead : Ramps along the path, corners passed slowly.
     
-      time_optimal : Corners rounded within the contour tolerance, jerk of every axis kept.
+      time_optimal : Corners rounded within the contour tolerance, jerk of every axis limited.
     """
     __members__: typing.ClassVar[dict[str, CommandPlanner]]
     look_ahead: typing.ClassVar[CommandPlanner]
@@ -3780,7 +3780,7 @@ class ShapingOptions:
     @property
     def axis_shapers(self) -> list[Fir]:
         """
-        A shaper for each of X, Y and Z, of one mean delay, in place of the common one; empty: none.
+        A shaper for each of X, Y and Z, of one mean delay, instead of the common one; empty: none.
         """
     @axis_shapers.setter
     def axis_shapers(self, arg0: collections.abc.Sequence[Fir]) -> None:
@@ -3804,7 +3804,7 @@ class ShapingOptions:
     @property
     def feed_excess_ratio(self) -> float:
         """
-        Share by which the shaped command may run faster along the path than programmed.
+        Ratio by which the shaped command may exceed the programmed feed along the path.
         """
     @feed_excess_ratio.setter
     def feed_excess_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -3812,7 +3812,7 @@ class ShapingOptions:
     @property
     def following(self) -> FollowingFir | None:
         """
-        Shapers along an axis in place of the one shaper, taps in whole block periods; None: none.
+        Shapers along an axis instead of the one shaper, taps in whole block periods; None: none.
         """
     @following.setter
     def following(self, arg0: FollowingFir | None) -> None:
@@ -3820,7 +3820,7 @@ class ShapingOptions:
     @property
     def further_stops(self) -> list[int]:
         """
-        Ascending indices of segments before which the command comes to rest too.
+        Ascending indices of segments before which the command also stops.
         """
     @further_stops.setter
     def further_stops(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
@@ -3836,7 +3836,7 @@ class ShapingOptions:
     @property
     def least_feed_mm_per_s(self) -> float:
         """
-        What the controller can run: no run is slowed below it, mm/s.
+        Lowest feed of the controller: no motion is slowed below it for the tolerance, mm/s.
         """
     @least_feed_mm_per_s.setter
     def least_feed_mm_per_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -3852,7 +3852,7 @@ class ShapingOptions:
     @property
     def mode_tables(self) -> typing.Annotated[list[list[ModeTable]], "FixedSize(3)"]:
         """
-        How the modes vary with the position of the axis that is followed, for the response as target.
+        How the modes vary with the position of the axis of `following`, for the response as target.
         """
     @mode_tables.setter
     def mode_tables(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[ModeTable]], "FixedSize(3)"]) -> None:
@@ -3868,7 +3868,7 @@ class ShapingOptions:
     @property
     def planner(self) -> CommandPlanner:
         """
-        The time-optimal one asks for feed, acceleration and jerk of every axis in `limits`.
+        The time-optimal planner needs feed, acceleration and jerk of every axis in `limits`.
         """
     @planner.setter
     def planner(self, arg0: CommandPlanner) -> None:
@@ -3876,7 +3876,7 @@ class ShapingOptions:
     @property
     def plunge_axis_angle_rad(self) -> float:
         """
-        How far a side of a corner may lean from Z and still count as plunge, rad.
+        Largest angle from the tool axis Z that still counts as a plunge, rad.
         """
     @plunge_axis_angle_rad.setter
     def plunge_axis_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -3884,7 +3884,7 @@ class ShapingOptions:
     @property
     def plunge_corner_angle_rad(self) -> float:
         """
-        Least change of direction of such a corner, rad.
+        Smallest change of direction of a corner with a plunge that is a forced stop, rad.
         """
     @plunge_corner_angle_rad.setter
     def plunge_corner_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -3900,7 +3900,7 @@ class ShapingOptions:
     @property
     def target(self) -> ContourTarget:
         """
-        What is brought back to the path; with a target, `tolerance` is its own.
+        Motion that contour compensation brings back to the path, within the contour tolerance.
         """
     @target.setter
     def target(self, arg0: ContourTarget) -> None:
@@ -3908,7 +3908,7 @@ class ShapingOptions:
     @property
     def tolerance(self) -> FilterTolerance:
         """
-        Of the shaper with what follows it.
+        Tolerance for the shaper and the filters after it.
         """
     @tolerance.setter
     def tolerance(self, arg0: FilterTolerance) -> None:
@@ -3920,7 +3920,7 @@ class ShapedCommand:
     @property
     def arc_normal(self) -> list[int]:
         """
-        Per period the axis across an arc's plane, or -1.
+        Per period the axis perpendicular to the plane of an arc, or -1.
         """
     @property
     def first_period(self) -> int:
@@ -3930,7 +3930,7 @@ class ShapedCommand:
     @property
     def grid_mm(self) -> numpy.ndarray:
         """
-        (n+1, 3) positions at k*T_B, mm, read-only view.
+        (n+1, 3) positions at multiples of the block period, mm, read-only view.
         """
     @property
     def middle_mm(self) -> numpy.ndarray:
@@ -3945,7 +3945,7 @@ class ShapedCommand:
     @property
     def segment_periods(self) -> list[int]:
         """
-        Per marked segment the period of the region in which its begin is reached.
+        Per marked segment the period of the region in which its start is reached.
         """
 class RegionShaper:
     """
@@ -3954,7 +3954,7 @@ class RegionShaper:
     Args:
         path: The programmed path.
         shaper: Taps in whole block periods, common to all axes.
-        marked_segments: Ascending indices whose begin in time is wanted.
+        marked_segments: Ascending indices of segments whose start time is wanted.
         options: How the region is shaped.
     
     Raises:
@@ -3966,46 +3966,46 @@ class RegionShaper:
         """
     def begin_anew(self) -> bool:
         """
-        Give the region out from its begin again, with the feed that the search finds.
+        Restarts the region from its beginning, with the feed that the search then finds.
         
         Returns:
-            False, and nothing is done, if no part was given out early.
+            False, and nothing is done, if no part was returned early.
         """
     def begin_early(self) -> None:
         """
-        To be called before the first part: do not wait for the search for the feed.
+        Call before the first part: returns parts before the search for the feed has ended.
         
-        Where the region is one run, its parts are given out while they are measured, as if the first plan kept the tolerance.
-        Where that turns out to be wrong, next() gives None and is_withdrawn holds: all that was given out is void.
+        If the region is one motion from rest to rest, next() returns parts while the search measures them, as if its first plan
+        kept the tolerance. If it does not, next() returns None and is_withdrawn is True: all parts returned are invalid.
         """
     def next(self, periods: typing.SupportsInt | typing.SupportsIndex) -> ShapedCommand | None:
         """
-        Next part of at most so many periods, or None behind the last.
+        Next part of at most `periods` periods, or None after the last.
         """
     @property
     def is_slowed(self) -> bool:
         """
-        Whether any run given out is slower than without a tolerance; without a target always.
+        Whether any motion so far is slower than without a tolerance; True without a target.
         """
     @property
     def is_withdrawn(self) -> bool:
         """
-        Whether what was given out is void.
+        Whether the returned parts are invalid.
         """
     @property
     def largest_deviation_mm(self) -> float:
         """
-        Largest deviation of what shall follow the path, as far as given out, mm.
+        Largest deviation of the target from the path, over the motions returned so far, mm.
         """
     @property
     def share(self) -> float:
         """
-        How much of the region was given out, 0 to 1.
+        Progress in the region, 0 to 1.
         """
     @property
     def stops(self) -> int:
         """
-        Stops at corners that no speed passes within the tolerance.
+        Number of stops at junctions that exceed the tolerance at every speed.
         """
 class ContourSolver:
     """
@@ -4028,7 +4028,7 @@ class ContourSolver:
         """
     def solve(self, error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], carried: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] = ...) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Corrections (m,) for errors (m + len(kernel) - 1,); `carried`: the len(kernel) + 1 corrections before.
+        Corrections (m,) for errors (m + len(kernel) - 1,); `carried`: the len(kernel) + 1 corrections before; `stiffness`: empty, or m + 2 factors of the smoothness.
         """
 class FitOptions:
     """
@@ -4038,12 +4038,12 @@ class FitOptions:
         ...
     def end_with_arc(self, clockwise: bool, normal: typing.SupportsInt | typing.SupportsIndex, radius_mm: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
-        The last block must be an arc, so that the modal motion code behind it is G02 or G03.
+        The last block must be an arc, so that the modal motion code after it is G02 or G03.
         """
     @property
     def arc_min_chord_mm(self) -> float:
         """
-        Shorter pieces are lines, mm.
+        Arcs with a shorter chord are lines, mm.
         """
     @arc_min_chord_mm.setter
     def arc_min_chord_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4059,7 +4059,7 @@ class FitOptions:
     @property
     def equal_above_increments(self) -> float:
         """
-        Distance per interpolation period up to which blocks may be longer than that, increments.
+        Blocks may be longer if the command moves no further per interpolation period, increments.
         """
     @equal_above_increments.setter
     def equal_above_increments(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4067,7 +4067,7 @@ class FitOptions:
     @property
     def equal_periods(self) -> int:
         """
-        Likewise blocks so far from both ends of a steady section, block periods; 0: none.
+        Likewise blocks this far from both ends of a section at constant velocity; 0: none.
         """
     @equal_periods.setter
     def equal_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -4099,7 +4099,7 @@ class FitOptions:
     @property
     def lent_periods(self) -> int:
         """
-        Periods that the blocks before did not last.
+        Periods by which the blocks before were too short.
         """
     @lent_periods.setter
     def lent_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -4107,7 +4107,7 @@ class FitOptions:
     @property
     def merge_tolerance_increments(self) -> float:
         """
-        Deviation of merged blocks per axis, least increments.
+        Permitted deviation of merged blocks from the shaped command, per axis, least increments.
         """
     @merge_tolerance_increments.setter
     def merge_tolerance_increments(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4131,7 +4131,7 @@ class FitOptions:
     @property
     def most_periods(self) -> int:
         """
-        Longest block, block periods. 1: all last the same time, for a feed override that is turned.
+        Longest block, block periods. 1: all blocks have the same duration, for other feed overrides.
         """
     @most_periods.setter
     def most_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -4139,7 +4139,7 @@ class FitOptions:
     @property
     def smooth_arcs_mm(self) -> float:
         """
-        How far the middle of an arc may be moved so that it meets its neighbours at a smaller angle, mm.
+        Distance by which the middle of an arc may be moved to reduce the angle to its neighbours, mm.
         """
     @smooth_arcs_mm.setter
     def smooth_arcs_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4163,7 +4163,7 @@ class FittedBlocks:
     @property
     def left_periods(self) -> int:
         """
-        Time that the blocks do not last: `FitOptions.lent_periods` of the next piece.
+        Periods by which the blocks are too short: `FitOptions.lent_periods` of the next piece.
         """
     @property
     def periods(self) -> numpy.typing.NDArray[numpy.uint32]:
@@ -4172,7 +4172,7 @@ class FittedBlocks:
         """
 class BlockMark:
     """
-    An N word or comment to be written before the block that begins there.
+    An N word and a comment, written before the block that begins there.
     """
     def __init__(self, period: typing.SupportsInt | typing.SupportsIndex, n_number: typing.SupportsInt | typing.SupportsIndex = -1, comment: bytes = b'', n_digits: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
@@ -4193,7 +4193,7 @@ class WriterOptions:
     @property
     def feed_decimals(self) -> int:
         """
-        Digits behind the point.
+        Decimals of F.
         """
     @feed_decimals.setter
     def feed_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -4233,14 +4233,14 @@ class WriterOptions:
     @property
     def position_decimals(self) -> int:
         """
-        Digits behind the point.
+        Decimals of a position word.
         """
     @position_decimals.setter
     def position_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
 class LinearBlock:
     """
-    A block of linear feed that takes the place of some of constant feed.
+    A block of linear feed that replaces blocks of constant feed.
     """
     def __init__(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], length_mm: typing.SupportsFloat | typing.SupportsIndex, start_feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, radius_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0, sweep_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
@@ -4249,7 +4249,7 @@ class LinearBlock:
     @property
     def duration_s(self) -> float:
         """
-        How long it lasts, s.
+        Duration, s.
         """
     @property
     def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -4289,7 +4289,7 @@ class LinearBlock:
     @property
     def sets_feed(self) -> bool:
         """
-        The feed at its start is not that of the block before: a line before it sets it.
+        Its start feed differs from the feed of the block before: a line before it sets the feed.
         """
     @property
     def start_feed_mm_per_min(self) -> float:
@@ -4392,14 +4392,14 @@ class ContourTracker:
         """
 class SimulationOptions:
     """
-    What a run of set-points is measured with.
+    Options of a simulation and of its measurements.
     """
     def __init__(self) -> None:
         ...
     @property
     def arrived_mm(self) -> float:
         """
-        Drives: the residual is the vibration of the table against its motor once that is so near, mm; 0: the whole error from the stop on.
+        Drives: the residual is the vibration of the table relative to its motor once the motor is within this distance of the command, mm; 0: |response - command| from the stop on.
         """
     @arrived_mm.setter
     def arrived_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4423,7 +4423,7 @@ class SimulationOptions:
     @property
     def feed_slack_mm(self) -> float:
         """
-        Distance within that time that rounding may add, mm.
+        Distance that rounding may add within `feed_window_s`, mm.
         """
     @feed_slack_mm.setter
     def feed_slack_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4431,7 +4431,7 @@ class SimulationOptions:
     @property
     def feed_window_s(self) -> float:
         """
-        Time over which the speed is held against the programmed feed, beside four and sixteen times it, s; 0: not measured.
+        Averaging time of the largest speed relative to the programmed feed, also with four and sixteen times it, s; 0: not measured.
         """
     @feed_window_s.setter
     def feed_window_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4439,7 +4439,7 @@ class SimulationOptions:
     @property
     def last_seconds(self) -> float:
         """
-        Blocks only: simulate the last so many seconds; 0: all.
+        Blocks only: simulate only this time before the end, s; 0: all.
         """
     @last_seconds.setter
     def last_seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4455,7 +4455,7 @@ class SimulationOptions:
     @property
     def measure_contour(self) -> bool:
         """
-        Deviations and orbit errors.
+        Whether deviations and orbit errors are measured.
         """
     @measure_contour.setter
     def measure_contour(self, arg0: bool) -> None:
@@ -4471,7 +4471,7 @@ class SimulationOptions:
     @property
     def measure_response_orbit(self) -> bool:
         """
-        Orbit errors of the response too, where the contour is measured.
+        Also orbit errors of the response, if the contour is measured.
         """
     @measure_response_orbit.setter
     def measure_response_orbit(self, arg0: bool) -> None:
@@ -4495,7 +4495,7 @@ class SimulationOptions:
     @property
     def other_overrides(self) -> list[float]:
         """
-        Blocks only: the largest deviations at these feed overrides too.
+        Blocks only: also compute the largest deviations at these feed overrides.
         """
     @other_overrides.setter
     def other_overrides(self, arg0: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
@@ -4511,7 +4511,7 @@ class SimulationOptions:
     @property
     def record_samples(self) -> int:
         """
-        Samples kept for pictures; 0: none.
+        Maximum number of stored samples; 0: none.
         """
     @record_samples.setter
     def record_samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -4519,7 +4519,7 @@ class SimulationOptions:
     @property
     def settling_band_mm(self) -> float:
         """
-        Of the settling time, mm; 0: none.
+        Band of the settling time, mm; 0: not measured.
         """
     @settling_band_mm.setter
     def settling_band_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4527,7 +4527,7 @@ class SimulationOptions:
     @property
     def settling_limit_s(self) -> float:
         """
-        How long behind the stop it is looked for; with drives the residual too, s.
+        Time after the stop in which the settling time is determined; with drives also the residual, s.
         """
     @settling_limit_s.setter
     def settling_limit_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4535,7 +4535,7 @@ class SimulationOptions:
     @property
     def starved_blocks(self) -> list[int]:
         """
-        Blocks only: what if the block buffer ran empty behind one of these blocks (ascending)?
+        Blocks only: also simulate a buffer underrun after each of these (ascending), one at a time.
         """
     @starved_blocks.setter
     def starved_blocks(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
@@ -4543,7 +4543,7 @@ class SimulationOptions:
     @property
     def starved_memory_s(self) -> float:
         """
-        How much of the run behind such a wait is looked at, s; 0: all.
+        Time simulated after such a wait, s; 0: all.
         """
     @starved_memory_s.setter
     def starved_memory_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4551,7 +4551,7 @@ class SimulationOptions:
     @property
     def starved_s(self) -> float:
         """
-        How long the set-points then wait, s.
+        Duration of the wait in a buffer underrun, s.
         """
     @starved_s.setter
     def starved_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4559,14 +4559,14 @@ class SimulationOptions:
     @property
     def tracker(self) -> ContourTracker:
         """
-        Tracker of the path, whose geometry several runs share; None: each run makes its own.
+        Tracker of the path, whose geometry several simulations share; None: each makes its own.
         """
     @tracker.setter
     def tracker(self, arg1: ContourTracker) -> None:
         ...
 class FeedExcess:
     """
-    Where a motion is fastest against the programmed feed at the same position.
+    The largest ratio of the speed to the programmed feed at the same position.
     """
     @property
     def line(self) -> int:
@@ -4590,12 +4590,12 @@ class FeedExcess:
         """
 class StarvedFigures:
     """
-    What a wait for the next block does to a run.
+    Effect of a buffer underrun.
     """
     @property
     def block(self) -> int:
         """
-        The set-points wait behind it.
+        Block after which the set-points wait.
         """
     @property
     def command(self) -> DeviationStats:
@@ -4605,7 +4605,7 @@ class StarvedFigures:
     @property
     def residual_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        Largest |response - command| while the set-points rest, in the wait and at the end, (3,), mm.
+        Largest |response - command| while the set-points rest, during the wait and at the end, (3,), mm.
         """
     @property
     def response(self) -> DeviationStats:
@@ -4614,7 +4614,7 @@ class StarvedFigures:
         """
 class OverrideFigures:
     """
-    The largest deviations of a run at another feed override.
+    The largest deviations at another feed override.
     """
     @property
     def command_mm(self) -> float:
@@ -4633,7 +4633,7 @@ class OverrideFigures:
         """
 class SimulationFigures:
     """
-    Figures of one run from rest to rest.
+    Figures of one motion from rest to rest.
     """
     @property
     def command(self) -> DeviationStats:
@@ -4643,7 +4643,7 @@ class SimulationFigures:
     @property
     def duration_s(self) -> float:
         """
-        Until the set-points rest, s.
+        Time until the set-points rest, s.
         """
     @property
     def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -4653,12 +4653,12 @@ class SimulationFigures:
     @property
     def feed_excess(self) -> FeedExcess:
         """
-        Of the command, where asked for.
+        Of the command, if requested.
         """
     @property
     def orbit_error_percent(self) -> list[float]:
         """
-        Per arc of the path.
+        Orbit error per arc, in percent.
         """
     @property
     def other_overrides(self) -> list[OverrideFigures]:
@@ -4673,7 +4673,7 @@ class SimulationFigures:
     @property
     def peak_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        Largest |response - command| before it, (3,), mm.
+        Largest |response - command| in motion, (3,), mm.
         """
     @property
     def recorded_command(self) -> numpy.ndarray:
@@ -4698,12 +4698,12 @@ class SimulationFigures:
     @property
     def response_orbit_error_percent(self) -> list[float]:
         """
-        The same of the response, where asked for.
+        Orbit error of the response per arc of the path, in percent, if requested.
         """
     @property
     def settling_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        From that instant until |response - command| stays within the band, (3,), s; inf: not within the limit.
+        Time from the rest of the set-points until |response - command| stays within the band, (3,), s; inf: not within the limit.
         """
     @property
     def starved(self) -> list[StarvedFigures]:
@@ -4712,7 +4712,7 @@ class SimulationFigures:
         """
 class SectionKind:
     """
-    What a section of a path is.
+    Kind of a section of a path.
     
     Members:
     
@@ -4762,7 +4762,7 @@ class SectionKind:
         ...
 class PathSection:
     """
-    A section of a path that is measured by itself.
+    A section of a path that is measured separately.
     """
     @property
     def begin_mm(self) -> float:
@@ -4811,7 +4811,7 @@ class PathSection:
         """
 class CircleFit:
     """
-    The circle of least squares of radial distance through points.
+    Least-squares circle through points (radial distances).
     """
     @property
     def centre_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
@@ -4845,7 +4845,7 @@ class Roughness:
     @property
     def evaluated_mm(self) -> float:
         """
-        Length that the figures speak of, mm.
+        Evaluation length: without one cut-off at each end, mm.
         """
     @property
     def ra_mm(self) -> float:
@@ -4864,17 +4864,17 @@ class Roughness:
         """
 class RestVibration:
     """
-    What a plant does while its command stands still.
+    Vibration of a plant while its command is at rest.
     """
     @property
     def begin_s(self) -> float:
         """
-        The command stands still from here on, s.
+        Start of the rest of the command, s.
         """
     @property
     def observed_s(self) -> float:
         """
-        For so long, s.
+        Duration of the rest, s.
         """
     @property
     def residual_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -4884,7 +4884,7 @@ class RestVibration:
     @property
     def settling_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        Until |response - command| stays within the band, (3,), s; NaN where that was not seen.
+        Time until |response - command| stays within the band, (3,), s; NaN if it left the band in the last eighth of the rest.
         """
 class WallFigures:
     """
@@ -4913,11 +4913,11 @@ class WallFigures:
     @property
     def stations(self) -> int:
         """
-        Positions at which it could be measured.
+        Number of positions at which it could be measured.
         """
 class ArcFigures:
     """
-    A circle through what was moved or cut on an arc.
+    A circle fitted to the motion or to the wall cut on an arc.
     """
     @property
     def fit(self) -> CircleFit:
@@ -4936,12 +4936,12 @@ class SideFigures:
     @property
     def above_mm(self) -> float:
         """
-        More along Z than across the path, mm.
+        Above: more along Z than across the path, mm.
         """
     @property
     def below_mm(self) -> float:
         """
-        Likewise, mm.
+        Below: likewise, mm.
         """
     @property
     def left_mm(self) -> float:
@@ -4965,7 +4965,7 @@ class SectionFigures:
     @property
     def command_arc(self) -> ArcFigures | None:
         """
-        Circle through the command; arcs of 10 degrees on.
+        Circle through the command; arcs from 10 degrees on.
         """
     @property
     def command_orbit_percent(self) -> float | None:
@@ -4975,17 +4975,17 @@ class SectionFigures:
     @property
     def command_sides(self) -> SideFigures:
         """
-        The same by sides.
+        Deviation of the command, by side of the path.
         """
     @property
     def left(self) -> WallFigures:
         """
-        Left wall from where it should be, positive to the left.
+        Left wall less the programmed wall, positive to the left.
         """
     @property
     def left_roughness(self) -> Roughness | None:
         """
-        Of the left wall, or None if too short.
+        Roughness of the wall, or None if too short.
         """
     @property
     def left_wall_arc(self) -> ArcFigures | None:
@@ -5000,12 +5000,12 @@ class SectionFigures:
     @property
     def nominal_radius_mm(self) -> float:
         """
-        Programmed, mm; arcs only.
+        Programmed radius, mm; arcs only.
         """
     @property
     def peak_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        Largest |response - command| while it moves, (3,), mm.
+        Largest |response - command| during motion, (3,), mm.
         """
     @property
     def response(self) -> DeviationStats:
@@ -5025,22 +5025,22 @@ class SectionFigures:
     @property
     def response_sides(self) -> SideFigures:
         """
-        The same by sides.
+        Deviation of the response, by side of the path.
         """
     @property
     def rest(self) -> RestVibration | None:
         """
-        The stop of the command in it, or None.
+        Worst stop of the command in it (largest residual), or None.
         """
     @property
     def right(self) -> WallFigures:
         """
-        Right wall from where it should be, positive to the left.
+        Right wall less the programmed wall, positive to the left.
         """
     @property
     def right_roughness(self) -> Roughness | None:
         """
-        Of the right wall, or None if too short.
+        Roughness of the wall, or None if too short.
         """
     @property
     def right_wall_arc(self) -> ArcFigures | None:
@@ -5050,12 +5050,12 @@ class SectionFigures:
     @property
     def section(self) -> PathSection:
         """
-        Where.
+        The section.
         """
     @property
     def time_s(self) -> float:
         """
-        While the command moves in it, s.
+        Time in which the command moves in it, s.
         """
     @property
     def turns_left(self) -> bool:
@@ -5065,7 +5065,7 @@ class SectionFigures:
     @property
     def width(self) -> WallFigures:
         """
-        Left less right wall, with the tool's diameter.
+        Left less right wall plus the tool's diameter.
         """
 class TrackFigures:
     """
@@ -5084,7 +5084,7 @@ class TrackFigures:
     @property
     def duration_s(self) -> float:
         """
-        Until the command rests for the last time, s.
+        Time until the command rests for the last time, s.
         """
     @property
     def response(self) -> DeviationStats:
@@ -5108,14 +5108,14 @@ class TrackFigures:
         """
 class MetrologyOptions:
     """
-    With what a run is measured.
+    Options of SectionMetrology.
     """
     def __init__(self) -> None:
         ...
     @property
     def band_mm(self) -> float:
         """
-        Settled is what stays within it, mm.
+        Band in which the response counts as settled, mm.
         """
     @band_mm.setter
     def band_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5123,7 +5123,7 @@ class MetrologyOptions:
     @property
     def cutoff_mm(self) -> float:
         """
-        Cut-off lambda c, mm; 0: by the section's length.
+        Cut-off lambda c, mm; 0: as in ISO 4288.
         """
     @cutoff_mm.setter
     def cutoff_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5139,7 +5139,7 @@ class MetrologyOptions:
     @property
     def least_rest_s(self) -> float:
         """
-        A shorter standstill is no stop, s.
+        A shorter rest within the path is no stop, s.
         """
     @least_rest_s.setter
     def least_rest_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5147,7 +5147,7 @@ class MetrologyOptions:
     @property
     def period_s(self) -> float:
         """
-        Between two samples, s.
+        Time between two samples, s.
         """
     @period_s.setter
     def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5155,7 +5155,7 @@ class MetrologyOptions:
     @property
     def station_spacing_mm(self) -> float:
         """
-        Largest, mm.
+        Largest distance of two stations, mm.
         """
     @station_spacing_mm.setter
     def station_spacing_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5163,14 +5163,14 @@ class MetrologyOptions:
     @property
     def tool_radius_mm(self) -> float:
         """
-        Of the disc that is swept, mm.
+        Radius of the disc that is swept, mm.
         """
     @tool_radius_mm.setter
     def tool_radius_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
 class SectionMetrology:
     """
-    Measures what a run of samples does to the sections of a path.
+    Measures a motion per section of a path, sample by sample.
     """
     def __init__(self, path: Path, sections: collections.abc.Sequence[PathSection], options: MetrologyOptions) -> None:
         """
@@ -5178,7 +5178,7 @@ class SectionMetrology:
         """
     def feed(self, command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         """
-        The next samples of both, (n, 3), mm. Raises ArgumentError on other shapes or values that are not finite.
+        Takes the next samples of command and response, (n, 3), mm. Raises ArgumentError on other shapes or values that are not finite.
         """
     def finish(self) -> TrackFigures:
         """
@@ -5186,7 +5186,7 @@ class SectionMetrology:
         """
     def wall_profile(self, section: typing.SupportsInt | typing.SupportsIndex) -> tuple[float, float, numpy.ndarray, numpy.ndarray, numpy.ndarray, numpy.ndarray]:
         """
-        Distance of the first station from the path's start and spacing, mm; deviation of left and right wall, (n,), mm, positive to the left, NaN where there is no wall; the path's points and left normals seen from above, (n, 2).
+        Returns distance of the first station from the path's start, mm; spacing, mm; deviations of the left and of the right wall, (n,), mm, positive to the left, NaN where there is no wall; the path's points and its left normals, both seen from above, (n, 2).
         """
     @property
     def station_spacing_mm(self) -> float:
@@ -5195,7 +5195,7 @@ class SectionMetrology:
         """
 class PathFollower:
     """
-    By how much, and in which direction, a table leaves the path that its command follows.
+    Deviation vectors of a response from the path that its command follows.
     """
     def __init__(self, path: Path) -> None:
         """
@@ -5203,7 +5203,7 @@ class PathFollower:
         """
     def step(self, command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        The next samples of both, (k, 3), mm: from foot on the path to response, (k, 3), mm. Raises ArgumentError on other shapes or values that are not finite.
+        Takes the next samples of command and response, (k, 3), mm. Returns the vectors from the foot on the path to the response, (k, 3), mm. Raises ArgumentError on other shapes or values that are not finite.
         """
 class MotionKind:
     """
@@ -5348,7 +5348,7 @@ class RapidPath:
         ...
 class InPosition:
     """
-    Where the wait for in-position comes from.
+    How the wait for in-position is determined.
     
     Members:
     
@@ -5399,7 +5399,7 @@ class ShapedRegions:
     
     Members:
     
-      marked : Regions that the program says it of.
+      marked : Regions marked in the program.
     
       all
     
@@ -5445,7 +5445,7 @@ class ShapedRegions:
         ...
 class FanucModel:
     """
-    What decides how long a program takes, and what acceleration does to the path.
+    Parameters of a control that determine cycle time and deviation by acceleration.
     """
     def __init__(self) -> None:
         ...
@@ -5476,7 +5476,7 @@ class FanucModel:
     @property
     def exponential_rest(self) -> float:
         """
-        Share of the exponential's weights that is cut off at its end.
+        Exponential: ratio of the sum of the weights that is cut off at the end.
         """
     @exponential_rest.setter
     def exponential_rest(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5532,7 +5532,7 @@ class FanucModel:
     @property
     def last_tool_in_spindle(self) -> bool:
         """
-        At the start, from the run before: an M06 that calls it changes nothing.
+        The program's last tool is in the spindle at the start: an M06 that calls it changes nothing.
         """
     @last_tool_in_spindle.setter
     def last_tool_in_spindle(self, arg0: bool) -> None:
@@ -5540,7 +5540,7 @@ class FanucModel:
     @property
     def limits(self) -> MotionLimits:
         """
-        Look-ahead; the axes' feed limits hold always.
+        Limits of the look-ahead; the axes' feed limits hold always.
         """
     @limits.setter
     def limits(self, arg0: MotionLimits) -> None:
@@ -5548,7 +5548,7 @@ class FanucModel:
     @property
     def look_ahead_filter_time_constant_s(self) -> float:
         """
-        Moving average behind look-ahead, s (1769); 0: none.
+        Moving average after look-ahead, s (1769); 0: none.
         """
     @look_ahead_filter_time_constant_s.setter
     def look_ahead_filter_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5556,7 +5556,7 @@ class FanucModel:
     @property
     def m_code_s(self) -> dict[int, float]:
         """
-        M codes with a time of their own: code -> s.
+        M codes with individual times: code -> s.
         """
     @m_code_s.setter
     def m_code_s(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]) -> None:
@@ -5564,7 +5564,7 @@ class FanucModel:
     @property
     def m_function_s(self) -> float:
         """
-        Every M code without a time of its own, s.
+        Every M code not in `m_code_s`, s.
         """
     @m_function_s.setter
     def m_function_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5588,7 +5588,7 @@ class FanucModel:
     @property
     def planner(self) -> PlannerRules:
         """
-        Another kind than fanuc: look-ahead by its rules, shaped blocks too.
+        Kinds other than fanuc: look-ahead by their rules, also for shaped blocks.
         """
     @planner.setter
     def planner(self, arg0: PlannerRules) -> None:
@@ -5620,7 +5620,7 @@ class FanucModel:
     @property
     def rapid_override(self) -> float:
         """
-        Scales the rapid rates; the acceleration of a rapid stays.
+        Scales the rapid rates; the acceleration of a rapid does not change.
         """
     @rapid_override.setter
     def rapid_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5628,7 +5628,7 @@ class FanucModel:
     @property
     def rapid_path(self) -> RapidPath:
         """
-        Straight or every axis for itself.
+        Straight, or every axis at its own rate.
         """
     @rapid_path.setter
     def rapid_path(self, arg0: RapidPath) -> None:
@@ -5652,7 +5652,7 @@ class FanucModel:
     @property
     def shaped_bell_time_s(self) -> float:
         """
-        Behind shaped blocks, linear: second moving average, s; 0: none.
+        After shaped blocks, linear: second moving average, s; 0: none.
         """
     @shaped_bell_time_s.setter
     def shaped_bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5668,7 +5668,7 @@ class FanucModel:
     @property
     def shaped_filter_shape(self) -> FilterShape:
         """
-        Behind shaped blocks.
+        Acceleration after shaped blocks.
         """
     @shaped_filter_shape.setter
     def shaped_filter_shape(self, arg0: FilterShape) -> None:
@@ -5676,7 +5676,7 @@ class FanucModel:
     @property
     def shaped_regions(self) -> ShapedRegions:
         """
-        What runs as shaped blocks.
+        Which cuts run as shaped blocks.
         """
     @shaped_regions.setter
     def shaped_regions(self, arg0: ShapedRegions) -> None:
@@ -5684,7 +5684,7 @@ class FanucModel:
     @property
     def shaped_time_constant_s(self) -> float:
         """
-        Behind shaped blocks, s; 0: no filter.
+        Time constant after shaped blocks, s; 0: no filter.
         """
     @shaped_time_constant_s.setter
     def shaped_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5692,7 +5692,7 @@ class FanucModel:
     @property
     def spindle_start_s(self) -> list[tuple[float, float]]:
         """
-        (speed in 1/min, s) in which the spindle comes from rest to it.
+        Pairs of a spindle speed in 1/min and the time from rest to it in s.
         """
     @spindle_start_s.setter
     def spindle_start_s(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
@@ -5700,7 +5700,7 @@ class FanucModel:
     @property
     def spindle_stop_s(self) -> list[tuple[float, float]]:
         """
-        (speed in 1/min, s) in which the spindle comes from it to rest.
+        Pairs of a spindle speed in 1/min and the time from it to rest in s.
         """
     @spindle_stop_s.setter
     def spindle_stop_s(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
@@ -5708,7 +5708,7 @@ class FanucModel:
     @property
     def time_constant_s(self) -> float:
         """
-        After interpolation, s (1622).
+        Time constant after interpolation, s (1622).
         """
     @time_constant_s.setter
     def time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5724,7 +5724,7 @@ class FanucModel:
     @property
     def unknown_move_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        Per axis: a rapid whose start or end the program does not give, s, shape (3,).
+        Per axis: time of a rapid whose start or end the program does not give, s, shape (3,).
         """
     @unknown_move_s.setter
     def unknown_move_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
@@ -5752,21 +5752,21 @@ class ServoLag:
         """
 class CircleFigures:
     """
-    What acceleration and servo lag make of a circle.
+    Effect of acceleration and servo lag on a circle.
     """
     @property
     def command_error_mm(self) -> float:
         """
-        Programmed radius minus radius of the set-points behind the filters, mm.
+        Programmed radius minus radius of the set-points after the filters, mm.
         """
     @property
     def radial_error_mm(self) -> float:
         """
-        Programmed radius minus radius of the axes behind the servo loop, mm.
+        Programmed radius minus radius of the axes after the servo loop, mm.
         """
 class BlockKind:
     """
-    What a row of the block table is; the table holds the number.
+    Kind of a row of the block table, which contains the number of the kind.
     
     Members:
     
@@ -5827,7 +5827,7 @@ class ToolTime:
     @property
     def acceleration_s(self) -> float:
         """
-        What acceleration adds to cutting blocks and rapids; in look-ahead also what its limits add, s.
+        Time added to cutting blocks and rapids by acceleration and, in look-ahead, by its other limits, s.
         """
     @property
     def cutting_s(self) -> float:
@@ -5852,7 +5852,7 @@ class ToolTime:
     @property
     def in_position_s(self) -> float:
         """
-        Waits behind rapids and exact stops, s.
+        Waits after rapids and exact stops, s.
         """
     @property
     def rapid_s(self) -> float:
@@ -5872,21 +5872,21 @@ class ToolTime:
     @property
     def total_s(self) -> float:
         """
-        Sum of the parts below, s.
+        Sum of all parts, s.
         """
 class CycleTime:
     """
-    How long a program takes, and where.
+    Cycle time of a program.
     """
     @property
     def acceleration_s(self) -> float:
         """
-        What acceleration adds to cutting blocks and rapids; in look-ahead also what its limits add, s.
+        Time added to cutting blocks and rapids by acceleration and, in look-ahead, by its other limits, s.
         """
     @property
     def blocks(self) -> numpy.ndarray:
         """
-        One row per block, structured and read-only: line, kind (a BlockKind number), start_s, duration_s, feed_mm_per_s reached; empty unless asked for.
+        One row per block, structured and read-only: line, kind (a BlockKind number), start_s, duration_s, feed_mm_per_s reached; empty unless requested.
         """
     @property
     def cutting_length_mm(self) -> float:
@@ -5911,7 +5911,7 @@ class CycleTime:
     @property
     def in_position_s(self) -> float:
         """
-        Waits behind rapids and exact stops, s.
+        Waits after rapids and exact stops, s.
         """
     @property
     def outside_regions_s(self) -> float:
@@ -5931,7 +5931,7 @@ class CycleTime:
     @property
     def regions(self) -> numpy.ndarray:
         """
-        One row per region, structured and read-only: first_line, last_line, tool, start_s, duration_s (cutting_s + acceleration_s + in_position_s), length_mm.
+        One row per region, structured and read-only: first_line, last_line, tool, start_s, duration_s and its parts cutting_s, acceleration_s and in_position_s, length_mm.
         """
     @property
     def tool_change_s(self) -> float:
@@ -5946,16 +5946,16 @@ class CycleTime:
     @property
     def total_s(self) -> float:
         """
-        Sum of the parts below, s.
+        Sum of all parts, s.
         """
 class InterpolatedTime:
     """
-    Time of a program by giving every set-point.
+    Cycle time of a program by full interpolation.
     """
     @property
     def cutting_s(self) -> float:
         """
-        Runs of cutting blocks with their acceleration, s.
+        Cutting blocks with their acceleration, s.
         """
     @property
     def dwell_s(self) -> float:
@@ -5970,7 +5970,7 @@ class InterpolatedTime:
     @property
     def in_position_s(self) -> float:
         """
-        Waits behind rapids and exact stops, s.
+        Waits after rapids and exact stops, s.
         """
     @property
     def rapid_s(self) -> float:
@@ -5985,7 +5985,7 @@ class InterpolatedTime:
     @property
     def set_points(self) -> int:
         """
-        Set-points given.
+        Number of set-points.
         """
     @property
     def tool_change_s(self) -> float:
@@ -5995,7 +5995,7 @@ class InterpolatedTime:
     @property
     def total_s(self) -> float:
         """
-        Sum of the parts below, s.
+        Sum of all parts, s.
         """
 class SimulationChunk:
     """
@@ -6006,7 +6006,7 @@ class SimulationChunk:
     @property
     def command_mm(self) -> numpy.ndarray:
         """
-        Set-points behind every filter, (k, 3), mm.
+        Set-points after every filter, (k, 3), mm.
         """
     @property
     def first_sample(self) -> int:
@@ -6016,7 +6016,7 @@ class SimulationChunk:
     @property
     def friction_force_n(self) -> numpy.ndarray:
         """
-        Feed drives: friction of the table, against its motion, (k, 3), N; modes: (0, 0).
+        Feed drives: friction of the table, against its motion, (k, 3), N; without drives: (0, 0).
         """
     @property
     def kind(self) -> numpy.ndarray:
@@ -6026,17 +6026,17 @@ class SimulationChunk:
     @property
     def line(self) -> numpy.ndarray:
         """
-        Line of the block that is being interpolated, (k,).
+        Line of the present block, (k,).
         """
     @property
     def motor_force_n(self) -> numpy.ndarray:
         """
-        Feed drives: force of the motor, (k, 3), N; modes: (0, 0).
+        Feed drives: force of the motor, (k, 3), N; without drives: (0, 0).
         """
     @property
     def motor_mm(self) -> numpy.ndarray:
         """
-        Feed drives: motor as travel of the table, (k, 3), mm; modes: (0, 0).
+        Feed drives: motor as travel of the table, (k, 3), mm; without drives: (0, 0).
         """
     @property
     def response_mm(self) -> numpy.ndarray:
@@ -6050,30 +6050,30 @@ class SimulationChunk:
         """
 class SimulationStream:
     """
-    A motion simulated through filters and plant and handed out in pieces.
+    Simulates a motion through filters and plant and returns it in pieces.
     """
     @staticmethod
     def of_blocks(blocks: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: SimulationOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> SimulationStream:
         """
-        Blocks at their feed.
+        Blocks at their feed; after their end the set-points rest for `rest_s`.
         """
     @staticmethod
     def of_path(path: Path, profile: SpeedProfile, options: SimulationOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> SimulationStream:
         """
-        A path under a speed profile; behind its end the set-points rest for rest_s.
+        A path under a speed profile; after its end the set-points rest for `rest_s`.
         """
     @staticmethod
     def of_program(program: ProgramText, model: FanucModel, options: SimulationOptions, region_offsets_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]] = [], rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> SimulationStream:
         """
-        A whole program on one time axis. region_offsets_mm: from the positions of each region to the machine's, for modes that vary with them. Raises ArgumentError on a model that no controller can have.
+        A whole program on one time axis. `region_offsets_mm`: from the positions of each region to machine positions, for modes that vary with them. Raises ArgumentError on an invalid model.
         """
     def read(self, most: typing.SupportsInt | typing.SupportsIndex) -> SimulationChunk:
         """
-        The next rows, at most so many; none behind the end.
+        Returns the next rows, at most `most`; none after the end.
         """
 class SpindleSense:
     """
-    Sense in which the spindle turns, seen towards the work piece.
+    Direction of spindle rotation, seen towards the workpiece.
     
     Members:
     
@@ -6124,7 +6124,7 @@ class EndMill:
     """
     def __init__(self, diameter_mm: typing.SupportsFloat | typing.SupportsIndex, flutes: typing.SupportsInt | typing.SupportsIndex, helix_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0, runout_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
         """
-        Helix of a right-hand cutter, rad; runout: how far each flute stands out beyond the mean radius, mm, in the order in which they cut. Raises ArgumentError on a value that no tool can have.
+        `helix_rad`: helix angle of a right-hand cutter; `runout_mm`: radius of each flute less the mean radius, in the order in which they cut. Raises ArgumentError on a value outside its range.
         """
     @property
     def diameter_mm(self) -> float:
@@ -6134,7 +6134,7 @@ class EndMill:
     @property
     def flutes(self) -> int:
         """
-        Their number.
+        Number of flutes.
         """
     @property
     def helix_rad(self) -> float:
@@ -6153,7 +6153,7 @@ class EndMill:
         """
 class EngagementTrack:
     """
-    What the tool meets along a path, sample by sample. Azimuths in rad from the direction of feed, positive to its left; with a clockwise spindle a tooth passes from +pi/2 (up milling) to -pi/2 (down milling).
+    Engagement of the tool along a path, sample by sample. Azimuths in rad from the direction of feed, positive to its left; with a clockwise spindle a tooth passes from +pi/2 (up milling) to -pi/2 (down milling).
     """
     def __len__(self) -> int:
         ...
@@ -6169,7 +6169,7 @@ class EngagementTrack:
     @property
     def direction_rad(self) -> numpy.ndarray:
         """
-        Of feed in the XY plane, from +X, (n,), rad; 0 where the tool only plunges.
+        Direction of feed in the XY plane, from +X, (n,), rad; 0 where the tool only plunges.
         """
     @property
     def first_arc(self) -> numpy.ndarray:
@@ -6179,17 +6179,17 @@ class EngagementTrack:
     @property
     def horizontal(self) -> numpy.ndarray:
         """
-        Share of the travel that lies in the XY plane, (n,): 1 level, 0 a plunge.
+        Component of the travel in the XY plane, (n,): 1 level, 0 a plunge.
         """
     @property
     def plunged_mm2(self) -> numpy.ndarray:
         """
-        Area of material below the end of a tool that goes down, (n,), mm2.
+        Area of material below the end of a descending tool, (n,), mm2.
         """
     @property
     def radial_depth_mm(self) -> numpy.ndarray:
         """
-        Width of what is met, across the direction of feed, (n,), mm.
+        Width of cut, perpendicular to the feed, (n,), mm.
         """
     @property
     def s_mm(self) -> numpy.ndarray:
@@ -6199,7 +6199,7 @@ class EngagementTrack:
     @property
     def section_mm2(self) -> numpy.ndarray:
         """
-        Area across the direction of feed, (n,), mm2; times the feed: material removal rate.
+        Area of cut, perpendicular to the feed, (n,), mm2; times feed: material removal rate.
         """
     @property
     def segment(self) -> numpy.ndarray:
@@ -6218,21 +6218,21 @@ class EngagementTrack:
         """
 class Material:
     """
-    A work piece of horizontal layers, each with its boundary as a field of distances on a grid.
+    A workpiece of horizontal layers, each represented by the distance from its boundary on a grid.
     """
     def __init__(self, rings_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], borders_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], resolution_mm: typing.SupportsFloat | typing.SupportsIndex, memory_limit_bytes: typing.SupportsInt | typing.SupportsIndex = 2147483648) -> None:
         """
-        Outlines of the stock, each (n, 2), mm, holes included (even-odd rule); heights between the layers from bottom to top, mm (see layer_borders); distance of the grid's nodes, mm (a hundredth of the tool's diameter is a good choice). Raises ArgumentError on an outline or heights that enclose nothing, or a grid that needs more memory than the limit.
+        `rings_mm`: outlines of the stock, each (n, 2), holes included (even-odd rule); `borders_mm`: heights between the layers from bottom to top (see layer_borders); `resolution_mm`: grid spacing (a hundredth of the tool's diameter is a good choice). Raises ArgumentError on an outline or heights that enclose nothing, or a grid that needs more memory than the limit.
         """
     def __len__(self) -> int:
         ...
     def compact(self) -> None:
         """
-        Gives back the memory of what is uniform by now.
+        Frees the memory of tiles that have become uniform.
         """
     def copy(self) -> Material:
         """
-        The material as it is now; the two are independent from here on.
+        An independent copy of the material in its present state.
         """
     def distance_mm(self, layer: typing.SupportsInt | typing.SupportsIndex, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
@@ -6248,11 +6248,11 @@ class Material:
         """
     def take_whole_layers(self) -> None:
         """
-        From now on only whole layers are taken away: those whose bottom the tip reaches. What is left is never less than what is really there, also under a ramp.
+        From now on removes a layer only if the tip reaches its bottom. The remaining material is then never underestimated, also under a ramp.
         """
     def volume_in_cylinder_mm3(self, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex, radius_mm: typing.SupportsFloat | typing.SupportsIndex, bottom_mm: typing.SupportsFloat | typing.SupportsIndex, top_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
-        Material in an upright cylinder, mm3: what a tool would stand in.
+        Material in a vertical cylinder, mm3, such as a tool at its start position.
         """
     @property
     def borders_mm(self) -> list[float]:
@@ -6262,7 +6262,7 @@ class Material:
     @property
     def bottom_mm(self) -> float:
         """
-        Of the stock, mm.
+        Bottom of the stock, mm.
         """
     @property
     def bytes(self) -> int:
@@ -6272,27 +6272,27 @@ class Material:
     @property
     def high_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
         """
-        High corner of the stock as it was, (2,), mm.
+        High corner of the original stock, (2,), mm.
         """
     @property
     def low_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
         """
-        Low corner of the stock as it was, (2,), mm.
+        Low corner of the original stock, (2,), mm.
         """
     @property
     def resolution_mm(self) -> float:
         """
-        Distance of the grid's nodes, mm.
+        Grid spacing, mm.
         """
     @property
     def top_mm(self) -> float:
         """
-        Of the stock as it was, mm.
+        Top of the original stock, mm.
         """
     @property
     def volume_mm3(self) -> float:
         """
-        What is left, mm3.
+        Remaining volume, mm3.
         """
 class CornerSection:
     """
@@ -6306,7 +6306,7 @@ class CornerSection:
     
       s3 : On the arc of the finished corner.
     
-      s4 : On the straight behind it.
+      s4 : On the straight after it.
     """
     __members__: typing.ClassVar[dict[str, CornerSection]]
     s1: typing.ClassVar[CornerSection]
@@ -6349,12 +6349,12 @@ class CornerSection:
         ...
 class CornerEngagement:
     """
-    What the tool meets at one position of a corner.
+    Engagement of the tool at one position of a corner.
     """
     @property
     def direction_rad(self) -> float:
         """
-        Of feed, from +X, rad.
+        Direction of feed, from +X, rad.
         """
     @property
     def from_rad(self) -> float:
@@ -6379,7 +6379,7 @@ class CornerEngagement:
     @property
     def turned_rad(self) -> float:
         """
-        Of the tool centre's arc so far, rad.
+        Angle turned on the tool centre's arc so far, rad.
         """
     @property
     def x_mm(self) -> float:
@@ -6397,7 +6397,7 @@ class CornerCut:
     """
     def __init__(self, tool_radius_mm: typing.SupportsFloat | typing.SupportsIndex, rough_radius_mm: typing.SupportsFloat | typing.SupportsIndex, finish_radius_mm: typing.SupportsFloat | typing.SupportsIndex, allowance_mm: typing.SupportsFloat | typing.SupportsIndex, turn_rad: typing.SupportsFloat | typing.SupportsIndex = 1.5707963267948966, before_mm: typing.SupportsFloat | typing.SupportsIndex = 10.0, after_mm: typing.SupportsFloat | typing.SupportsIndex = 10.0, mirrored: bool = False) -> None:
         """
-        The tool comes along +X with the wall to its right, turns left by `turn_rad` and follows the second wall; the finished walls meet at the origin. `mirrored`: wall to the left. Equal tool and finish radius: the path has a sharp vertex. Raises ArgumentError on radii below the tool's or an allowance above it.
+        The tool moves along +X with the wall to its right, turns left by `turn_rad` and follows the second wall; the finished walls meet at the origin. `mirrored`: wall to the left. Equal tool and finish radius: the path has a sharp vertex. Raises ArgumentError on corner radii below the tool's or an allowance above it.
         """
     def at(self, s_mm: typing.SupportsFloat | typing.SupportsIndex, behind_vertex: bool = False) -> CornerEngagement:
         """
@@ -6418,27 +6418,27 @@ class CornerCut:
     @property
     def after_mm(self) -> float:
         """
-        Straight behind the corner, mm.
+        Straight path after the corner, mm.
         """
     @property
     def allowance_mm(self) -> float:
         """
-        Left on both walls, mm.
+        Allowance left on both walls by roughing, mm.
         """
     @property
     def before_mm(self) -> float:
         """
-        Straight before the corner, mm.
+        Straight path before the corner, mm.
         """
     @property
     def finish_radius_mm(self) -> float:
         """
-        Of the corner to be made, mm.
+        Radius of the corner to be made, mm.
         """
     @property
     def length_mm(self) -> float:
         """
-        Of the tool's path, mm.
+        Length of the tool's path, mm.
         """
     @property
     def mirrored(self) -> bool:
@@ -6448,7 +6448,7 @@ class CornerCut:
     @property
     def rough_radius_mm(self) -> float:
         """
-        Of the corner as roughing left it, mm.
+        Radius of the corner after roughing, mm.
         """
     @property
     def tool_radius_mm(self) -> float:
@@ -6458,11 +6458,11 @@ class CornerCut:
     @property
     def turn_rad(self) -> float:
         """
-        Through which the path turns, rad.
+        Turning angle of the path, rad.
         """
 class ChipThickness:
     """
-    Which chip thickness the specific cutting force belongs to.
+    Chip thickness used in the specific cutting force.
     
     Members:
     
@@ -6666,16 +6666,16 @@ class ForceCurve:
     @property
     def turned_rad(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
-        Angle of the spindle in its own sense, (n_angles,); at 0 the first flute's tip looks along the feed.
+        Spindle angle in its direction of rotation, rad, (n_angles,); at 0 the first flute's tip points along the feed.
         """
 class MillingForce:
     """
-    Forces of an end mill at one engagement; make one and keep it.
+    Forces of an end mill at one engagement; reuse one object, which stores tables.
     
-    The chip at azimuth p is feed per tooth * cos p thick (paper 001 eq. 1); with runout that of flute i is the least of
+    The chip at azimuth p is feed per tooth * cos p thick (paper 001 eq. 1); with runout that of flute i is the minimum of
     m * feed per tooth * cos p + r_i - r_(i-m), m >= 1, and not below 0. A counter-clockwise spindle mirrors everything,
     helix included. `arcs`: (n_arcs, 4): from and to in rad from the direction of feed, positive to its left, bottom and top
-    in mm above the tip. `feed_mm_per_min`: along the path. Not for several threads at a time.
+    in mm above the tip. `feed_mm_per_min`: along the path. Not thread-safe.
     
     Raises:
         ArgumentError: A speed that is not positive; in all members also an arc beyond -pi/2 ... pi/2 or below the tip, or a
@@ -6695,7 +6695,7 @@ class MillingForce:
         """
     def figures(self, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex) -> ForceFigures:
         """
-        Figures over one revolution: means exact, peaks and mean of the magnitude to 0.1 %; zeros where nothing is cut.
+        Figures over one revolution: means exact, peaks and mean of the magnitude to 0.1 %; zeros without engagement.
         """
     def figures_of(self, track: EngagementTrack, feed_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beam: ToolBeam | None = None) -> dict:
         """
@@ -6738,11 +6738,11 @@ class MillingForce:
         """
 class FeedLimit:
     """
-    What bounds a feed.
+    The limit that determines a feed.
     
     Members:
     
-      none : The highest feed asked for is within all limits.
+      none : The highest requested feed is within all limits.
     
       resultant : Resultant force, mean or peak.
     
@@ -6797,7 +6797,7 @@ class FeedLimit:
         ...
 class FeedLimits:
     """
-    What bounds a feed over one revolution; inf: no limit.
+    Limits of a feed over one revolution of the spindle; inf: no limit.
     """
     def __init__(self, *, mean_resultant_n: typing.SupportsFloat | typing.SupportsIndex = ..., peak_resultant_n: typing.SupportsFloat | typing.SupportsIndex = ..., peak_deflection_um: typing.SupportsFloat | typing.SupportsIndex = ..., peak_torque_nm: typing.SupportsFloat | typing.SupportsIndex = ..., mean_power_w: typing.SupportsFloat | typing.SupportsIndex = ..., feed_per_tooth_mm: typing.SupportsFloat | typing.SupportsIndex = ..., peak_chip_mm: typing.SupportsFloat | typing.SupportsIndex = ..., beam: ToolBeam | None = None) -> None:
         """
@@ -6845,7 +6845,7 @@ class FeedLimits:
         """
 class LimitedFeed:
     """
-    A feed and what bounds it.
+    A feed, and the limit that determines it.
     """
     @property
     def feed_mm_per_min(self) -> float:
@@ -6860,7 +6860,7 @@ class LimitedFeed:
     @property
     def within(self) -> bool:
         """
-        False: even the lowest feed, which this is, is beyond the limit.
+        False: this is the lowest feed, and it exceeds the limit.
         """
 class WallSide:
     """
@@ -6936,7 +6936,7 @@ class FeedWriterOptions:
     """
     def __init__(self, increment_mm: typing.SupportsFloat | typing.SupportsIndex, unit_mm: typing.SupportsFloat | typing.SupportsIndex, position_decimals: typing.SupportsInt | typing.SupportsIndex, absolute_centres: bool, modal_feed: typing.SupportsFloat | typing.SupportsIndex = 0.0, restore_feed: bool = True) -> None:
         """
-        Least increment, mm; unit of position words and of the length in F, mm; decimals of a position; whether I J K are positions; F that holds before the region (0: as in the original), and whether that of the original is left behind.
+        `increment_mm`: least increment; `unit_mm`: unit of position words and of the length in F; `position_decimals`: of a position word; `absolute_centres`: I J K are positions; `modal_feed`: F in effect before the region (0: as in the original); `restore_feed`: restore the modal feed of the original at the end.
         """
 class RefedRegion:
     """
@@ -6950,12 +6950,12 @@ class RefedRegion:
     @property
     def lines(self) -> list[int]:
         """
-        Per block its line, counted from the text's first one = 0.
+        Per block its line, counted from 0 for the first of the text.
         """
     @property
     def modal_feed(self) -> float:
         """
-        F that holds behind it.
+        F in effect after it.
         """
     @property
     def text(self) -> bytes:
@@ -6964,17 +6964,17 @@ class RefedRegion:
         """
 class Travel:
     """
-    How a path is really travelled, per section between two stations.
+    Actual speeds along a path, per section from one station to the next.
     """
     @property
     def duration_s(self) -> float:
         """
-        Until the set-points rest, s.
+        Time until the set-points rest, s.
         """
     @property
     def highest_mm_per_s(self) -> numpy.ndarray:
         """
-        Largest travel within a window, over the window, (n,), mm/s: what was travelled in the present direction and in XY, as travel along the path.
+        Largest distance within a window, divided by the window, (n,), mm/s. Only travel in XY in the present direction counts, converted to travel along the path.
         """
     @property
     def time_s(self) -> numpy.ndarray:
@@ -6983,7 +6983,7 @@ class Travel:
         """
 class ComparedKind:
     """
-    What is compared of two programs, and what a difference is of.
+    Kinds of program contents compared, and of differences.
     
     Members:
     
@@ -7089,17 +7089,17 @@ class ProgramComparison:
     @property
     def counts(self) -> list:
         """
-        (ComparedKind, in the original, in the emitted program, unchanged) of every kind.
+        For each kind (ComparedKind, number in the original, in the emitted program, unchanged).
         """
     @property
     def differences(self) -> list:
         """
-        (ComparedKind, line of the original, line of the emitted program, what the one has, what the other has, distance of the paths in mm) each; a line is 0 where the program has nothing.
+        For each difference (ComparedKind, line of the original, line of the emitted program, contents of the original, of the emitted program, distance of the paths in mm); line 0: the program has nothing there.
         """
     @property
     def path_mm(self) -> float:
         """
-        Largest distance of the paths of a cut that both have, seen from either, mm.
+        Largest distance between the paths of a cut in both programs, in either direction, mm.
         """
 class ExpandedProgram:
     """
@@ -7128,11 +7128,11 @@ class ExpandedProgram:
     @property
     def text(self) -> bytes:
         """
-        From one line `%` to the other.
+        The program between lines `%`.
         """
 class LinuxcncToolTable:
     """
-    The tools by number.
+    LinuxCNC's tool table: the tools by number.
     """
     def __init__(self, file: str, unit: str, unit_mm: typing.SupportsFloat | typing.SupportsIndex, tools: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, tuple[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         """
@@ -7140,14 +7140,14 @@ class LinuxcncToolTable:
         """
 class LinuxcncOptions:
     """
-    What the machine says of a LinuxCNC program.
+    Settings of the machine for reading a LinuxCNC program.
     """
     def __init__(self) -> None:
         ...
     @property
     def adds_points(self) -> bool:
         """
-        Numbers of whole units need a point in the expanded program.
+        Whether whole numbers need a decimal point in the expanded program.
         """
     @adds_points.setter
     def adds_points(self, arg0: bool) -> None:
@@ -7155,7 +7155,7 @@ class LinuxcncOptions:
     @property
     def block_skip(self) -> bool | None:
         """
-        Switch of /: on, off, or None: not known.
+        Switch of /: on, off; None: not known, taken as off.
         """
     @block_skip.setter
     def block_skip(self, arg0: bool | None) -> None:
@@ -7171,7 +7171,7 @@ class LinuxcncOptions:
     @property
     def find_subroutine(self) -> bool:
         """
-        Called with the name of a subroutine that the program does not hold; gives (name, bytes) or None.
+        Called with the name of a subroutine that the program does not contain; returns (name, bytes) or None.
         """
     @find_subroutine.setter
     def find_subroutine(self, arg1: typing.Any) -> None:
@@ -7179,7 +7179,7 @@ class LinuxcncOptions:
     @property
     def first_codes(self) -> str:
         """
-        Set what LinuxCNC begins in, where the machine begins otherwise.
+        Codes to be put before the program: LinuxCNC's initial modes where the machine's differ.
         """
     @first_codes.setter
     def first_codes(self, arg0: str) -> None:
@@ -7187,7 +7187,7 @@ class LinuxcncOptions:
     @property
     def inch(self) -> bool:
         """
-        Unit in force at the first line.
+        Whether inch is the unit at the first line.
         """
     @inch.setter
     def inch(self, arg0: bool) -> None:
@@ -7211,7 +7211,7 @@ class LinuxcncOptions:
     @property
     def max_steps(self) -> int:
         """
-        Lines executed, not counting one for each line.
+        Lines executed at most, beyond one for each line.
         """
     @max_steps.setter
     def max_steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -7219,7 +7219,7 @@ class LinuxcncOptions:
     @property
     def tool_length_mm(self) -> dict[int, float]:
         """
-        By H number, before those of the table.
+        By H number; they override the table.
         """
     @tool_length_mm.setter
     def tool_length_mm(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]) -> None:
@@ -7227,7 +7227,7 @@ class LinuxcncOptions:
     @property
     def tool_table(self) -> LinuxcncToolTable | None:
         """
-        None: there is none.
+        The tool table; None: there is none.
         """
     @tool_table.setter
     def tool_table(self, arg0: LinuxcncToolTable | None) -> None:
@@ -7235,7 +7235,7 @@ class LinuxcncOptions:
     @property
     def work_offset(self) -> int:
         """
-        In force at the first line, 1 ... 9: G54 ... G59.3.
+        Work offset at the first line, 1 ... 9: G54 ... G59.3.
         """
     @work_offset.setter
     def work_offset(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -7260,18 +7260,18 @@ class LinuxcncProgram:
     @property
     def path_tolerance_mm(self) -> tuple[float | None, float | None] | None:
         """
-        The one P and Q of all its G64, mm, None for a word that is left out; None: there are several, or none.
+        P and Q common to all its G64, mm, None for a word that is left out; None: there are several, or no G64.
         """
 class SiemensOptions:
     """
-    What a SINUMERIK program does not say of itself.
+    Settings for reading a SINUMERIK program.
     """
     def __init__(self) -> None:
         ...
     @property
     def arc_radius_tolerance_mm(self) -> float:
         """
-        By which start and end radius of an arc may differ.
+        Permitted difference of start and end radius of an arc, mm.
         """
     @arc_radius_tolerance_mm.setter
     def arc_radius_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -7279,7 +7279,7 @@ class SiemensOptions:
     @property
     def block_skip(self) -> bool | None:
         """
-        Whether `/` blocks are skipped; None: not known.
+        Whether `/` blocks are skipped; None: refused.
         """
     @block_skip.setter
     def block_skip(self, arg0: bool | None) -> None:
@@ -7287,7 +7287,7 @@ class SiemensOptions:
     @property
     def called(self) -> bool:
         """
-        Called with the name of a program in capitals; gives (name, bytes in UTF-8) or None.
+        Called with the name of a program in capitals; returns (name, bytes in UTF-8) or None.
         """
     @called.setter
     def called(self, arg1: typing.Any) -> None:
@@ -7295,7 +7295,7 @@ class SiemensOptions:
     @property
     def file(self) -> str:
         """
-        Name of the program's file, as errors name it.
+        Name of the program's file in messages.
         """
     @file.setter
     def file(self, arg0: str) -> None:
@@ -7303,7 +7303,7 @@ class SiemensOptions:
     @property
     def least_increment_mm(self) -> float:
         """
-        Of the expanded program.
+        Of the expanded program, mm.
         """
     @least_increment_mm.setter
     def least_increment_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -7311,7 +7311,7 @@ class SiemensOptions:
     @property
     def left_out(self) -> dict[str, str]:
         """
-        Words that are left out, with what is told of them.
+        Words that are left out, each with its note.
         """
     @left_out.setter
     def left_out(self, arg0: collections.abc.Mapping[str, str]) -> None:
@@ -7319,7 +7319,7 @@ class SiemensOptions:
     @property
     def left_out_addresses(self) -> dict[str, str]:
         """
-        Addresses likewise.
+        Addresses, likewise.
         """
     @left_out_addresses.setter
     def left_out_addresses(self, arg0: collections.abc.Mapping[str, str]) -> None:
@@ -7327,7 +7327,7 @@ class SiemensOptions:
     @property
     def max_expansion_moves(self) -> int:
         """
-        Moves, likewise.
+        Maximum number of moves, likewise.
         """
     @max_expansion_moves.setter
     def max_expansion_moves(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -7335,7 +7335,7 @@ class SiemensOptions:
     @property
     def max_program_steps(self) -> int:
         """
-        Blocks that are executed, beside those of the text.
+        Maximum number of blocks executed, beyond one for each line.
         """
     @max_program_steps.setter
     def max_program_steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -7343,7 +7343,7 @@ class SiemensOptions:
     @property
     def name(self) -> str:
         """
-        Of a program without a head %_N_NAME_MPF, in capitals.
+        Name of a program without a header %_N_NAME_MPF, in capitals.
         """
     @name.setter
     def name(self, arg0: str) -> None:
@@ -7359,7 +7359,7 @@ class SiemensOptions:
     @property
     def tool_change_unknown_axes(self) -> str:
         """
-        Axes whose position is not known behind M6.
+        Axes of "XYZ" whose position is not known after M6.
         """
     @tool_change_unknown_axes.setter
     def tool_change_unknown_axes(self, arg0: str) -> None:
@@ -7367,7 +7367,7 @@ class SiemensOptions:
     @property
     def work_offsets(self) -> dict[str, typing.Annotated[list[float], "FixedSize(3)"]]:
         """
-        By name, mm.
+        By name ("G54", "G54.1P5"), mm.
         """
     @work_offsets.setter
     def work_offsets(self, arg0: collections.abc.Mapping[str, typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]) -> None:
@@ -7384,23 +7384,23 @@ class SiemensProgram:
     @property
     def names(self) -> list[tuple[str, str]]:
         """
-        Words that stand for others of the source, each with that one.
+        Pairs of a word and the word of the source that it replaces.
         """
 def acceleration_filters(model: FanucModel) -> list[Fir]:
     """
-    Filters behind interpolation in order, none, one or two.
+    Filters after interpolation in order: none, one or two.
     """
 def arma_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_modes: typing.SupportsInt | typing.SupportsIndex, plain: bool = False) -> Arma:
     """
-    ARMA model of one or several free decays: common poles, each record's own initial state.
+    ARMA model of one or several free decays: common poles, a separate initial state for each record.
     
     Args:
         responses: Response per decay, each of shape (n,), in any unit.
         n_modes: Number of modes, 1 to 50.
-        plain: One round of unfiltered least squares instead of the iterated one.
+        plain: One round of unfiltered least squares instead of the iteration.
     
     Returns:
-        The model, as from arma_driven with a unit impulse at the first sample for the force.
+        The model, as from arma_driven with a unit impulse at the first sample as force.
     
     Raises:
         ArgumentError: As arma_driven.
@@ -7410,13 +7410,13 @@ def arma_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing
     """
 def arma_driven(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_modes: typing.SupportsInt | typing.SupportsIndex, plain: bool = False) -> Arma:
     """
-    ARMA model of one or several taps of the same point, by iterated least squares.
+    ARMA model of one or several impacts at the same point, by iterated least squares.
     
     Args:
-        forces: Force per tap in N, each of shape (n,), at rest at the first sample.
-        responses: Response per tap at the same instants, each of shape (n,); poles and numerator are common.
+        forces: Force per impact in N, each of shape (n,); the structure is at rest at the first sample.
+        responses: Response per impact at the same instants, each of shape (n,); poles and numerator are common.
         n_modes: Number of modes, 1 to 50; the model has 2*n_modes poles and 2*n_modes+1 numerator terms.
-        plain: One round of unfiltered least squares, which noise bends, instead of the iterated one.
+        plain: One round of unfiltered least squares instead of the iteration; noise biases its poles.
     
     Returns:
         The model whose phi converged, or the best of all rounds with converged False.
@@ -7430,42 +7430,42 @@ def arma_driven(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.A
     """
 def block_overlap_time_s(lengths_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], model: FanucModel) -> float:
     """
-    Time of a run of overlapping cutting blocks, s: sum of ceil(l / (F T)) T plus the length of the filters (paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.
+    Time of a sequence of overlapping cutting blocks, s: sum of ceil(l / (F T)) T plus the length of the filters (paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.
     """
 def busiest_per_s(durations_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], amounts: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, stretch_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    Largest amount per second in any time window of a duration; each block's amount is spread evenly over it.
+    Largest amount per second in any time window; each block's amount is spread evenly over its duration.
     
-    `durations_s`: of the blocks, s, (n,); `amounts`: what each of them needs, such as its characters, (n,); None: one of each; `stretch_s`: the window, s; all blocks together if they last less.
+    `durations_s`: of the blocks, s, (n,); `amounts`: of each block, such as its characters, (n,); None: one each; `stretch_s`: duration of the window, s; all blocks together if they are shorter.
     """
 def compare_programs(original: ProgramText, emitted: ProgramText, reader: ReaderOptions, emission_lines: collections.abc.Sequence[str], joint_path_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> ProgramComparison:
     """
-    Compare two programs that were read with these options; `emission_lines`: capitals without blanks, lines that do not end a cut; `joint_path_mm`: within it cuts of other lengths are the same, run through side by side.
+    Compares two programs read with these options. `emission_lines`: capitals without blanks, lines that do not end a cut; `joint_path_mm`: cuts of different lengths are the same if their paths, followed in parallel, stay within it.
     """
 def contour_kernel(shaper: Fir, modes: collections.abc.Sequence[Mode], period_s: typing.SupportsFloat | typing.SupportsIndex, target: ContourTarget) -> list[float]:
     """
-    Kernel from a command before shaping to what shall follow the path; `shaper`: taps in samples of `period_s`.
+    Kernel from a command before shaping to the motion that is to follow the path; `shaper`: taps in samples of `period_s`.
     """
 def controlled_motion(path: Path, limits: MotionLimits, rules: PlannerRules) -> tuple[Path, SpeedProfile]:
     """
-    The path that a control follows, and its speed along it from rest to rest: (Path, SpeedProfile). Raises ArgumentError on a segment without feed, or a setting that the planner does not take.
+    The path that a control follows, and its speed along it from rest to rest: (Path, SpeedProfile). Raises ArgumentError on a segment without feed, or an invalid setting.
     """
 def convolve(first: Shaper, second: Shaper) -> Shaper:
     """
-    The two shapers in series: cancels what either cancels, lasts as long as both together.
+    The two shapers in series: cancels the modes of both; the durations add.
     
     Args:
         first: A shaper.
         second: Another one; the order does not matter.
     
     Returns:
-        The series shaper; taps whose times agree within 1e-12 of its duration are merged.
+        The series shaper; impulses whose times agree within 1e-12 of its duration are merged.
     
     Source: paper 002, eq. 3.
     """
 def convolved_zv(modes: collections.abc.Sequence[Mode]) -> Shaper:
     """
-    Convolved ZV, the conventional multi-mode shaper: 2^n non-negative taps.
+    Convolved ZV, the conventional multi-mode shaper: 2^n non-negative impulses.
     
     Args:
         modes: The n >= 1 modes to cancel.
@@ -7480,11 +7480,11 @@ def convolved_zv(modes: collections.abc.Sequence[Mode]) -> Shaper:
     """
 def count_slowed_blocks(blocks: Path, corner_speed_difference_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], max_feed_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> int:
     """
-    Blocks that a controller with look-ahead would run slower than programmed.
+    Number of blocks that a controller with look-ahead would run slower than programmed.
     """
 def csv_rows(word: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], words: collections.abc.Sequence[str], table: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.f_contiguous"]) -> bytes:
     """
-    Rows of a CSV file: the row's word, (k,), and the numbers of its row in the table, (k, c), each as the shortest text that reads back as the same number. Raises ArgumentError on unequal lengths or a word that does not exist.
+    Rows of a CSV file: a word and the numbers of a row of the table, (k, c), each as the shortest text that reads back as the same number. `word`: index of each row's word in `words`, (k,). Raises ArgumentError on unequal lengths or an index without a word.
     """
 def divisible_segments(program: ProgramText, region: Region, options: FeedWriterOptions) -> list[bool]:
     """
@@ -7492,7 +7492,7 @@ def divisible_segments(program: ProgramText, region: Region, options: FeedWriter
     """
 def equivalent_mass_bisection(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, low_kg: typing.SupportsFloat | typing.SupportsIndex = 0.001, high_kg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.01, most_halvings: typing.SupportsInt | typing.SupportsIndex = 100, quantity: str = 'acceleration', theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, impulse_n_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> EquivalentMass:
     """
-    Equivalent mass by bisection: paper 003's steps 1 to 7, the check of the closed form.
+    Equivalent mass by bisection: paper 003, steps 1 to 7; a check of the closed form.
     
     Args:
         force_n: Measured force in N, shape (n,).
@@ -7502,17 +7502,17 @@ def equivalent_mass_bisection(force_n: typing.Annotated[numpy.typing.ArrayLike, 
         damping_ratio: 0 to 1.
         low_kg: Lower end of the range, above 0.
         high_kg: Upper end of the range.
-        tolerance: Of the RMS, relative to the measured one.
-        most_halvings: After which the search gives up, with converged False.
+        tolerance: Tolerance of the RMS, relative to the measured one.
+        most_halvings: Number of halvings after which the search gives up, with converged False.
         quantity: "acceleration", "velocity" or "displacement".
-        theta: Of the Wilson theta method.
+        theta: Parameter of the Wilson theta method, at least 1.
         impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
     
     Returns:
         The mass, the number of halvings and both RMS.
     
     Raises:
-        ArgumentError: A value outside its range, or a force or response that is zero throughout.
+        ArgumentError: A value outside its range, a response that is zero throughout, or such a force without an impulse.
     
     Source: paper 003, section 2.2, steps 1-7.
     """
@@ -7527,14 +7527,14 @@ def equivalent_mass_closed_form(force_n: typing.Annotated[numpy.typing.ArrayLike
         omega_rad_s: Undamped natural frequency in rad/s, above 0.
         damping_ratio: 0 to 1.
         quantity: "acceleration", "velocity" or "displacement".
-        theta: Of the Wilson theta method.
+        theta: Parameter of the Wilson theta method, at least 1.
         impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
     
     Returns:
         The mass that makes the RMS of simulated and measured response equal.
     
     Raises:
-        ArgumentError: A value outside its range, or a force or response that is zero throughout.
+        ArgumentError: A value outside its range, a response that is zero throughout, or such a force without an impulse.
     
     Source: paper 003, section 2.2.
     """
@@ -7546,7 +7546,7 @@ def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing
     middle zero, lies at the mode. Without damping it is the Dolph-Chebyshev window over half periods.
     
     Args:
-        mode: The mode around which little is to be left.
+        mode: The mode around which the residual is to be small.
         vibration_limit: Residual ratio at the humps (no unit), above 0 and below 1.
         humps: Number of humps, 1 to 3.
     
@@ -7555,13 +7555,13 @@ def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing
     
     Raises:
         ArgumentError: A value is outside its range.
-        DesignError: No such shaper with non-negative taps was reached (high damping).
+        DesignError: There is no such shaper with non-negative impulses (high damping).
     
     Source: Singhose, Seering and Singer 1994; Singhose, Porter, Tuttle and Singer 1997; the solution: this project.
     """
 def fastest_block_ends(blocks: Path) -> list[int]:
     """
-    Per axis the block, but for the last, at whose end it is fastest; ascending, each once.
+    Blocks after which a stop excites most: for each axis the block with the highest speed at its end, except the last block; ascending, without repetition.
     """
 def feeds_per_minute(program: ProgramText, region: Region) -> bool:
     """
@@ -7585,11 +7585,11 @@ def fit_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.
         omega_rad_s: Starts, undamped natural frequencies in rad/s, shape (n_modes,), below Nyquist.
         damping_ratio: Starts, 0 < zeta < 1, shape (n_modes,).
         with_offset: Fit a constant offset per record.
-        coloured_residuals: Covariance that holds for residuals correlated over time (stationary) as well.
+        coloured_residuals: The covariance also holds for residuals that are correlated over time (stationary noise).
         most_iterations: Steps after which the search gives up, with converged False.
     
     Returns:
-        The fit; look at converged and reason before use.
+        The fit; check converged and reason before use.
     
     Raises:
         ArgumentError: As fit_modes.
@@ -7598,15 +7598,15 @@ def fit_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.
     """
 def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, quantity: str = 'acceleration', with_offset: bool = True, with_mass_line: bool = False, with_compliance: bool = False, coloured_residuals: bool = False, hold: str = 'linear', force_noise_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, most_iterations: typing.SupportsInt | typing.SupportsIndex = 60) -> ModalFit:
     """
-    Output-error (for white noise: maximum likelihood) fit of modes to one or several taps of the same point.
+    Output-error fit of modes to one or several impacts at the same point (for white noise: maximum likelihood).
     
     The response is the sum over modes of (1/m) s^q/(s^2 + 2 zeta omega s + omega^2) applied to the force, from rest at the
-    first sample. Search by Levenberg-Marquardt in ln omega and ln zeta with exact
-    derivatives; everything linear is eliminated.
+    first sample. The search is Levenberg-Marquardt in ln omega and ln zeta with exact derivatives; linear parameters are
+    eliminated.
     
     Args:
-        forces: Force per tap in N, each of shape (n,).
-        responses: Response per tap at the same instants in SI units, each of shape (n,).
+        forces: Force per impact in N, each of shape (n,).
+        responses: Response per impact at the same instants in SI units, each of shape (n,).
         period_s: Time between samples in s, above 0.
         omega_rad_s: Starts, undamped natural frequencies in rad/s, shape (n_modes,), below Nyquist.
         damping_ratio: Starts, 0 < zeta < 1, shape (n_modes,).
@@ -7614,15 +7614,15 @@ def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.Arr
         with_offset: Fit a constant offset per record.
         with_mass_line: Add a free mass, for modes far below.
         with_compliance: Add a spring without mass, for modes far above.
-        coloured_residuals: Covariance that holds for residuals correlated over time (stationary) as well.
-        hold: How the force runs between samples: "linear"; "band_limited", as behind an anti-aliasing filter (sinc
-            interpolation); "impulse", blows just before the samples, of force times period.
+        coloured_residuals: The covariance also holds for residuals that are correlated over time (stationary noise).
+        hold: Course of the force between samples: "linear"; "band_limited", as after an anti-aliasing filter (sinc
+            interpolation); "impulse", impulses of force times period just before the samples.
         force_noise_n: Standard deviation of white noise on the force in N. In pulses of up to 128 samples the true force is
-            estimated along with the modes; else its effect is added to the covariance to first order.
+            estimated together with the modes; otherwise the effect of the noise is added to the covariance, to first order.
         most_iterations: Steps after which the search gives up, with converged False.
     
     Returns:
-        The fit; look at converged and reason before use.
+        The fit; check converged and reason before use.
     
     Raises:
         ArgumentError: Records as in arma_driven, a start or option outside its range, or too few samples.
@@ -7635,35 +7635,35 @@ def for_shaped_blocks(model: FanucModel) -> FanucModel:
     """
 def gaussian_low_pass(profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], spacing_mm: typing.SupportsFloat | typing.SupportsIndex, cutoff_mm: typing.SupportsFloat | typing.SupportsIndex) -> numpy.ndarray:
     """
-    Gaussian filter of ISO 16610-21: what is longer than the cut-off, (n,), mm.
+    Gaussian low-pass filter of ISO 16610-21: the part of a profile with wavelengths above the cut-off, (n,), mm.
     """
 def grid_polynomial(modes: collections.abc.Sequence[Mode], period_s: typing.SupportsFloat | typing.SupportsIndex) -> Shaper:
     """
-    Shortest shaper with taps at multiples of a period that cancels every mode exactly there.
+    Shortest shaper with impulses at multiples of a period that cancels every mode exactly.
     
     The polynomial with the roots z = exp(s*period) and their conjugates: two periods per mode, one for a mode whose z is
-    real, none for one that aliases onto an earlier one. Amplitudes may be negative and large: look at abs_sum before use.
+    real, none for one that aliases onto an earlier one. Amplitudes may be negative and large: check abs_sum before use.
     
     Args:
-        modes: The modes to cancel, at least one; one above the grid's Nyquist frequency is fine.
+        modes: The modes to cancel, at least one; one above the grid's Nyquist frequency is allowed.
         period_s: Period of the grid in s, above 0.
     
     Returns:
-        The shaper; residual_ratio of every mode is at most 1e-10, some 1e-16*abs_sum as a rule.
+        The shaper; residual_ratio of every mode is at most 1e-10, usually about 1e-16*abs_sum.
     
     Raises:
         ArgumentError: No mode, or a period that is not positive.
-        DesignError: A z closer to +1 than 0.01, or so large an abs_sum that rounding leaves more than 1e-10.
+        DesignError: A z closer to +1 than 0.01, or round-off that leaves a residual above 1e-10.
     
     Source: this project.
     """
 def in_position_wait_behind_s(error_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], moved: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"], model: FanucModel) -> float:
     """
-    The same behind any command, s. `error_mm`: what the servo loop lags at its end, (3,); `moved`: the axes that moved, (3,). Raises ArgumentError on a model that no controller can have.
+    Wait for in-position after any command, s. `error_mm`: the servo lag at its end, (3,); `moved`: the axes that moved, (3,). Raises ArgumentError on an invalid model.
     """
 def in_position_wait_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel) -> float:
     """
-    Wait for in-position behind a rapid, s. Raises ArgumentError on a model that no controller can have.
+    Wait for in-position after a rapid, s. Raises ArgumentError on an invalid model.
     """
 def insensitive_band(shaper: Shaper, mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex) -> FrequencyBand:
     """
@@ -7675,7 +7675,7 @@ def insensitive_band(shaper: Shaper, mode: Mode, vibration_limit: typing.Support
         vibration_limit: Residual ratio (no unit), above 0 and below 1.
     
     Returns:
-        The band; of no width if the limit is exceeded at the mode itself, up to ten times its frequency at most.
+        The band; of zero width if the limit is exceeded at the mode itself; up to at most ten times its frequency.
     
     Raises:
         ArgumentError: The limit is outside its range.
@@ -7705,35 +7705,35 @@ def interpolate(path: Path, profile: SpeedProfile, period_s: typing.SupportsFloa
     """
 def interpolate_program(program: ProgramText, model: FanucModel) -> InterpolatedTime:
     """
-    The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no controller can have, or a program of more than 4e9 set-points.
+    Cycle time by full interpolation, set-point by set-point. Raises ArgumentError on an invalid model, or a program of more than 4e9 set-points.
     """
 def largest_difference_mm(path: Path, blocks: collections.abc.Sequence[LinearBlock], period_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    By how much the motion of joined blocks differs from the blocks of constant feed at the ends of their periods.
+    Largest difference of the joined blocks from the blocks of constant feed at the ends of their periods.
     """
 def largest_feed(force: MillingForce, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], limits: FeedLimits, lowest: typing.SupportsFloat | typing.SupportsIndex, highest: typing.SupportsFloat | typing.SupportsIndex) -> LimitedFeed:
     """
-    Highest feed between `lowest` and `highest` (mm/min) within all limits: never above, and within 0.1 % of the one that binds. Raises ArgumentError unless 0 < lowest <= highest.
+    Highest feed between `lowest` and `highest` (mm/min) within all limits: never above a limit, and within 0.02 % of the limit reached. Raises ArgumentError unless 0 < lowest <= highest.
     """
 def largest_feeds(force: MillingForce, track: EngagementTrack, limits: FeedLimits, lowest: typing.SupportsFloat | typing.SupportsIndex, highest: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.bool]]:
     """
-    The same for every sample of a track, along the path: (feed_mm_per_min, limit as FeedLimit number, within), each (n_samples,). The highest where nothing is met or the tool only plunges.
+    largest_feed for every sample of a track, along the path: (feed_mm_per_min, limit as FeedLimit number, within), each (n_samples,). Without engagement, or if the tool only plunges, the highest feed.
     """
 def layer_borders(paths: collections.abc.Sequence[Path], bottom_mm: typing.SupportsFloat | typing.SupportsIndex, top_mm: typing.SupportsFloat | typing.SupportsIndex, ramp_step_mm: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
     """
-    Heights between layers for these paths in a stock from bottom to top, mm: where the tool moves on a level, the lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.
+    Heights between layers for these paths in a stock from bottom to top, mm: the heights of level moves, the lowest points of ramps and plunges, and steps of at most `ramp_step_mm` along ramps and helices (a tenth of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.
     """
 def line_sections(path: Path, ranges: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]]) -> list[PathSection]:
     """
-    The parts of a path that come from source lines, pairs of first and last. Raises ArgumentError if a range runs backwards or two overlap.
+    The parts of a path that come from `ranges` of source lines, pairs of first and last line. Raises ArgumentError if a range runs backwards or two overlap.
     """
 def linear_blocks(path: Path, period_s: typing.SupportsFloat | typing.SupportsIndex, tolerance_mm: typing.SupportsFloat | typing.SupportsIndex, joints: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], modes: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> list[LinearBlock]:
     """
-    Join blocks of constant feed, each of whole periods, into blocks of linear feed, where the motion stays within a tolerance of the ends of their periods. A block begins at each of `joints` (ascending); speeds at the end of the path are chosen so that `modes` of X, Y and Z are at rest there.
+    Joins blocks of constant feed, each of whole periods, into blocks of linear feed. At the ends of the periods the motion stays within a tolerance of the original motion. A block begins at each of `joints` (ascending); speeds at the end of the path are chosen so that `modes` of X, Y and Z are at rest there.
     """
 def linear_distance_mm(length_mm: typing.SupportsFloat | typing.SupportsIndex, start_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, end_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, time_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    Distance along such a block at a time since its start, mm.
+    Distance along a block whose speed is linear along its path, at a time since its start, mm.
     """
 def linear_duration_s(length_mm: typing.SupportsFloat | typing.SupportsIndex, start_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, end_mm_per_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
@@ -7741,42 +7741,42 @@ def linear_duration_s(length_mm: typing.SupportsFloat | typing.SupportsIndex, st
     """
 def linear_end_speed(length_mm: typing.SupportsFloat | typing.SupportsIndex, start_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, time_s: typing.SupportsFloat | typing.SupportsIndex) -> float | None:
     """
-    Speed at the end of a block that lasts a given time, or at its start where these are swapped, mm/s; None: no such speed.
+    Speed at one end of a block of a given duration from the speed at its other end, mm/s; None: there is no such speed.
     """
 def linear_model(parameters: FeedDriveParameters) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]:
     """
     The drive as x' = A x + B w, y = C x + D w with inputs linear between the set-points.
     
     Args:
-        parameters: Without friction other than viscous, backlash and force limit.
+        parameters: The drive, with viscous friction only and without backlash and force limit.
     
     Returns:
         A, B, C, D. Input 0 is the set-point; input 1, only with acceleration feed-forward, the speed of the set-points,
-        whose sample is the difference to the one before over the period. The output is the response. Lengths in any one
-        unit, time in s.
+        sampled as the difference from the previous set-point divided by the period. The output is the response. Lengths in
+        any one unit, time in s.
     
     Raises:
         ArgumentError: The drive is not linear.
     """
 def linear_positions_mm(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], blocks: collections.abc.Sequence[LinearBlock], times_s: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
-    (n, 3) positions of the motion of blocks at ascending times, mm; after the last block its end.
+    Positions of the motion of blocks at ascending times, (n, 3), mm; after the last block its end.
     """
 def linuxcnc_slowing(path: Path, limits: MotionLimits, rules: PlannerRules, corner_rad: typing.SupportsFloat | typing.SupportsIndex) -> LinuxcncSlowing:
     """
-    What LinuxCNC's two rules for short segments do to a path at its feeds; larger turns are corners.
+    Effect of LinuxCNC's two rules for short segments on a path at its feeds. Turns above `corner_rad` do not count.
     """
 def list_programs(text: bytes) -> list[ProgramEntry]:
     """
-    The programs of a text (bytes) in the order in which they stand. Raises ProgramError where it cannot be read.
+    The programs of a text (bytes) in order. Raises ProgramError if its '%' lines or its O numbers cannot be read.
     """
 def look_ahead_on_load(stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], load_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], before_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], behind_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
     """
-    The feeds (n,), mm/min, lowered around each station whose load allows less (`load_mm_per_min`, (n,)), because the travel lags behind a change: `before_s` and `behind_s` (n,) times the feed that the load allows.
+    Returns the feeds (n,), mm/min, lowered around each station that is limited by its load (`load_mm_per_min`, (n,)), because the motion lags behind a change of feed. A lower feed is commanded earlier by `before_s` (n,) times the feed that the load allows, a higher one later by `behind_s` (n,) times it.
     """
 def machine_frame(tool_frame: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], direction_rad: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
     """
-    A force (2,) in the frame of the tool, in the frame of the machine (paper 001 eq. 4, 5); direction of feed from +X towards +Y.
+    Converts a force (2,) from the frame of the tool to the frame of the machine (paper 001 eq. 4, 5); `direction_rad`: direction of feed from +X towards +Y.
     """
 def matrix_exponential(matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
@@ -7784,21 +7784,21 @@ def matrix_exponential(matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.fl
     
     Raises:
         ArgumentError: Not square or not finite.
-        NumericError: The result exceeds all numbers.
+        NumericError: The result overflows.
     """
 def measure_roughness(profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], spacing_mm: typing.SupportsFloat | typing.SupportsIndex, cutoff_mm: typing.SupportsFloat | typing.SupportsIndex, lambda_s_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Roughness:
     """
-    Ra, Rz and Wa of an evenly spaced profile (n,), mm, one cut-off at either end left out. Raises ArgumentError if less than one sampling length remains.
+    Ra, Rz and Wa of an evenly spaced profile (n,), mm, without one cut-off at each end. Raises ArgumentError if less than one sampling length remains.
     """
 def minimal_branches(first: Mode, second_damping: typing.SupportsFloat | typing.SupportsIndex, ratios: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> MinimalBranches:
     """
-    All minimal two-mode shapers over the ratio of the frequencies, joined to curves (paper 002, fig. 2 and 3).
+    All minimal two-mode shapers over the ratio of the frequencies, joined into curves (paper 002, fig. 2 and 3).
     
     At each ratio the list is that of `minimal_two_mode`; curves are followed by continuation, also through gaps, where the
-    sum of magnitudes or the duration exceeds its limit. Where two curves touch, their tails may be exchanged.
+    sum of magnitudes or the duration exceeds its limit. Where two curves touch, their ends may be exchanged.
     
     Args:
-        first: The mode whose frequency stays.
+        first: The mode whose frequency is constant.
         second_damping: Damping ratio of the other mode (no unit).
         ratios: Frequencies of the other mode over that of the first, ascending, above 0, shape (n_ratios,).
         max_duration_s: Largest duration in s, at most 100 periods of the faster mode at any ratio.
@@ -7814,25 +7814,25 @@ def minimal_branches(first: Mode, second_damping: typing.SupportsFloat | typing.
     """
 def minimal_shapers(modes: collections.abc.Sequence[Mode], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_starts: typing.SupportsInt | typing.SupportsIndex = 100000, max_boxes: typing.SupportsInt | typing.SupportsIndex = 400000) -> MinimalShapers:
     """
-    Minimal multi-mode shapers: n+1 taps that cancel n = 1 ... 6 modes, damped or not.
+    Minimal multi-mode shapers: n+1 impulses that cancel n = 1 ... 6 modes, damped or not.
     
     One mode is closed form and two are searched completely. Three and more are searched from many low-discrepancy starts
-    and by boxes of times, each of which is proven empty or shrunk onto a solution, in ascending duration: what the result
-    says about completeness is `complete` and `complete_up_to_s`. Shapers with fewer taps that serve all modes are listed
-    too; solutions that are not isolated (undamped modes at odd ratios, which one ZV serves) are not.
+    and by boxes of times in ascending duration, each of which is proven empty or shrunk to one solution; `complete` and
+    `complete_up_to_s` tell what is proven. Shapers with fewer impulses that cancel all modes are listed too; solutions that
+    are not isolated (undamped modes at odd ratios, which one ZV cancels) are not.
     
     Args:
-        modes: One to six modes, no two alike within 1e-6.
+        modes: One to six modes, no two poles within 1e-6 of one another (relative).
         max_duration_s: Largest duration in s, above 0, at most 100 periods of the fastest mode.
         max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1.
-        max_starts: Most Newton starts; fewer are used once every solution was found three times over.
-        max_boxes: Most boxes of times that the proof may look at (some 2 microseconds each for four modes); 0: no proof.
+        max_starts: Maximum number of Newton starts; fewer are used once every solution was found three times.
+        max_boxes: Maximum number of boxes of times examined (some 2 microseconds each for four modes); 0: no proof.
     
     Returns:
         The shapers, residual_ratio of every mode at most 1e-12, and what was searched.
     
     Raises:
-        ArgumentError: No mode, more than six, two alike, or a value outside its range.
+        ArgumentError: No mode, more than six, two with equal poles, or a value outside its range.
     
     Source: paper 002, eq. 4-11; the searches are this project's.
     """
@@ -7840,16 +7840,16 @@ def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsF
     """
     All minimal (three-impulse) shapers of two modes, ascending in duration, then in the second time.
     
-    Complete: boxes of the plane of the two free times are discarded only where a bound on derivatives proves that they
-    hold no solution, and Newton starts from all that are left. Where one ZV serves both modes (undamped, odd ratio) it is
-    listed with its two taps; where amplitudes at given times are not unique, those with the smallest sum of squares are.
+    Complete: boxes of the plane of the two free times are discarded only if a bound on derivatives proves that they contain
+    no solution, and Newton starts from all others. If one ZV cancels both modes (undamped, odd ratio), it is listed with
+    its two impulses. If amplitudes at given times are not unique, those with the smallest sum of squares are listed.
     
     Args:
         first: One mode, damped or not.
-        second: The other one, either may be the faster.
+        second: The other one; either may be the faster.
         max_duration_s: Largest duration in s, above 0, at most 100 periods of the faster mode.
-        max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1; 1 is not enough for rounding, use
-            has_negative to pick the non-negative ones.
+        max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1. Rounding may exceed 1: use
+            has_negative to select the non-negative ones.
     
     Returns:
         The shapers, residual_ratio of both modes below 1e-13; empty if there is none in the range.
@@ -7870,7 +7870,7 @@ def modal_response(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float
         damping_ratio: Damping ratios, 0 < zeta < 1, shape (n_modes,).
         inverse_mass: Residues 1/m in 1/kg, shape (n_modes,).
         quantity: "acceleration", "velocity" or "displacement".
-        hold: How the force runs between samples, as in fit_modes.
+        hold: Course of the force between samples, as in fit_modes.
     
     Returns:
         Response in SI units, shape (n,).
@@ -7882,10 +7882,10 @@ def modal_response(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float
     """
 def mzv(mode: Mode) -> Shaper:
     """
-    Modified ZV: three non-negative taps, 3/8 of the damped period apart.
+    Modified ZV: three non-negative impulses, 3/8 of the damped period apart.
     
-    Cancels the mode and the pole of the same decay at 5/3 of its damped frequency; half as long again as ZV, and without
-    damping .62 of ZV's slope at the mode.
+    Cancels the mode and the pole of the same decay at 5/3 of its damped frequency; 1.5 times as long as ZV; without
+    damping its residual has 0.62 of ZV's slope at the mode.
     
     Args:
         mode: The mode to cancel.
@@ -7924,24 +7924,24 @@ def negative_zv(mode: Mode) -> Shaper:
     """
 def path_sections(path: Path, short_mm: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> list[PathSection]:
     """
-    The whole path as runs of lines of one direction and of arcs about one centre; neighbours shorter than `short_mm` become one curve.
+    The whole path as sections: sequences of lines of one direction and of arcs about one centre. Successive sequences shorter than `short_mm` are one section of the kind `curve`.
     """
 def plan_speed(path: Path, limits: MotionLimits, tolerance: FilterTolerance = ...) -> SpeedProfile:
     """
-    Tangential speed profile over a whole path from rest to rest, with a filter behind it that must stay within its tolerance. Raises ArgumentError on a limit that is not > 0.
+    Tangential speed profile over a whole path from rest to rest; `tolerance`: the filter after the interpolation, and the deviation permitted to it. Raises ArgumentError on a limit that is not > 0.
     """
 def plan_tolerances(path: Path, shaper: Fir, options: ShapingOptions, tolerances_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> list[tuple[float, float]]:
     """
-    The time that a region takes at several contour tolerances, without giving it out.
+    Durations of a region at several contour tolerances, without its command.
     
     Args:
         path: The programmed path.
         shaper: Taps in whole block periods, common to all axes.
-        options: How the region is shaped; its own contour tolerance does not count.
-        tolerances_mm: Descending is fastest, as each search starts from the speeds of the one before; infinity: no slowing.
+        options: How the region is shaped; its own contour tolerance has no effect.
+        tolerances_mm: Descending is fastest, as each search starts from the speeds of the last one; infinity: no slowing.
     
     Returns:
-        For each tolerance the duration of the shaped command, s, and the largest deviation of what shall follow the path, mm.
+        For each tolerance the duration of the shaped command, s, and the largest deviation of the target, mm.
     
     Raises:
         ArgumentError: As RegionShaper.
@@ -7950,7 +7950,7 @@ def plant_response(command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.fl
     """
     Response of base-excited modes to a whole record of set-points, exact for set-points linear in between.
     
-    What the real-time plant of the core gives sample by sample, to the last bit, at the speed of a batch. At rest at the
+    Identical to the real-time plant of the core, to the last bit, but computed as a batch. The plant is at rest at the
     first row.
     
     Args:
@@ -7966,7 +7966,7 @@ def plant_response(command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.fl
     """
 def poles_to_modes(poles: collections.abc.Sequence[complex | typing.SupportsComplex | typing.SupportsFloat | typing.SupportsIndex], period_s: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
-    Natural frequencies and damping ratios of discrete poles: complex pairs that are stable, ascending.
+    Natural frequencies and damping ratios of discrete poles: stable complex pairs, ascending in frequency.
     
     omega = |ln lambda|/period, zeta = -Re(ln lambda)/|ln lambda|.
     
@@ -7986,22 +7986,22 @@ def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing
     """
     Ranks candidate modes by forward selection: starts for fit_modes and fit_decay from the poles of a chart.
     
-    At each step the candidate is chosen that, together with those before it, leaves the least squares; residues (of
-    decays: amplitudes and phases per record) are fitted, frequencies and damping ratios are not.
+    Each step chooses the candidate that, together with those already chosen, gives the smallest sum of squares. Residues
+    (for decays: amplitudes and phases per record) are fitted; frequencies and damping ratios are not.
     
     Args:
         responses: Response per record, each of shape (n,).
         period_s: Time between samples in s, above 0.
         omega_rad_s: Candidates, undamped natural frequencies in rad/s, shape (n_candidates,), below Nyquist.
         damping_ratio: Candidates, 0 < zeta < 1, shape (n_candidates,).
-        most: How many to choose, at least 1.
+        most: Number of candidates to choose, at least 1.
         forces: Force per record in N at the same instants; None: the records are free decays.
         quantity: "acceleration", "velocity" or "displacement"; only with forces.
-        kept: The first so many candidates are chosen before all others, in their order; handed over as fitted, they leave
-            only what is new to the rest.
+        kept: Number of candidates at the start of the list that are chosen before all others, in their order: modes
+            already fitted.
     
     Returns:
-        The ranking; shorter than asked for where no candidate explains anything more.
+        The ranking; shorter than `most` if no candidate explains anything more.
     
     Raises:
         ArgumentError: As fit_modes.
@@ -8010,19 +8010,19 @@ def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing
     """
 def rapid_samples(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel) -> numpy.ndarray:
     """
-    Set-points of a rapid, one per period, (n, 3), mm, read-only. Raises ArgumentError on an unusable model.
+    Set-points of a rapid, one per period, (n, 3), mm, read-only. Raises ArgumentError on an invalid model.
     """
 def rapid_time_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: FanucModel) -> float:
     """
-    Time of a rapid from rest to rest without the wait for in-position, s (paper 004, eq. 6 to 16). `travel_mm`: signed travel of each axis, shape (3,). Raises ArgumentError on a model that no controller can have.
+    Time of a rapid from rest to rest without the wait for in-position, s (paper 004, eq. 6 to 16). `travel_mm`: signed travel of each axis, shape (3,). Raises ArgumentError on an invalid model.
     """
 def read_linuxcnc(text: bytes, options: LinuxcncOptions) -> LinuxcncProgram:
     """
-    Executes a LinuxCNC program as its interpreter does, and writes what it executes in FANUC's words. Raises ProgramError with the file (empty: the program itself), line and column of what is not read.
+    Executes a LinuxCNC program as its interpreter does, and returns what it executes in FANUC's words. Raises ProgramError with the file (empty: the program itself), line and column of a word that is not supported.
     """
 def read_parts(parts: list, options: ReaderOptions) -> ProgramText:
     """
-    The same of a text in parts (a list of bytes); the list is empty behind it, so that the text stands in memory once.
+    Reads a program text in parts (a list of bytes). The list is emptied meanwhile, so that the text is in memory only once.
     """
 def read_program(text: bytes, options: ReaderOptions = ...) -> ProgramText:
     """
@@ -8030,7 +8030,7 @@ def read_program(text: bytes, options: ReaderOptions = ...) -> ProgramText:
     """
 def read_siemens(text: str, options: SiemensOptions) -> SiemensProgram:
     """
-    Executes a SINUMERIK program in DIN words as the control does, and writes what it executes in FANUC's words. Raises ProgramError with file, line and column of what is not read.
+    Executes a SINUMERIK program in DIN words as the control does, and returns what it executes in FANUC's words. Raises ProgramError with file, line and column of a word that is not supported.
     """
 def repeated_zv(mode: Mode, zeros: typing.SupportsInt | typing.SupportsIndex) -> Shaper:
     """
@@ -8041,7 +8041,7 @@ def repeated_zv(mode: Mode, zeros: typing.SupportsInt | typing.SupportsIndex) ->
         zeros: Zeros at the mode, 1 to 20: the residual and its first zeros-1 derivatives vanish there.
     
     Returns:
-        A shaper of zeros+1 non-negative taps, half a damped period apart.
+        A shaper of zeros+1 non-negative impulses, half a damped period apart.
     
     Raises:
         ArgumentError: `zeros` is outside its range.
@@ -8050,7 +8050,7 @@ def repeated_zv(mode: Mode, zeros: typing.SupportsInt | typing.SupportsIndex) ->
     """
 def schedule_feed(block_ends_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], kept_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], divisible: collections.abc.Sequence[bool], stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], least_length_mm: typing.SupportsFloat | typing.SupportsIndex = 0.6, most_change_mm_per_min: typing.SupportsFloat | typing.SupportsIndex = ..., resolution_mm_per_min: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> list[FeedStretch]:
     """
-    Feeds of a path in the shortest time that the stations allow: sections not shorter than the least length, each at the lowest feed of its stations. Per block its end (n,), the feed that it keeps (0: it may change) and whether it may be divided; feeds (m,) hold up to their station. Raises ArgumentError on values that do not ascend or are not above 0.
+    Feeds of a path for the shortest time within the feeds of the stations: sections not shorter than the minimum length, each at the lowest feed of its stations. Per block: its end (n,), its fixed feed (0: it may change) and whether it may be divided. Feeds (m,) are valid up to their station. Raises ArgumentError on values that do not ascend or are not above 0.
     """
 def sensitivity_curve(shaper: Shaper, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, frequencies_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> list[float]:
     """
@@ -8071,7 +8071,7 @@ def sensitivity_curve(shaper: Shaper, damping_ratio: typing.SupportsFloat | typi
     """
 def shape_path(path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> ShapedCommand:
     """
-    Split at forced stops, plan, sample on half the block grid and shape. `shaper` has its taps in whole block periods. Raises ArgumentError if the block period is no multiple of the interpolation period.
+    The shaped command of a whole region: the path is split at forced stops, planned, sampled at half the block period and shaped. `shaper` has its taps in whole block periods. Raises ArgumentError if the block period is no multiple of the interpolation period.
     """
 def simulate_blocks(blocks: Path, path: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: SimulationOptions) -> SimulationFigures:
     """
@@ -8087,7 +8087,7 @@ def simulate_path(path: Path, profile: SpeedProfile, options: SimulationOptions,
     """
 def simulate_planned(path: Path, limits: MotionLimits, options: SimulationOptions, programmed: Path) -> SimulationFigures:
     """
-    simulate_path under the profile of plan_speed, which is not kept as a whole where it need not be.
+    simulate_path with the profile of plan_speed under the limits, without storing the profile if possible.
     """
 def simulate_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], path: Path, options: SimulationOptions) -> SimulationFigures:
     """
@@ -8099,10 +8099,10 @@ def simulated_duration_s(blocks: Path, period_s: typing.SupportsFloat | typing.S
     """
 def stabilisation_poles(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_max: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None) -> list[numpy.typing.NDArray[numpy.complex128]]:
     """
-    Poles of models with 1 ... n_max modes, for a stabilisation chart and for starts. Quick.
+    Poles of models with 1 ... n_max modes, for a stabilisation chart and as starts of a fit.
     
-    All orders are read off one covariance matrix of the free decay (ESPRIT); of taps the decay is the correlation of
-    response with force, which weighs all taps.
+    All orders follow from one covariance matrix of the free decay (ESPRIT). For impacts the decay is the correlation of
+    response with force, in which each impact is weighted by its force.
     
     Args:
         responses: Response per record, each of shape (n,).
@@ -8119,29 +8119,29 @@ def stabilisation_poles(responses: collections.abc.Sequence[typing.Annotated[num
     """
 def sweep(material: Material, path: Path, tool_diameter_mm: typing.SupportsFloat | typing.SupportsIndex, *, step_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0, touch_mm: typing.SupportsFloat | typing.SupportsIndex = 0.002, progress: collections.abc.Callable | None = None) -> EngagementTrack:
     """
-    Moves a tool along a path through the material, takes away what it sweeps, and tells what it met. Samples stand at most `step_mm` apart (0: a fortieth of the diameter) and at the end of every segment; contacts less deep or wide than `touch_mm` are none. `progress` is called now and then with the distance travelled, mm. Whatever stands in the tool at the start counts as gone; a rapid is swept like any other move. Raises ArgumentError on values out of range, an arc outside of the XY plane, or if the material needs more memory than its limit.
+    Moves a tool along a path through the material, removes the swept volume and returns the engagement. Samples are at most `step_mm` apart (0: a fortieth of the diameter) and at the end of every segment; contacts less deep or less wide than `touch_mm` are ignored. `progress` is called from time to time with the distance travelled, mm. Material inside the tool at the start counts as removed; a rapid is swept like any other move. Raises ArgumentError on values out of range, an arc outside of the XY plane, or if the memory limit is exceeded.
     """
 def thin_curves(times: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], values: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.f_contiguous"], tolerances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> numpy.typing.NDArray[numpy.int64]:
     """
-    Fewer samples of curves over time, which look the same (Douglas and Peucker 1973, distance along the value).
+    Selects samples of curves over time that look the same (Douglas and Peucker 1973, distance along the value).
     
     Args:
-        times: Of the rows, (n,), rising.
+        times: Times of the rows, (n,), rising.
         values: Samples of the curves, (n, curves).
-        tolerances: How far each curve may be from a straight line between two kept samples, (curves,), above 0.
+        tolerances: Permitted distance of each curve from straight lines between selected samples, (curves,), above 0.
     
     Returns:
-        Which rows remain, rising, the first and the last among them, (k,).
+        Indices of the selected rows, ascending, including the first and the last, (k,).
     
     Raises:
-        ArgumentError: Another shape, times that do not rise, a tolerance that is not above 0, or a value that is not finite.
+        ArgumentError: Another shape, times that do not rise, a tolerance not above 0, or a value that is not finite.
     """
 def time_optimal_trajectory(path: Path | typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, max_feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], max_acceleration_mm_per_s2: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], max_jerk_mm_per_s3: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = 0.05, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | None = None, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> numpy.ndarray:
     """
     Set-points of a whole path from rest to rest, nearly as fast as the limits of every axis allow.
     
-    Junctions are rounded within the tolerance, jerk is limited, and the motion rests at segments with `stop_at_end`. Limits
-    hold for the differences of the set-points (1.001); programmed feeds are kept. Bit for bit the set-points of a
+    Junctions are rounded within the tolerance, jerk is limited, and the motion rests at segments with `stop_at_end`. The
+    differences of the set-points keep the limits to a factor of 1.001, and the programmed feeds. Bit for bit those of a
     `MotionController` without filters that is given all segments at once. See docs/concepts/time_optimal.md.
     
     Args:
@@ -8149,32 +8149,32 @@ def time_optimal_trajectory(path: Path | typing.Annotated[numpy.typing.ArrayLike
         max_feed_mm_per_s: Limit of every axis, mm/s: a number for all, or one for each, shape (3,).
         max_acceleration_mm_per_s2: Likewise, mm/s^2.
         max_jerk_mm_per_s3: Likewise, mm/s^3.
-        contour_tolerance_mm: By which the path may be left where its direction or curvature jumps, mm; 0: rest there.
-        feed_mm_per_s: Feed along the polyline through points, mm/s; None: as fast as the axes can be.
-        period_s: Between two set-points, s.
+        contour_tolerance_mm: Permitted deviation where direction or curvature of the path jumps, mm; 0: stop there.
+        feed_mm_per_s: Feed along the polyline through points, mm/s; None: as fast as the limits allow.
+        period_s: Time between two set-points, s.
     
     Returns:
-        Set-points, (n_samples, 3), mm, read-only: the start first, the end to the last bit last.
+        Set-points, (n_samples, 3), mm, read-only; the first is the start, the last exactly the end.
     
     Raises:
-        ArgumentError: A limit or a period that is not above zero and finite, a tolerance below zero, a segment without feed.
+        ArgumentError: A limit or period that is not above zero and finite, a tolerance below zero, a segment without feed.
         NumericError: The limits cannot be kept.
     """
 def time_program(program: ProgramText, model: FanucModel, per_block: bool = False) -> CycleTime:
     """
-    Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in look-ahead. Raises ArgumentError on a model that no controller can have.
+    Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in look-ahead. Raises ArgumentError on an invalid model.
     """
 def travel_blocks(blocks: Path, along: Path, block_end: BlockEnd, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
     """
-    How blocks at their feed are travelled, followed along `along`; else as travel_path.
+    Actual speeds of blocks at their feed, followed along `along`, from which they were made; else as travel_path.
     """
 def travel_path(path: Path, profile: SpeedProfile, along: Path, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
     """
-    How a path under a speed profile is travelled, followed along another one of which it is made, or along itself; `stations_mm` (n,) ascend to the length of that, `filters` stand behind the set-points, speeds are taken over `window_s`. Raises ArgumentError on stations that do not ascend.
+    Actual speeds of a path under a speed profile, followed along `along`, the same path or the one from which it was made. `stations_mm` (n,) ascend to the length of `along`; `filters` act after the set-points; speeds are averaged over `window_s`. Raises ArgumentError on stations that do not ascend.
     """
 def wall_error_um(force: MillingForce, beam: ToolBeam, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, side: WallSide, height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     """
-    Form error of the wall across itself at heights above the tip (paper 001, section 2.3).
+    Form error perpendicular to the wall at heights above the tip (paper 001, section 2.3).
     
     Args:
         force: The force model.
@@ -8186,14 +8186,14 @@ def wall_error_um(force: MillingForce, beam: ToolBeam, arcs: typing.Annotated[nu
         tolerance_rad: An arc that ends this close to +-pi/2 reaches the wall.
     
     Returns:
-        (n,), um: + material is left standing, - the wall is cut too deep; NaN where the engagement does not reach it.
+        (n,), um: + material is left, - the wall is cut too deep; NaN where the engagement does not reach it.
     
     Raises:
         ArgumentError: A height below the tip, or an engagement above the overhang.
     """
 def wall_errors_um(force: MillingForce, beam: ToolBeam, track: EngagementTrack, feed_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], side: WallSide, height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> numpy.ndarray:
     """
-    The same along a track, a feed for each sample: (n_samples, n_heights), um, read-only. Raises ArgumentError as wall_error_um, and on another number of feeds.
+    wall_error_um along a track, with a feed for each sample: (n_samples, n_heights), um, read-only. Raises ArgumentError as wall_error_um, and on another number of feeds.
     """
 def wilson_theta(mass_kg: typing.SupportsFloat | typing.SupportsIndex, damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex, force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, displacement_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
@@ -8205,7 +8205,7 @@ def wilson_theta(mass_kg: typing.SupportsFloat | typing.SupportsIndex, damping_n
         stiffness_n_per_m: Stiffness, above 0.
         force_n: Force in N, shape (n,).
         period_s: Time between samples in s, above 0.
-        theta: Section of the step over which the acceleration is linear, at least 1; stable from 1.37 on.
+        theta: Number of periods over which the acceleration is linear, at least 1; stable from 1.37 on.
         displacement_m: At the first sample.
         velocity_m_per_s: At the first sample.
     
@@ -8242,11 +8242,11 @@ def worst_residual(shaper: Shaper, mode: Mode, lowest_hz: typing.SupportsFloat |
     """
 def write_blocks(blocks: FittedBlocks, start: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"], marks: collections.abc.Sequence[BlockMark], options: WriterOptions) -> tuple[bytes, int, int]:
     """
-    (text as bytes, motion code, plane) of fitted blocks; `start` in increments.
+    Text of fitted blocks: (bytes, modal motion code after it, modal plane after it); `start` in increments.
     """
 def write_feeds(program: ProgramText, region: Region, stretches: collections.abc.Sequence[FeedStretch], options: FeedWriterOptions) -> RefedRegion:
     """
-    The region's lines with the feeds of sections that cover its path; what else stands in them stays. Raises ArgumentError if they do not cover it, or end within a block that cannot be divided.
+    The region's lines with the feeds of sections that cover its path; everything else in them does not change. Raises ArgumentError if they do not cover it, or end within a block that cannot be divided.
     """
 def zv(mode: Mode | typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Shaper:
     """
@@ -8266,11 +8266,11 @@ def zv(mode: Mode | typing.SupportsFloat | typing.SupportsIndex, damping_ratio: 
     """
 def zv_on_grid(mode: Mode, period_s: typing.SupportsFloat | typing.SupportsIndex) -> Shaper:
     """
-    ZV with impulses at multiples of a period only: the second one split between the two around it.
+    ZV with impulses at multiples of a period only; the second one is divided between two neighbours.
     
     Args:
         mode: The mode to cancel.
-        period_s: Of the grid in s, above 0, at most a quarter of the damped period.
+        period_s: Period of the grid in s, above 0, at most a quarter of the damped period.
     
     Returns:
         A shaper with 3 non-negative impulses, 2 where half the damped period is a multiple; residual exactly zero at the

@@ -1,4 +1,4 @@
-"""All errors of shapegcode that the user can correct, derived from :class:`ShapegcodeError`.
+"""Errors of shapegcode, derived from :class:`ShapegcodeError`; the user can correct all but :class:`RoundTripError`.
 
 From the core: :class:`ArgumentError`, :class:`DesignError`, :class:`NumericError`, :class:`ProgramError`. From settings
 files: :class:`MachineError`, :class:`ToolError`, :class:`StockError`, :class:`RunsFileError`. From measured
@@ -29,7 +29,7 @@ class Problem:
     """One error in a settings file.
 
     Attributes:
-        key: dotted name of the key, for example ``axes.x.max_feed_mm_per_min``; empty if the file is bad.
+        key: dotted name of the key, for example ``axes.x.max_feed_mm_per_min``; empty: no single key.
         value: the offending value as written in TOML; empty for a missing key.
         limit: rule for the value.
         line: line number in the file, None if unknown.

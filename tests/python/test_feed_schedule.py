@@ -111,6 +111,17 @@ def test_the_feed_that_the_machine_runs_keeps_the_limit(time_constant_s: float) 
     assert (speed <= plan.limit_mm_per_min[at] / (1.0 - result.margin) ** (1.0 / 0.85)).mean() > 0.995
 
 
+def test_arcs_with_absolute_centres_are_scheduled_as_those_with_distances(corner: sg.FeedSchedule) -> None:
+    """Emitted arcs have positions of centres as the original has: the same machine reads them back."""
+    machine = sg.Machine.load("vx500").with_values({"input.arc_centre": "absolute"})
+    absolute = scheduled(CORNER.replace("R4.", "I4. J8."), machine=machine)
+    emitted = absolute.text.decode()
+    assert set(re.findall(r"I[-.\d]+ ?J[-.\d]+", emitted)) == {"I4. J8.", "I4.J8."}
+    assert re.findall(r"F[\d.]+", emitted) == re.findall(r"F[\d.]+", corner.text.decode())
+    again = sg.Program.from_text(emitted, machine)
+    assert again.regions[0].path.length_mm == pytest.approx(corner.written.regions[0].path.length_mm)
+
+
 def test_air_is_crossed_faster_but_not_up_to_the_material() -> None:
     text = "%\nG90 G54 G17 G21\nT1 M06\nS3000 M03\nG00 X-20. Y-12. Z-5.\nG01 X50. F300.\nM30\n%\n"
     fast = tool("resultant_n = 1000", "air_feed_mm_per_min = 3000\napproach_mm = 2.0")

@@ -112,6 +112,10 @@ def test_a_simple_machine() -> None:
     assert [mode.frequency_hz for mode in machine.axes.y.modes] == [131.0, 200.0]
     assert machine.axes.z.modes == ()
     assert sg.convert(TEXT, machine).machine == "simple"
+    assert machine.to_toml().count("max_acceleration_mm_s2 = 3000.0  # assumed") == 3
+    stated = sg.Machine.simple(modes={"x": 46}, max_acceleration_mm_per_s2=2000.0)
+    assert stated.axes.x.max_acceleration_mm_s2 == 2000.0
+    assert "max_acceleration_mm_s2 = 2000.0  # assumed" not in stated.to_toml()
     with pytest.raises(sg.ArgumentError, match="'a' is not an axis"):
         sg.Machine.simple(modes={"a": 46})
     with pytest.raises(sg.MachineError, match="frequency_hz"):

@@ -13,7 +13,7 @@ import shapegcode as sg
 from command import run
 from edge_writer import MEASURED, edge_document, write_edge
 from shapegcode import _core
-from shapegcode.identification.servo.fit import delayed, lag_way
+from shapegcode.identification.servo.fit import delayed, lagged_motion
 
 FloatArray = NDArray[np.float64]
 PERIOD_S = 0.002
@@ -51,7 +51,7 @@ def capture(path: Path, axes: dict[int, tuple[FloatArray, FloatArray]], noise: f
 def test_the_lag_on_a_ramp_is_its_closed_form_and_that_of_the_core() -> None:
     time = PERIOD_S * np.arange(400)
     ramp = np.where(time > 0.1, 80.0 * (time - 0.1), 0.0)
-    error = lag_way(ramp, 30.0, PERIOD_S)
+    error = lagged_motion(ramp, 30.0, PERIOD_S)
     behind = time > 0.1
     # v/K (1 − e^(−K t)) behind the start of the ramp, which lies on a sample.
     assert error[behind] == pytest.approx(80.0 / 30.0 * (1.0 - np.exp(-30.0 * (time[behind] - 0.1))), abs=1e-9)
@@ -64,13 +64,13 @@ def test_the_lag_on_a_ramp_is_its_closed_form_and_that_of_the_core() -> None:
         core.step(np.full(3, place))
         errors.append(np.array(core.error_mm))
     for axis, (gain, rest) in enumerate(((30.0, 0.8), (60.0, 1.0), (90.0, 0.1))):
-        assert rest * lag_way(way, gain, PERIOD_S) == pytest.approx(np.array(errors)[:, axis], abs=1e-9)
+        assert rest * lagged_motion(way, gain, PERIOD_S) == pytest.approx(np.array(errors)[:, axis], abs=1e-9)
     # An axis that runs when the record begins lags v/K from its first sample on.
-    assert lag_way(5.0 * time, 30.0, PERIOD_S) == pytest.approx(5.0 / 30.0, abs=1e-12)
+    assert lagged_motion(5.0 * time, 30.0, PERIOD_S) == pytest.approx(5.0 / 30.0, abs=1e-12)
     # The command 2.25 samples later, in steps of a quarter of a sample: the same polygon, so the same error.
     fine = np.interp(np.arange(4 * len(way)) / 4.0, np.arange(len(way)), way)
-    quarters = lag_way(fine, 30.0, PERIOD_S / 4.0)
-    assert lag_way(way, 30.0, PERIOD_S, 2.25)[3:] == pytest.approx(quarters[3:1191:4], abs=1e-9)
+    quarters = lagged_motion(fine, 30.0, PERIOD_S / 4.0)
+    assert lagged_motion(way, 30.0, PERIOD_S, 2.25)[3:] == pytest.approx(quarters[3:1191:4], abs=1e-9)
     assert delayed(5.0 * time, 2.25) == pytest.approx(5.0 * (time - 2.25 * PERIOD_S), abs=1e-12)
 
 

@@ -25,7 +25,7 @@ class Column {
     return blocks_[i / block_size][i % block_size];
   }
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  /// Frees the unused memory: in a short column it may be as much as the used.
+  /// Frees the unused memory, which in a short column may be as large as the used memory.
   void fit() {
     if (!blocks_.empty()) blocks_.back().shrink_to_fit();
   }
@@ -43,7 +43,7 @@ class Column {
   std::size_t forgotten_ = 0;  // blocks
 };
 
-/// The same for values that seldom change: a block of identical values, to the bit, takes the memory of one.
+/// A growing array of values that seldom change: a block of bit-identical values takes the memory of one value.
 template <typename Value>
 class SteadyColumn {
  public:

@@ -25,26 +25,26 @@ enum class ContourTarget {
 /// What plans the command of a motion from rest to rest before it is shaped.
 enum class CommandPlanner : std::uint8_t {
   look_ahead,    ///< `plan_speed`: ramps along the path, corners passed slowly
-  time_optimal,  ///< `time_optimal_motion`: corners rounded within the contour tolerance, jerk of every axis kept
+  time_optimal,  ///< `time_optimal_motion`: corners rounded within the contour tolerance, jerk of every axis limited
 };
 
-/// The kernel from a command before shaping to the motion that is to follow the path, at delays 0, 1, ... samples of
-/// `period_s`: the shaper's taps alone, or followed by an axis' modes under a command that is linear between samples.
-/// If the shaper cancels the modes, the kernel is hardly longer than the shaper. Otherwise its tail is cut off where
-/// less than 1e-4 of it remains, or at four times the shaper, and the outer taps are adjusted to keep the shaper's sum
-/// and mean delay. `of`: the axis that moves, with its modes, and the axis whose command is shaped. If they differ, the
-/// kernel is the response of the modes that the commanded axis excites, and empty without any. Throws Error(argument)
-/// as ModalPlant does. Source: this project.
+/// Axes of a kernel: the axis that moves, with its modes, and the axis whose command is shaped.
 struct KernelAxes {
   std::size_t moved = 0;
   std::size_t commanded = 0;
 };
+/// The kernel from a command before shaping to the motion that is to follow the path, at delays 0, 1, ... samples of
+/// `period_s`: the shaper's taps alone, or followed by an axis' modes under a command that is linear between samples.
+/// If the shaper cancels the modes, the kernel is hardly longer than the shaper. Otherwise its tail is cut off where
+/// less than 1e-4 of it remains, or at four times the shaper's duration, and the outer taps are adjusted to keep the
+/// shaper's sum and mean delay. If the two axes differ, the kernel is the response of the modes that the commanded axis
+/// excites, and empty without any. Throws Error(argument) as ModalPlant does. Source: this project.
 [[nodiscard]] std::vector<double> contour_kernel(const Fir& shaper, std::span<const Mode> modes, double period_s,
                                                  ContourTarget target, KernelAxes of = {});
 
 /// Finds, for one axis, the correction c of a command before shaping that brings the shaped command (or the plant's
 /// response to it) back to the programmed path: it minimises |e + f*c|^2 + sum_k w_k (c_k - 2 c_{k-1} + c_{k-2})^2,
-/// where f is that kernel (see contour_kernel) and e the deviation without correction.
+/// where f is the kernel (see contour_kernel) and e the deviation without correction.
 ///
 /// The error is summed as far as the correction acts, so the normal matrix is a banded Toeplitz matrix whatever the
 /// length of the window. Its Cholesky factor is computed once, until its rows no longer change; every window then costs
@@ -95,7 +95,7 @@ struct ShapingOptions {
   double plunge_corner_angle_rad = 0.78;
   /// Ascending indices of segments, above 0, before which the command also stops, as at a forced stop.
   std::vector<std::uint32_t> further_stops;
-  double rest_at_stop_s = 0.0;  ///< pause at a forced stop, until the control's filter is at rest
+  double rest_at_stop_s = 0.0;  ///< pause at a forced stop, until the filters after interpolation are at rest
   /// Which motion contour compensation brings back to the path. With a target, the feed is the highest that keeps
   /// `tolerance.contour_tolerance_mm`; without one, `tolerance` bounds the speed at corners and on arcs.
   ContourTarget target = ContourTarget::none;
@@ -111,15 +111,15 @@ struct ShapingOptions {
   /// Ratio by which the shaped command may exceed the programmed feed along the path, > 0. The contour correction keeps
   /// it. The speed is lowered for a slower programmed feed early enough that the shaper's output reaches it in time.
   double feed_excess_ratio = MotionLimits::none;
-  /// Weight of the correction's second differences on half the block grid. A smaller weight follows the path more
-  /// closely and excites more at frequencies beside the modes: docs/concepts/contour.md.
+  /// Weight of the correction's second differences on a grid of half the block period. A smaller weight follows the
+  /// path more closely and excites more at frequencies beside the modes: docs/concepts/contour.md.
   double contour_smoothness = 0.4;
 };
 
 /// A region's command, shaped and on the block grid, ready for fit_blocks.
 struct ShapedCommand {
   std::uint32_t first_period = 0;       ///< periods of the region before this part
-  Eigen::MatrixXd grid_mm;              ///< (n+1, 3) at k*T_B
+  Eigen::MatrixXd grid_mm;              ///< (n+1, 3) at multiples of the block period
   Eigen::MatrixXd middle_mm;            ///< (n, 3) half a period later
   std::vector<std::int8_t> arc_normal;  ///< (n) see fit_blocks
   std::vector<std::uint32_t> run_ends;  ///< periods, of this part, at which the command is at rest

@@ -38,7 +38,7 @@ inline constexpr std::size_t compared_kinds = 20;
 struct ComparisonOptions {
   ReaderOptions reader;                     ///< with which both programs were read
   std::vector<std::string> emission_lines;  ///< capitals without blanks
-  double joint_path_mm = 0.0;               ///< cuts of different lengths are equal within it, compared in parallel
+  double joint_path_mm = 0.0;  ///< cuts are also the same if their paths, followed in parallel, are within it
 };
 
 /// One difference. Lines are those of the sources; 0: the program has nothing there.
@@ -46,7 +46,7 @@ struct ProgramDifference {
   ComparedKind kind = ComparedKind::cuts;
   std::uint32_t original_line = 0;
   std::uint32_t emitted_line = 0;
-  std::string original;  ///< its contents, with the file if that is a called one; empty: none
+  std::string original;  ///< its contents, with the file if they are in a called one; empty: none
   std::string emitted;
   double distance_mm = 0.0;  ///< of paths
 };

@@ -65,7 +65,7 @@ using AxisShapers = std::variant<Fir, std::vector<Fir>>;
 /// Settings of a control. Its set-points keep every finite limit of speed, acceleration and jerk.
 struct ControllerSettings {
   double period_s = 0.001;
-  /// Of X, Y and Z, with the rules for corners. A finite jerk requires a finite acceleration. Its feed override, at
+  /// Of X, Y and Z, with the rules for corners. A finite jerk requires a finite acceleration. Its `feed_override`, at
   /// most 2, is the initial one; plans are valid for any later one. Under the constant-time law ramps are as steep as
   /// the time constant allows, but short ramps are not lengthened to it.
   MotionLimits limits;
@@ -74,7 +74,7 @@ struct ControllerSettings {
   /// Permitted deviation from the path by corner rounding, smoothing and shaper. 0: corners are exact stops; none:
   /// corners are rounded up to the middle between neighbours, and smoothing and shaper may deviate without limit.
   double contour_tolerance_mm = 0.05;
-  /// Length of each of two moving averages for every axis; 0 = none, as rounded corners need none.
+  /// Duration of each of two moving averages for every axis; 0 = none, as rounded corners need none.
   double smoothing_time_s = 0.0;
   /// A shaper that depends on an axis uses its position before the smoothing. Its changes use up to a quarter of
   /// acceleration and jerk, and limit the feed where that is not enough.
@@ -93,7 +93,7 @@ struct ControllerSettings {
   /// and includes the window.
   std::size_t window = 128;
   std::size_t queue = 1024;
-  /// True: step() also plans, when the planned motion runs out; for simulations and tests, which have no clock. False:
+  /// True: step() also plans, when the planned motion runs out; for simulations and tests, not in real time. False:
   /// another thread calls plan(), `lead_periods` ahead of the motion; for a real-time control.
   bool plans_in_step = true;
   int lead_periods = 60;
@@ -101,7 +101,7 @@ struct ControllerSettings {
   std::vector<AxisTravel> travel;
   /// Of each axis, or empty. The limits of the path are reduced by them.
   std::vector<OffsetLimits> offset;
-  /// Maximum of each axis, for emergency_stop(); empty: it decelerates as abort() does.
+  /// Maximum acceleration of each axis, for emergency_stop(); empty: it decelerates as abort() does.
   std::vector<double> emergency_acceleration;
   /// Periods of motion stored for retrace(), some 150 bytes each.
   std::size_t retrace_periods = 0;
@@ -137,7 +137,7 @@ enum class PushResult : std::uint8_t {
   wrong_axes,     ///< not as many following axes as the settings have
   aborted,        ///< after abort() nothing is accepted until restart()
   flushing,       ///< between flush() and flushed() nothing is accepted
-  no_time,        ///< a dwell below zero, above 1e6 s, or no number
+  no_time,        ///< a dwell below zero, above 1e6 s, or not a number
   beyond_travel,  ///< it leads out of the travel of an axis
   bad_limit,      ///< a limit of the segment that is not above zero
   not_straight,   ///< synchronous with the spindle, but not a line
@@ -194,8 +194,8 @@ struct ControllerState {
   std::uint64_t steps = 0;
   std::uint64_t starvations = 0;       ///< how often the queue ran empty
   std::uint64_t late_plans = 0;        ///< how often the motion slowed down because no section was planned in time
-  double set_point_distance_mm = 0.0;  ///< `distance_mm` and `line` of the last set-point, which has come
-  std::uint64_t set_point_line = 0;    ///< through smoothing and shaper: `delay_periods()` later, rounded
+  double set_point_distance_mm = 0.0;  ///< `distance_mm` at the last set-point, which lags by `delay_periods()`
+  std::uint64_t set_point_line = 0;    ///< `line` at the last set-point, likewise
   std::uint64_t travel_stops = 0;      ///< how often the control was held because the path would have left the travel
   double spindle_speed = 0.0;          ///< revolutions per s
   double spindle_error_mm = 0.0;       ///< of a synchronous segment: the motion less that required by the spindle angle
@@ -251,7 +251,7 @@ class MotionController {
   /// The same for rapids, on which the feed override has no effect. 0 stops a rapid.
   void rapid_override(double ratio) noexcept;
   /// Spindle position in this period, in continuously counted revolutions (encoder counts over counts per revolution);
-  /// from the stepping thread, before every step. Feeds per revolution follow its speed in steps of .5 % and stop when
+  /// from the stepping thread, before every step. Feeds per revolution follow its speed in steps of 0.5 % and stop when
   /// it stops; a synchronous segment begins at a whole revolution.
   void spindle(double revolutions) noexcept;
   /// Decelerates to rest along the path, beginning after 32 periods or an eighth of the lead at the latest; resume()

@@ -9,12 +9,12 @@ namespace shapegcode {
 /// A note about a line of a program for another control.
 struct SourceNote {
   std::uint32_t line = 0;  ///< of the source, from 1
-  std::string text;        ///< one sentence, with both meanings where a word means another thing on FANUC
+  std::string text;        ///< one sentence, with both meanings of a word that has another one on FANUC
 };
 
 /// A program for another control, translated into FANUC's words: loops, calls and expressions are executed, numbers
-/// have a point where a unit hangs on them, I J K are distances from the start, dwells are G04 X in seconds. It begins
-/// and ends with a line `%`.
+/// have a decimal point where their unit depends on it, I J K are distances from the start, dwells are G04 X in
+/// seconds. It begins and ends with a line `%`.
 struct ExpandedProgram {
   std::string text;
   std::vector<std::uint32_t> lines;  ///< for each line of the text, from 0, the line of the source, from 1

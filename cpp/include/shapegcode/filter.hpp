@@ -34,7 +34,7 @@ class Fir {
   [[nodiscard]] int duration_samples() const noexcept;
   /// First moment of the taps in samples: the mean delay.
   [[nodiscard]] double mean_samples() const noexcept;
-  /// Second central moment of the taps in samples^2: the contour cost (dR/R = variance*(v/R)^2/2 on a circle).
+  /// Second central moment of the taps in samples^2; radius error of a circle: dR/R = variance*(v/R)^2/2.
   [[nodiscard]] double variance_samples2() const noexcept;
 
   /// The same taps on a grid `factor` times as fine. Throws Error(argument) on factor < 1 or a delay beyond 1e8
@@ -106,7 +106,7 @@ class VaryingFir {
   [[nodiscard]] int duration_samples() const noexcept;
   /// Mean delay, the average of the set, in samples.
   [[nodiscard]] double mean_samples() const noexcept;
-  /// Largest second central moment of the set in samples^2: the contour cost.
+  /// Largest second central moment of the set in samples^2.
   [[nodiscard]] double variance_samples2() const noexcept;
   /// The same set on a grid `factor` times as fine. Throws Error(argument) on factor < 1.
   [[nodiscard]] VaryingFir on_finer_grid(int factor) const;
@@ -163,7 +163,7 @@ class VaryingFirStream {
 class FollowingFir {
  public:
   /// Filter k of `fir` is valid where axis `axis` (0, 1, 2) is at `position_mm[k]`; in between the increments are
-  /// divided, beyond the ends the last filter is valid. Throws Error(argument) on an invalid axis, a number of
+  /// divided, beyond the ends the nearest filter is valid. Throws Error(argument) on an invalid axis, a number of
   /// positions other than that of filters, or positions that are not finite and strictly ascending.
   FollowingFir(VaryingFir fir, int axis, std::vector<double> position_mm);
 

@@ -28,8 +28,8 @@ struct MotionLimits {
   static constexpr double none = std::numeric_limits<double>::infinity();
 
   AccelerationLaw law = AccelerationLaw::constant_time;
-  double time_constant_s = 0.05;  ///< constant_time: length of a ramp from rest to the programmed feed
-  double jerk_time_s = 0.0;       ///< length of the smoothing of the acceleration; 0 = none
+  double time_constant_s = 0.05;  ///< constant_time: duration of a ramp from rest to the programmed feed
+  double jerk_time_s = 0.0;       ///< duration of the smoothing of the acceleration; 0 = none
   Vector3 max_feed_mm_per_s = Vector3::Constant(none);
   Vector3 max_acceleration_mm_per_s2 = Vector3::Constant(none);
   Vector3 max_jerk_mm_per_s3 = Vector3::Constant(none);

@@ -88,7 +88,7 @@ class Path {
   [[nodiscard]] Segments segments() const noexcept;
   [[nodiscard]] std::size_t size() const noexcept { return data_ ? data_->feeds.size() : 0; }
   [[nodiscard]] Segment operator[](std::size_t i) const noexcept;
-  /// Distance of segment i's start from the path's start; `distance(size())` is the whole length.
+  /// Distance of segment i's start from the path's start; `distance_mm(size())` is the whole length.
   [[nodiscard]] double distance_mm(std::size_t i) const noexcept { return data_->nodes[i].distance_mm; }
   [[nodiscard]] double length_mm() const noexcept { return size() == 0 ? 0.0 : distance_mm(size()); }
   // Single values of segment i.

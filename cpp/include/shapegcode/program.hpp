@@ -202,7 +202,7 @@ struct Program {
   std::vector<LineOrigin> origins;            ///< one per line of `text`; empty if not expanded
   std::vector<std::string> files;             ///< names; the first is empty: the program's own file
   std::vector<std::int64_t> program_numbers;  ///< all O numbers in the file
-  std::vector<std::size_t> called;            ///< programs of the file called by others, as `list_programs` counts
+  std::vector<std::size_t> called;            ///< programs of the file called by others, as indices in `list_programs`
   std::vector<Finding> alarms;                ///< with ReaderOptions::collect_alarms
   std::map<int, double> expanded_radii_mm;    ///< D number -> radius, if cutter compensation was expanded
   std::uint32_t compensated_moves = 0;        ///< cutting moves under G41/G42 that were expanded

@@ -52,11 +52,11 @@ typedef enum shapegcode_status {
   SHAPEGCODE_NOT_CONNECTED = 2,    ///< it does not start where the one before ended
   SHAPEGCODE_NO_LENGTH = 3,        ///< it moves no axis by more than 1e-9 mm or degrees
   SHAPEGCODE_NO_FEED = 4,          ///< a feed that is not above zero, or not finite
-  SHAPEGCODE_NOT_FINITE = 5,       ///< a position, centre or sweep is no number
+  SHAPEGCODE_NOT_FINITE = 5,       ///< a position, centre or sweep is not finite
   SHAPEGCODE_WRONG_AXES = 6,       ///< not as many following axes as the settings have
   SHAPEGCODE_AFTER_ABORT = 7,      ///< nothing is accepted between abort and restart
   SHAPEGCODE_NO_ARC = 8,           ///< no radius, no sweep, no such plane, or the sweep does not lead to the end
-  SHAPEGCODE_NO_TIME = 9,          ///< a dwell below zero, above 1e6 s, or no number
+  SHAPEGCODE_NO_TIME = 9,          ///< a dwell below zero, above 1e6 s, or not a number
   SHAPEGCODE_FLUSHING = 10,        ///< between flush and flushed nothing is accepted
   SHAPEGCODE_BEYOND_TRAVEL = 11,   ///< it leads out of the travel of an axis
   SHAPEGCODE_BAD_LIMIT = 12,       ///< a limit of the rules is not above zero
@@ -103,7 +103,7 @@ typedef enum shapegcode_number {
   SHAPEGCODE_PERIOD_S = 1,
   SHAPEGCODE_FOLLOWING_AXES = 2,        ///< axes that follow X, Y and Z, 0 to 6
   SHAPEGCODE_CONTOUR_TOLERANCE_MM = 3,  ///< of rounded corners, smoothing and shaper
-  SHAPEGCODE_SMOOTHING_TIME_S = 4,      ///< length of each of two moving averages; 0: none
+  SHAPEGCODE_SMOOTHING_TIME_S = 4,      ///< duration of each of two moving averages; 0: none
   SHAPEGCODE_CONTOUR_CORRECTION = 5,    ///< 1: compensate the radius error of arcs by smoothing and shaper
   SHAPEGCODE_WINDOW = 6,                ///< segments in the look-ahead window, 8 at least
   SHAPEGCODE_QUEUE = 7,          ///< segments in the whole queue, including the window; rounded up to a power of two
@@ -148,19 +148,19 @@ typedef struct shapegcode_shaper {
   size_t count;
 } shapegcode_shaper;
 
-/// No limits, no shaper, 1 ms, a contour tolerance of 0.05 mm. NULL: out of memory.
+/// Creates settings: no limits, no shaper, 1 ms, a contour tolerance of 0.05 mm. NULL: out of memory.
 shapegcode_settings* shapegcode_settings_create(void);
 
-/// NULL is allowed.
+/// Frees settings; NULL is allowed.
 shapegcode_status shapegcode_settings_destroy(shapegcode_settings* settings);
 
-/// SHAPEGCODE_ERROR_ARGUMENT: there is no such number, or the value has the wrong kind; create checks the range.
+/// Sets a number. SHAPEGCODE_ERROR_ARGUMENT: no such number, or a value of the wrong kind; create checks the range.
 shapegcode_status shapegcode_settings_set(shapegcode_settings* settings, int number, double value);
 
 /// Likewise for an axis: 0 to 2, or 3 and more for following axes.
 shapegcode_status shapegcode_settings_set_axis(shapegcode_settings* settings, int number, int axis, double value);
 
-/// A shaper for all axes (`axis` -1) or for one; copied.
+/// Sets the shaper of all axes (`axis` -1) or of one; copied.
 shapegcode_status shapegcode_settings_set_shaper(shapegcode_settings* settings, int axis,
                                                  const shapegcode_shaper* shaper);
 
@@ -169,7 +169,7 @@ shapegcode_status shapegcode_settings_set_shaper(shapegcode_settings* settings, 
 shapegcode_status shapegcode_settings_add_shapers(shapegcode_settings* settings, const shapegcode_shaper* shapers,
                                                   size_t count);
 
-/// Shapers for all axes, each valid where `axis` (0 to 2) is at its position, mm, ascending; copied.
+/// Sets shapers of all axes, each valid where `axis` (0 to 2) is at its position, mm, ascending; copied.
 shapegcode_status shapegcode_settings_set_following_shaper(shapegcode_settings* settings, int axis,
                                                            const double* positions_mm, const shapegcode_shaper* shapers,
                                                            size_t count);
@@ -189,8 +189,8 @@ typedef struct shapegcode_state {
   uint64_t starvations;          ///< how often the queue ran empty
   uint64_t late_plans;           ///< how often the motion slowed down because no section was planned in time
   uint64_t travel_stops;         ///< how often the control was held because the path would have left the travel
-  double set_point_distance_mm;  ///< `distance_mm` and `line` of the last set-point, which has come through
-  uint64_t set_point_line;       ///< smoothing and shaper: shapegcode_controller_delay() periods later, rounded
+  double set_point_distance_mm;  ///< `distance_mm` at the last set-point, which lags by shapegcode_controller_delay()
+  uint64_t set_point_line;       ///< `line` at the last set-point, likewise
   double spindle_speed;          ///< revolutions per s
   double spindle_error_mm;       ///< of a synchronous segment: the motion less that required by the spindle angle
   double offset[SHAPEGCODE_MOST_AXES];  ///< of the axes, before smoothing and shaper
@@ -240,7 +240,7 @@ typedef struct shapegcode_rules {
   double max_jerk;
 } shapegcode_rules;
 
-/// Line 0, no stop, a feed per s along the path, no limits. `struct_size` is sizeof(shapegcode_rules).
+/// Sets line 0, no stop, a feed per s along the path, no limits. `struct_size` is sizeof(shapegcode_rules).
 shapegcode_status shapegcode_rules_init(shapegcode_rules* rules, size_t struct_size);
 
 /// Appends a straight move from the end of the previous segment (at first: from the position of create or restart) to
@@ -309,7 +309,7 @@ shapegcode_status shapegcode_controller_spindle(shapegcode_controller* controlle
 /// Decelerates to rest along the path.
 shapegcode_status shapegcode_controller_hold(shapegcode_controller* controller);
 
-/// Continues after hold.
+/// Continues after hold or a programmed stop.
 shapegcode_status shapegcode_controller_resume(shapegcode_controller* controller);
 
 /// Decelerates to rest along the path and discards the rest of it; at rest, flushed lets new segments start there.
@@ -352,11 +352,11 @@ shapegcode_status shapegcode_controller_travel(shapegcode_controller* controller
 /// plans or steps.
 shapegcode_status shapegcode_controller_restart(shapegcode_controller* controller, const double* position);
 
-/// `struct_size` is sizeof(shapegcode_state).
+/// Returns a snapshot. `struct_size` is sizeof(shapegcode_state).
 shapegcode_status shapegcode_controller_state(const shapegcode_controller* controller, shapegcode_state* state,
                                               size_t struct_size);
 
-/// Mean delay of correction, smoothing and shaper.
+/// Mean delay of correction, smoothing and shaper in periods.
 shapegcode_status shapegcode_controller_delay(const shapegcode_controller* controller, double* periods);
 
 #ifdef __cplusplus

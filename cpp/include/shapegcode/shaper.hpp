@@ -29,7 +29,7 @@ struct Shaper {
 /// First moment sum A_k t_k in s: the mean delay of the shaped command.
 [[nodiscard]] double mean_s(const Shaper& shaper);
 
-/// Second central moment sum A_k (t_k - mean)^2 in s^2: the contour cost, dR/R = variance*(v/R)^2/2 on a circle of
+/// Second central moment sum A_k (t_k - mean)^2 in s^2; radius error dR/R = variance*(v/R)^2/2 on a circle of
 /// radius R at speed v. May be negative where amplitudes are.
 [[nodiscard]] double variance_s2(const Shaper& shaper);
 
@@ -67,8 +67,8 @@ inline constexpr double grid_largest_residual = 1e-10;
 /// `grid_largest_residual`. Source: this project.
 [[nodiscard]] Shaper grid_polynomial(std::span<const Mode> modes, double period_s);
 
-// One declaration here and one definition in families.cpp per family; those with a tolerated residual are in
-// extra_insensitive.hpp.
+// One declaration here and one definition in families.cpp per family; extra_insensitive() is in
+// extra_insensitive.cpp.
 
 /// Zero-vibration shaper of one mode: impulses at 0 and half the damped period, amplitudes 1/(1+K) and K/(1+K) with K =
 /// exp(-zeta*pi/sqrt(1-zeta^2)). Throws Error(argument) as `pole` does. Source: paper 002, eq. 1-2 (Smith 1958).

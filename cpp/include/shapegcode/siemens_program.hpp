@@ -16,28 +16,28 @@
 
 namespace shapegcode {
 
-/// What a SINUMERIK program does not say of itself.
+/// Settings for reading a SINUMERIK program.
 struct SiemensOptions {
-  std::string file;  ///< name of the program's file, as errors name it
-  std::string name;  ///< of a program without a head %_N_NAME_MPF, in capitals
+  std::string file;  ///< name of the program's file in messages
+  std::string name;  ///< of a program without a header %_N_NAME_MPF, in capitals
   double least_increment_mm = 0.001;
   double arc_radius_tolerance_mm = 0.01;
-  std::int64_t max_program_steps = 1'000'000;    ///< blocks that are executed, beside those of the text
-  std::int64_t max_expansion_moves = 1'000'000;  ///< moves, likewise
+  std::int64_t max_program_steps = 1'000'000;    ///< maximum number of blocks executed beyond one for each line
+  std::int64_t max_expansion_moves = 1'000'000;  ///< maximum number of moves, likewise
   std::optional<bool> block_skip;                ///< whether `/` blocks are skipped; none: not known, they are refused
-  std::string tool_change_unknown_axes;          ///< axes of "XYZ" whose position is not known behind M6
+  std::string tool_change_unknown_axes;          ///< axes of "XYZ" whose position is not known after M6
   std::map<std::string, std::array<double, 3>, std::less<>> work_offsets;  ///< by name ("G54", "G54.1P5"), mm
-  /// Words, and addresses of values, that are left out, each with what is told of it (empty: nothing).
+  /// Words, and addresses of values, that are left out, each with the note about it (empty: none).
   std::unordered_map<std::string, std::string> left_out, left_out_addresses;
-  /// Why a word is refused; empty: no reason is known.
+  /// Returns why a word is refused; empty: no reason is known.
   std::function<std::string(const std::string& word)> refused;
-  /// A program that is called, by its name in capitals, its text UTF-8; none: there is no such program.
+  /// Returns a called program by its name in capitals, with its text in UTF-8; none: there is no such program.
   std::function<std::optional<SourceText>(const std::string& name)> called;
 };
 
 struct SiemensProgram {
   ExpandedProgram expanded;
-  /// Words that stand for others of the source, for who writes for that control again: {"T901", "T=\"MILL\""}.
+  /// Words that replace words of the source, to write the program for that control again: {"T901", "T=\"MILL\""}.
   std::vector<std::pair<std::string, std::string>> names;
 };
 

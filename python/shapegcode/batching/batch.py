@@ -125,10 +125,10 @@ def summary_lines(rows: Iterable[BatchRow]) -> Iterator[str]:
 
 
 OnBatch = Callable[[float, str], None]
-"""Called with the finished ratio, and a text with the numbers of finished, running and failed runs."""
+"""Called with the finished fraction, and a text with the numbers of finished, running and failed runs."""
 
 _AHEAD = 2  # runs prepared per process, so that none waits for files
-_TOLD_EVERY_S = 1.0
+_REPORT_EVERY_S = 1.0
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
@@ -176,7 +176,7 @@ class Runs:
         self._allowed = tuple(os.path.join(os.path.realpath(folder), "") for folder in folders)
         self._whole_bytes = sum(map(planned.size_bytes, range(len(planned)))) or 1
         self._done = self._failed = self._done_bytes = 0
-        self._told = 0.0
+        self._reported_at = 0.0
         self._shared: dict[str, str] = {}  # scripts shared by pages are written once
         self._ctrl_c = _CtrlC()
 
@@ -223,8 +223,8 @@ class Runs:
         """Wait for at least one run, and store its outcome."""
         done: set[Future[process.JobOutcome]] = set()
         while not done:
-            self._tell(min(slots, len(waiting)))
-            done, _ = concurrent.futures.wait(waiting, _TOLD_EVERY_S, return_when=concurrent.futures.FIRST_COMPLETED)
+            self._report(min(slots, len(waiting)))
+            done, _ = concurrent.futures.wait(waiting, _REPORT_EVERY_S, return_when=concurrent.futures.FIRST_COMPLETED)
         for future in done:
             rank, fingerprint = waiting.pop(future)
             try:
@@ -238,7 +238,7 @@ class Runs:
             self._keep(rank, fingerprint, outcome)
 
     def _is_done(self, rank: int, key: str, fingerprint: str) -> bool:
-        """True if an earlier batch did the same, and its files are unchanged."""
+        """True if an earlier batch did the same, and its files are unchanged; the run is then counted as done."""
         row = self._manifest.earlier(key) if self._resume else None
         if row is None or row.get("fingerprint") != fingerprint or row["ended"] == "failed":
             return False
@@ -299,10 +299,10 @@ class Runs:
         self._failed += ended in ("failed", "refused")
         self._done_bytes += self._planned.size_bytes(rank)
 
-    def _tell(self, running: int) -> None:
-        if time.monotonic() - self._told < _TOLD_EVERY_S / 5:
+    def _report(self, running: int) -> None:
+        if time.monotonic() - self._reported_at < _REPORT_EVERY_S / 5:
             return
-        self._told = time.monotonic()
+        self._reported_at = time.monotonic()
         text = f"{self._done} of {len(self._planned)} done, {running} running, {self._failed} failed"
         self._on_progress(self._done_bytes / self._whole_bytes, text)
 
@@ -339,16 +339,16 @@ def batch(
         resume: run only what is missing, failed or changed.
         html: folder for a page of each run, and an index; None: no pages.
         time_limit_s: time limit of a run; 0: none.
-        memory_limit_bytes: memory limit of a run, beyond the loaded program; 0: none.
-        on_progress: called with the finished ratio and a text.
+        memory_limit_bytes: memory limit of a run, beyond what shapegcode itself needs; 0: none.
+        on_progress: called with the finished fraction and a text.
 
     Returns:
-        A row for each run.
+        A row for each finished run; `stopped` is not empty after Ctrl-C or if the disk is full.
 
     Raises:
         ArgumentError: nothing to do, another batch writes there, or a bad value.
         MachineError: an invalid machine.
-        OSError: a full disk, an unreadable file; finished runs are kept, and `resume` continues.
+        OSError: a file cannot be read or written; finished runs are kept, and `resume` continues.
     """
     if command not in COMMANDS:
         raise ArgumentError(f"command {command}: must be one of {', '.join(COMMANDS)}")

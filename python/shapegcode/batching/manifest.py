@@ -26,7 +26,7 @@ _FOLDER = "folder"
 
 
 def base_folder(output: str | Path) -> str:
-    """The folder in which the batch of an output folder was started."""
+    """The folder in which the batch of an output folder was started; the current one if there is no manifest."""
     try:
         with (Path(output) / MANIFEST).open("rb") as stream:
             return _base_of(stream, output) or os.getcwd()
@@ -77,7 +77,7 @@ class Manifest:
         return self._new[bisect.bisect_left(self._old, self._known[short(key)])]
 
     def add(self, row: Mapping[str, Any]) -> int:
-        """Write a row and flush it to the disk."""
+        """Write a row, flush it to the disk, and return its position in the file."""
         with named_errors(self.path):
             end = self._stream.tell()
             try:
@@ -91,7 +91,7 @@ class Manifest:
         return end
 
     def close(self) -> None:
-        """Release the lock of the folder."""
+        """Close the files and release the lock of the folder."""
         with contextlib.suppress(AttributeError, OSError):
             self._stream.close()
         if self._before is not None:

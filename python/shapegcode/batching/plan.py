@@ -29,7 +29,7 @@ class Source:
 
     path: str  # as given
     place: str  # position of its results in the output folder: its path below the given folder
-    # found in a given folder, and only returns to its caller: converted there
+    # a subprogram (M99) found in a given folder: not run on its own, but with the programs that call it
     subprogram: bool = False
 
 
@@ -122,7 +122,7 @@ def _only_returns(path: str) -> bool:
 
 
 def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterator[tuple[str, str]]:
-    """Files of programs that a program may call, recursively: any number after P in a program with calls."""
+    """Names and paths of programs that one may call, recursively: any number after P in a program with calls."""
     beside = Path(path).parent
     folders = [beside, *(Path(base, Path(name).expanduser()) for name in machine.input.program_folders)]
     load = program_loader(folders, machine.controller.max_program_bytes)
@@ -147,7 +147,7 @@ def _mentioned(text: bytes, folders: Sequence[Path]) -> list[int]:
     if not _CALL.search(text):
         return []
     if _COMPUTED.search(text):
-        # Known only when executed: take all existing ones.
+        # A computed number is known only when executed: take all existing programs.
         names = [file.stem for folder in folders if folder.is_dir() for file in folder.iterdir()]
         return [int(digits) for name in names if (digits := name.lstrip("Oo")).isdigit() and len(digits) <= 8]
     return [int(number) for number in _NUMBER.findall(text)]

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 Ending = Literal["ended", "crashed", "killed", "out of time", "out of memory", "other version"]
-"""End of a run: by itself with an exit code, or not."""
+"""How a run ended; "ended": by itself, with an exit code of the command."""
 
 FAILED_CODES = {97: "crashed", 98: "out of memory"}  # exit codes of a run that no command uses
 
@@ -55,7 +55,7 @@ class BatchJob:
     program: str  # as given
     machine: str
     words: tuple[str, ...]  # command line
-    output: str  # its main file, as a name in its folder: its key in the manifest; the JSON is in the same folder
+    output: str  # name of its main file, which is also its key in the manifest; the JSON is in the same folder
 
     @property
     def report(self) -> str:
@@ -70,7 +70,7 @@ class Packed:
     words: tuple[str, ...]  # command line
     files: Mapping[str, bytes]  # content by name in the folder of the run
     version: str  # required version of shapegcode
-    fingerprint: str  # hash of all of this: equal ones give equal results
+    fingerprint: str  # hash of command line, files and version: equal ones give equal results
     seconds: float = 0.0  # time limit; 0: none
     memory_bytes: int = 0  # memory limit; 0: none
     scratch: str = ""  # parent of the folder of the run; empty: the folder of temporary files
@@ -103,7 +103,7 @@ def pack(
 _ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",  # the other cores are for other runs
     "LD_BIND_NOW": "1",  # functions are linked once, not in each run
-    # Returned memory is fetched again page by page: set the thresholds that glibc would adapt in a long run.
+    # Memory returned to the system is fetched again page by page: set thresholds that glibc adapts only in long runs.
     "MALLOC_ARENA_MAX": "1",
     "MALLOC_MMAP_THRESHOLD_": "33554432",
     "MALLOC_TRIM_THRESHOLD_": "67108864",
@@ -146,7 +146,7 @@ class _Host:
 
 
 class Hosts:
-    """Hosts of the threads of one batch, or of one Dask worker."""
+    """Fork servers of one batch, or of one Dask worker: one for each thread."""
 
     def __init__(self) -> None:
         self._own = threading.local()
@@ -163,7 +163,7 @@ class Hosts:
             return self._run_in(Path(folder), packed)
 
     def end(self) -> None:
-        """Kill all workers and their runs; later requests get a killed job."""
+        """End all fork servers and their runs; a later `run` returns a killed job."""
         with self._lock:
             self._ended = True
             hosts = list(self._all)
@@ -235,7 +235,7 @@ def _ending(answer: Mapping[str, Any], packed: Packed, complained: str) -> tuple
     code = answer["code"]
     if code < 0:
         return "killed", f"killed by signal {-code}"
-    # The reader may refuse a program whose memory it knows in advance.
+    # The reader computes the memory for a program in advance, and refuses it if that is too much.
     foreseen = packed.memory_bytes > 0 and code == 2 and MEMORY_NEEDED in complained
     if foreseen or FAILED_CODES.get(code) == "out of memory":
         return "out of memory", f"needs more than {packed.memory_bytes / 1e6:.0f} MB (--memory-limit)"
@@ -272,9 +272,9 @@ class Cluster:
 
     Attributes:
         scheduler: its address, such as ``tcp://host:8786``, or "local" for a cluster on this machine.
-        tls_ca: file of the authority's certificate, as for Dask; empty: none; likewise the next two.
-        tls_cert: certificate of this client.
-        tls_key: key of this client.
+        tls_ca: file of the authority's certificate, as for Dask; empty: none.
+        tls_cert: file of this client's certificate; empty: none.
+        tls_key: file of this client's key; empty: none.
     """
 
     scheduler: str
@@ -285,7 +285,7 @@ class Cluster:
 
 @contextlib.contextmanager
 def cluster_executor(cluster: Cluster, processes: int) -> Iterator[tuple[Executor, int]]:
-    """An executor of a Dask cluster, after checking that its workers have this version of shapegcode."""
+    """Executor of a Dask cluster, and its number of parallel jobs; checks that its workers have this version."""
     scheduler = cluster.scheduler
     try:
         from distributed import Client, LocalCluster

@@ -18,7 +18,7 @@ from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 Ended = Literal["ok", "not ok", "refused", "failed"]
-"""Within tolerance; done, but out of tolerance; bad input; did not end by itself."""
+"""Ok: within tolerance; not ok: done, but out of tolerance; refused: bad input; failed: not completed."""
 
 _SHOWN = 20
 _LISTED = 2000
@@ -32,10 +32,10 @@ class BatchRow(OldNames):
         program: program as given.
         machine: machine as given.
         ended: end of the run.
-        answer: the first line of the command, or why there is none.
+        answer: the first line of the command's output, or why there is none.
         residual_um: residual vibration of the worst axis; None: the command does not compute it.
         contour_um: contour error, likewise.
-        cycle_time_s: likewise; both are equal for a command that writes no program.
+        cycle_time_s: cycle time, likewise; the pair is equal for a command that writes no program.
         alarms: number of alarms of `check`.
         output: the program that was written; empty: none.
         report: its JSON; empty: none.
@@ -115,7 +115,7 @@ def _number(value: object) -> float | None:
 
 
 def _both(name: str) -> Any:
-    """Cell for a figure of original and emitted, or the only one known."""
+    """Cell for a figure of original and emitted; one number if both are equal."""
 
     def cell(row: BatchRow) -> str:
         pair = getattr(row, name)
@@ -145,10 +145,10 @@ class Batch(Result):
         command: the command.
         output: folder of the results.
         rows: one for each program on each machine, in the given order.
-        summary: the table of all rows as a file.
+        summary: CSV file with all rows.
         not_done: runs not started or not finished because the batch was stopped.
         stopped: reason for the stop; empty: not stopped.
-        warnings: caution, before you run.
+        warnings: why the batch was stopped, and subprograms that were not run on their own.
         wall_s: elapsed time of the batch.
         processes: number of parallel processes.
         html: folder of the pages; empty: none.
@@ -185,7 +185,7 @@ class Batch(Result):
 
     @property
     def answer(self) -> str:
-        """Numbers of finished and other runs, and the elapsed time."""
+        """Number of runs that are ok and of the others, and the elapsed time."""
         counts, whole = self.counts, len(self.rows) + self.not_done
         trouble = [f"{count} {name}" for name, count in counts.items() if count and name != "ok"]
         trouble += [f"{self.not_done} not started"] if self.not_done else []

@@ -132,11 +132,11 @@ def check(test: AirTest, box: AirBox) -> None:
         raise ArgumentError(f"test {test.name} would not end at its start: {at}")
 
 
-_FEEDS = (3000.0, 1200.0, 600.0, 300.0, 120.0, 60.0)  # mm/min: in each, 1 µm is a small and exact part of a period
+_FEEDS = (3000.0, 1200.0, 600.0, 300.0, 120.0, 60.0)  # mm/min: at each, 1 µm takes a round time, from 0.02 to 1 ms
 _FIRST_NUMBER = 7001  # 8000 and 9000 are often locked
 _STOP_S, _STOP_DWELL_S = 0.032, 0.008  # multiples of every usual interpolation period
 _LOG_STOP_S, _LOG_DWELL_S, _LOG_PAUSE_S = 0.160, 0.096, 0.5
-_STEPS_WAY_S = 0.8  # at full feed: longer than the ramps at both ends
+_STEPS_MOVE_S = 0.8  # at full feed: longer than the ramps at both ends
 _LOG_RATIOS = (1.0, 0.5, 0.25, 0.1, 0.05)
 _MORE_RATIOS = (0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.45, 0.4, 0.35)
 _LONG_RAPID_S = 0.2
@@ -198,7 +198,7 @@ class _Maker:
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:
         """Moves of one length, alternately fast and slow, and back; none if the box is too small."""
         room = int((abs(self._box.travel_mm(axis)) + 1e-9) / length_mm)
-        wanted = max(8, 2 * math.ceil(_STEPS_WAY_S * self.feed / _PER_MINUTE / (2.0 * length_mm)))
+        wanted = max(8, 2 * math.ceil(_STEPS_MOVE_S * self.feed / _PER_MINUTE / (2.0 * length_mm)))
         stride = min(wanted, room - room % 2)
         if stride < 4:
             return []

@@ -123,7 +123,7 @@ def _fitted(machine: Machine, facts: Sequence[ControllerFact]) -> tuple[Machine,
         value = fact.value
         values[fact.key] = round(value, 7) if isinstance(value, float) else _SHAPES.get(value, value)
         if fact.quantity == CUTTING_SUM and isinstance(value, float):
-            # From the sum of both times the file keeps its bell time if that fits.
+            # Only the sum of both times is known: the file's bell time stays if it is below the sum.
             bell = machine.controller.bell_time_s if machine.controller.bell_time_s < value else 0.0
             values |= {"controller.bell_time_s": bell, fact.key: round(value - bell, 7)}
         key, text = (head, f"{last} ") if of_axis else (fact.key, "")

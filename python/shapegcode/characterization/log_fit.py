@@ -12,7 +12,7 @@ import numpy as np
 from shapegcode.characterization import moves
 from shapegcode.characterization.air_tests import AXES, AirTest, whole_periods
 from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, ControllerFact, Facts, mean
-from shapegcode.identification.servo.fit import GAINS, lag_way
+from shapegcode.identification.servo.fit import GAINS, lagged_motion
 from shapegcode.io.servo_log import ServoLog
 from shapegcode.io.units import FloatArray
 
@@ -403,7 +403,7 @@ def fit_rapids(facts: LogFacts, axis: str, parts: list[moves.PartLog]) -> list[_
 
 
 def _short_ramp(facts: LogFacts, fits: list[_Rapid]) -> tuple[float, float]:
-    """Bounds of the time constant from rapids too short to reach their rate: eq. 16 of paper 004, for half of one."""
+    """Bounds of the time constant from rapids too short to reach their rate: paper 004, eq. 16, for half a rapid."""
     period = facts.tick
     halves = [(whole_periods(fit.ramp[0] - 0.3 * period, period), fit) for fit in fits]
     sure = [(half, fit) for half, fit in halves if abs(half - fit.ramp[0]) + fit.ramp[1] < 0.3 * period]
@@ -465,7 +465,7 @@ def _lag_of(records: list[tuple[FloatArray, FloatArray, float]]) -> tuple[float,
     def solve(gain: float) -> tuple[float, float]:
         cross = square = power = 0.0
         for travel, error, step in records:
-            model = lag_way(travel, gain, step)
+            model = lagged_motion(travel, gain, step)
             cross += float(model @ error)
             square += float(model @ model)
             power += float(error @ error)

@@ -20,7 +20,7 @@ PERIODS_S = tuple(ms / 1000.0 for ms in (0.125, 0.25, 0.5, 1, 1.5, 2, 2.5, 3, 4,
 
 @dataclass(frozen=True)
 class ControllerFact:
-    """One quantity."""
+    """One parameter of the controller: value, interval and source."""
 
     quantity: str  # its name, the same for every source
     value: float | str | None  # a number, a word, or None if unknown

@@ -122,7 +122,7 @@ def _timing(values: FloatArray, period: float, end: air_tests.BlockEnd) -> Contr
 
 
 def _least_squares(rows: Sequence[TimedTest], period: float, end: air_tests.BlockEnd) -> _Fit:
-    """All unknowns except those of rapids, for one period and rule."""
+    """Fit all unknowns except those of rapids, for one period and rule."""
     from scipy.optimize import least_squares
 
     tiny = next((row for row in rows if row.test.name == "blocks_tiny"), None)
@@ -164,7 +164,7 @@ def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
         facts.add_word(name, "linear or bell", _SHAPE_KEY, note)
         return 0.0
     facts.add_word(name, "exponential", "", "stops from a higher feed take longer")
-    # Each stop ends on a poorly known period: half of the longest usual one, uniformly distributed.
+    # The end of each stop is rounded to an unknown period: an error uniform over half of the longest usual one.
     away = float(((x - centre) ** 2).sum())
     slack = 1.96 * 0.008 / math.sqrt(12.0) * math.sqrt(away) / away
     key, note = "controller.time_constant_s", "from stops at several feeds"

@@ -1,6 +1,6 @@
-"""Find what a controller would refuse in a program (on reading it), and where it would not run it as programmed.
+"""Find what a controller would refuse in a program on reading it, and where it would not run it as programmed.
 
-The latter follows from the time of each block at its feed.
+The latter follows mainly from the time of each block at its feed.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _WORK_LIMIT = re.compile(r"controller\.max_(program|expansion)_")  # in the mess
 _NOT_AS_WRITTEN = re.compile(r"does not end with M30|^text behind the '%'|^G68 R|byte-order mark")
 _ROUNDING = 1e-9
 _LOST_S = 1e-3  # time lost by short blocks: less is not a reason to change the program
-# Largest number per reading (max_alarms in the core's reader).
+# Largest number of alarms per reading (max_alarms in the core's reader).
 _MAX_ALARMS = 200
 _MEMORY_PER_LINE = 350  # bytes
 
@@ -146,7 +146,7 @@ def check_text(
 
 
 def _finding(severity: str, code: str, alarm: int, file: str, line: int, column: int, message: str) -> Finding:
-    # The number has its own field.
+    # The alarm number has its own field.
     return Finding(severity, code, alarm, file, line, column, _ALARM_WORDS.sub("", message))
 
 
@@ -210,7 +210,7 @@ def _size_and_macros(data: bytes, lines_before: int, source: str, machine: Machi
 def _reader_findings(program: Program) -> Iterator[Finding]:
     for line, column, alarm, message, file in program.core.alarms:
         if _WORK_LIMIT.search(message):
-            # Not refused by controls: beyond the limits of this program.
+            # A control would not refuse it: only the reader of shapegcode has this limit.
             sentence = f"{message}: what follows is not checked"
             yield _finding("warning", "work_limit", 0, file or program.source, line, column, sentence)
         else:

@@ -30,8 +30,8 @@ _SLOW_MOTION = 1e-4
 _RESOLUTION_S = _PERIOD_S * _SLOW_MOTION
 _NO_LIMIT = 1e12
 _ROUNDING = 1e-6
-_TICK_SLACK = 1e-5
-_FIRST_PLACES = 20
+_PERIOD_SLACK = 1e-5
+_MAX_LINES = 20
 
 # Effects of a stop between two cutting moves, worst first.
 _STOPS = "the control stops reading ahead, and the tool stops in the cut"
@@ -94,7 +94,7 @@ class Breaker:
 
 
 def block_table(program: Program, machine: Machine) -> BlockTable:
-    """Time every block of a program at its feed, with a few array operations per million blocks."""
+    """Time every block of a program at its feed."""
     limited = _timed(program, machine, with_limits=True)
     # A move of rotary axes only has no length here, and so no comparable time.
     cutting = np.flatnonzero((limited["kind"] == _CUTTING) & (limited["duration_s"] > 0.0))
@@ -104,8 +104,8 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     free = _timed(program, machine, with_limits=False)[cutting]
     rows = limited[cutting]
     lines = rows["line"].astype(np.int64)
+    # A run starts with a region, and where something lies between two cutting moves.
     # Several moves of one line (a corner word) are one block.
-    # A new region starts, or something is between a move and the previous one.
     run_starts: npt.NDArray[np.bool_] = np.diff(cuts_of_lines(program.regions, lines), prepend=-2) != 0
     run_starts |= np.diff(cutting, prepend=-2) != 1
     block_starts = np.flatnonzero(run_starts | (np.diff(lines, prepend=-1) != 0))
@@ -115,9 +115,9 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     feed = free["feed_mm_per_s"][block_starts] * (60.0 / _SLOW_MOTION)
     line = lines[block_starts]
 
-    # The control executes a shaped block in whole periods: its F is rounded up so that it ends just before the last.
+    # The control executes a shaped block in whole periods: its F is rounded up, so that it ends just within the last.
     period_s = machine.controller.interpolation_period_s
-    whole = np.ceil(limited_s / period_s - _TICK_SLACK) * period_s
+    whole = np.ceil(limited_s / period_s - _PERIOD_SLACK) * period_s
     shaped = cuts_of_lines([region for region in program.regions if region.shaped], line) >= 0
     duration = np.where(shaped, whole, limited_s)
     stretch_s = np.where(shaped, _shaper_s(program, machine), np.inf)
@@ -146,12 +146,12 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
                 int(line[short_at[first_short]]) if shorts else 0,
             )
         )  # fmt: skip
-    firsts = tuple(line[short_at[:_FIRST_PLACES]].tolist())
+    firsts = tuple(line[short_at[:_MAX_LINES]].tolist())
     return BlockTable(tuple(runs), lines, lines_of[_RAPID], lines_of[_DWELL], firsts, clamped)
 
 
 def _shaper_s(program: Program, machine: Machine) -> float:
-    """Duration of the shaper of a shaped program from its header, s: no transition is shorter."""
+    """Shaper duration in the header of a shaped program, s, at least the block time; rates hardly change faster."""
     least_s = machine.controller.block_time_s
     try:
         return max(float(program.stamp.shaper_ms) * 1e-3, least_s) if program.stamp else least_s

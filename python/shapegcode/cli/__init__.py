@@ -44,7 +44,7 @@ _HOMES = {
     "batch": ("batch", "study", "optimize"),
     "others": ("shaper", "report", "demo", "completion"),
 }
-"""Modules shared by several commands; the others have a module each."""
+"""Modules shared by several commands; each other command has a module of its own."""
 
 
 @dataclass(frozen=True)
@@ -129,13 +129,13 @@ def _expected(error: Exception) -> bool:
     """True for errors of the input or the file system, which need no traceback."""
     if isinstance(error, ModuleNotFoundError):
         return error.name == "matplotlib"
-    # An error of shapegcode has loaded its class: nothing is imported to find out.
+    # If the error is one of shapegcode, its core is loaded already: no import is needed.
     core = sys.modules.get("shapegcode._core")
     return isinstance(error, OSError if core is None else (OSError, core.ShapegcodeError))
 
 
 def _message(error: Exception) -> str:
-    """Message of an error; for a file the path, the reason, and a missing folder."""
+    """Message of an error; for a file its path and the reason, such as a missing folder."""
     kind = type(error).__name__
     if isinstance(error, ModuleNotFoundError):
         return f"pictures need {error.name}, which is not installed"
@@ -143,7 +143,7 @@ def _message(error: Exception) -> str:
         # One line per problem, each with the command's name, so that each is complete.
         return str(error).replace("\n", "\nshapegcode: ") or kind
     if error.filename is None:
-        # Every file is written under its name.
+        # Files are opened by name, so an error without a name is one of standard output.
         where = "standard output: " if error.errno in _FULL else ""
         return where + (error.strerror or str(error) or kind)
     path = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else str(error.filename)
@@ -183,7 +183,7 @@ class _Interrupts:
 
     def _handle(self, _number: int, _frame: object) -> None:
         if not self.came and hasattr(signal, "setitimer"):
-            # The interrupt may come inside a lock or a long simulation, which then would not end.
+            # A lock or a long simulation may not end on the interrupt.
             signal.signal(signal.SIGALRM, self._stop_now)
             signal.setitimer(signal.ITIMER_REAL, _MAX_STOP_S)
         self.came = True

@@ -129,7 +129,7 @@ def _with_unit(text: str, what: str, units: Mapping[str, float], example: str) -
 
 
 def size(text: str) -> int:
-    """A number of bytes such as ``262144``, ``256k``, ``1M`` or ``2G`` (1024 bytes, 1024 k, 1024 M), above 0."""
+    """A number of bytes above 0, such as ``262144``, ``256k``, ``1M`` or ``2G``; k, M, G are powers of 1024."""
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([kMG]?)", text)
     value = math.floor(float(match[1]) * _SIZE_UNITS[match[2]]) if match else 0
     return value if value >= 1 else _refuse(text, "a number of bytes above 0, for example 65536, 64k or 1M")
@@ -192,8 +192,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "verbosity": ("quiet", "verbose", "cite"),
 }  # fmt: skip
-"""Group of an option by its destination, one table for all commands, so that each lists it in the same
-group."""
+"""Destinations of the options of each group; one table, so that all commands list an option in the same group."""
 
 _GROUP_OF = {dest: title for title, dests in GROUPS.items() for dest in dests}
 _EXIT_CODES = "0 done and within tolerance; 1 done, but out of tolerance; 2 not done: bad input"
@@ -262,7 +261,7 @@ NEEDED = object()  # instead of a default: the option is required
 Row = tuple[Any, ...]
 """An option: names, metavar, type, help and, if not None, the default or `NEEDED`.
 
-Types: `bool` is a switch, a tuple one of its words, a list with a type a repeatable option, and a dictionary holds
+Types: `bool` makes a switch, a tuple holds the allowed words, a list the type of a repeatable option, and a dictionary
 arguments of argparse.
 """
 
@@ -295,7 +294,7 @@ class Interface:
     actions: Mapping[str, tuple[str, Interface]] = field(default_factory=dict)
 
     def declare(self, parser: argparse.ArgumentParser) -> None:
-        """Declare it."""
+        """Add description, options, actions and function to a parser."""
         parser.description = self.description or parser.description
         for entry in self.options:
             if isinstance(entry, OldName):

@@ -73,7 +73,7 @@ BATCH = Interface(
         ("--jobs", "N", count, "parallel processes (default: one per processor)", 0),
         ("--time-limit", "TIME", seconds, "time limit of each run (default: 3600s)", 3600.0),
         ("--memory-limit", "SIZE", size,
-         "memory limit of each run, such as 2G, beyond the loaded program (default: none; Linux only)", 0),
+         "memory limit of each run, such as 2G, beyond what shapegcode itself needs (default: none; Linux only)", 0),
         *cluster("run"),
         ("--json", "FILE", None, "write all rows as JSON; - for standard output"),
         ("--html", "DIR", None, "write a page for each run into this folder, with an index"),

@@ -248,14 +248,14 @@ _FIT = (
 )  # fmt: skip
 
 TESTCUT = Interface(
-    "Writes test cuts (paper 001) as programs with instructions in their heads and a side file (JSON) that "
-    "describes the cut; `fit` reads it and the measured forces. Exit code 0; 1: the fit is poor or the result "
+    "Writes test cuts (paper 001) as programs with instructions as comments at the start, and a side file (JSON) "
+    "that describes the cut; `fit` reads it and the measured forces. Exit code 0; 1: the fit is poor or the result "
     "not as expected; 2: bad input.",
     actions={
         "taper": (
             "increasing radial depth: for the coefficients of the cutting force (figure 4)",
             Interface(
-                "Mills a tapered edge, then makes passes along it, each at one feed: for k1 and k2 of the force.",
+                "Mills a tapered edge, then makes passes along it, each at one feed: for k1, k2 of the cutting force.",
                 (*_CUT, *_TAPER, *_END), _write_cut,
             ),
         ),

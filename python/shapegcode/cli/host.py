@@ -1,6 +1,6 @@
-"""Fork server: has all modules loaded and forks a process for each command line from `shapegcode.batching`.
+"""Fork server: loads all modules once, and forks a process for each command line from `shapegcode.batching`.
 
-It reads and answers one JSON object per line; when its input ends, it ends with its running command.
+It reads one JSON object per line and answers with another. When its input ends, it kills its running command and ends.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def main() -> int:
 def _run(job: Mapping[str, Any]) -> dict[str, Any] | None:
     """Fork, wait, and return the outcome; None if the input has ended."""
     begin = time.monotonic()
-    ended, held = os.pipe()  # the other end closes at any end of the process
+    ended, held = os.pipe()  # the child holds the other end, which closes however the child ends
     parent = os.getpid()
     pid = os.fork()
     if pid == 0:
@@ -123,9 +123,9 @@ def _follow(parent: int) -> None:
 
 
 def _limit_memory(more_bytes: int) -> None:
-    """Limit memory to that of the host plus *more_bytes*."""
+    """Limit the memory of the process to its present size plus *more_bytes*."""
     if sys.platform != "linux":
-        return  # only Linux limits used instead of reserved memory
+        return  # only Linux counts memory from mmap in RLIMIT_DATA
     import resource
 
     pages = int(Path("/proc/self/statm").read_text().split()[5])

@@ -116,7 +116,7 @@ IDENTIFY = arguments.Interface(
           "files of the same point are fitted together"),
         ("--sweep", "PROGRAM", None, "program that ran during the record (shapegcode sweep), on the control of -m"),
         ("--axis", None, ("x", "y", "z"),
-         "use the response along this axis; if the file names no axis, its response is taken as this axis"),
+         "use the response along this axis; if the file names no axis, its response is assumed to be along this one"),
         ("--across", "FILE", {"nargs": "*"},
          "also find the mode shape along the other axes (for a rocking tool), from a triaxial sensor or from these "
           "files: impacts at the same point, sensor turned"),

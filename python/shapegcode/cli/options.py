@@ -46,7 +46,7 @@ AMOUNT = OneOf("verbosity", (
 _PAGE = ("--html", "FILE", None, "write the result as a page: one HTML file, readable offline")
 _CITE = ("--cite", None, bool, "also list the papers on which the methods are based, as BibTeX")
 RESULT = (JSON, _PAGE, SCRIPT, _CITE, AMOUNT)  # of every command with a result
-RESULT_OF_DRAWS = (JSON, _PAGE, SCRIPT, AMOUNT)  # without --cite: each sample is a run of `convert`, which cites
+RESULT_OF_DRAWS = (JSON, _PAGE, SCRIPT, AMOUNT)  # without --cite: the methods are those of `convert`
 
 
 def program_input(metavar: str = "IN") -> tuple[Row, ...]:
@@ -113,7 +113,7 @@ def read_cutting(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def load_machine(args: argparse.Namespace, *, writes_program: bool = False) -> Machine:
-    """The machine of ``-m`` with the values of ``--set``; refused if programs cannot be written for its dialect."""
+    """The machine of ``-m`` with the values of ``--set``; with *writes_program* its output dialect must be FANUC."""
     from shapegcode.machine import Machine
 
     machine = Machine.load(args.machine)

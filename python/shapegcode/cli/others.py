@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from shapegcode.results.page.model import Page
 
 
-# As in the registry of families, whose solvers would load too slowly for a help text.
+# The names in the registry of families, which is not imported here: its solvers load too slowly for a help text.
 _FAMILIES = (
     "zv", "zvd", "zvdd", "mzv", "ei", "ei2", "ei3", "si", "negative-zv", "simultaneous", "minimal", "polynomial",
     "non-negative", "robust", "mirrored", "smooth-zv", "smooth-mzv", "smooth-ei", "smooth-ei2", "smooth-si",
@@ -65,8 +65,8 @@ SHAPER = Interface(
          "block period on which the impulses must lie, such as 5ms; may be repeated (default: the machine's, or the "
          "best few)", []),
         ("--continuous", None, bool,
-         "design shapers whose impulses may lie at any time (continuous time): besides those on --block-period; "
-         "without it only these. Default without -m and --block-period: these and those on the best few periods"),
+         "also design shapers whose impulses may lie at any time (continuous time); without --block-period only "
+         "these are designed. Default without -m and --block-period: continuous time and the best few periods"),
         ("--family", "NAME", {"action": "extend", "nargs": "+"},
          f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"),
         ("--list-families", None, bool, "list the families with meaning and source, and exit"),
@@ -83,7 +83,7 @@ SHAPER = Interface(
         ("--negative", None, bool, "a design with negative impulses may be recommended"),
         ("--taps", "TIME:A,...", None, 'compare your own shaper (impulses): "0:.5,10.9ms:.5"'),
         ("--speed", "MM/S", positive, "speed at which the contour cost is shown (default: %(default)g)", 200.0),
-        ("--radius", "MM", positive, "radius of the arc on which it is shown (default: %(default)g)", 20.0),
+        ("--radius", "MM", positive, "radius of the arc for the contour cost (default: %(default)g)", 20.0),
         plots("write pictures of the comparison (PNG and SVG) into this folder"),
         *RESULT,
         OldName("--all", "--verbose"),
@@ -121,7 +121,7 @@ def _target(source: Path, report: Mapping[str, Any]) -> Path:
 
 
 def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[float], None]) -> tuple[Page, str]:
-    """The page of a result, and the result's class; empty if this version cannot read it."""
+    """The page of a result, and the name of its class, which is empty if this version cannot read the result."""
     from shapegcode.cli.replay import changes, simulated_again
     from shapegcode.results.json import this_version
     from shapegcode.results.outcome import NotKeptError
@@ -168,7 +168,7 @@ _PAGES = {
     "metrology": "paper000", "corner": "paper001", "shaper": "paper002", "tap": "paper003", "cycle-time": "paper004",
     "evidence": "evidence",
 }  # fmt: skip
-"""Pages of the documentation that replace the demo of that name of version 0.1.0."""
+"""Page of the documentation that replaces a demo of version 0.1.0, by the name of the demo."""
 
 
 def _name(word: str) -> str:

@@ -10,7 +10,7 @@ from shapegcode.cli.arguments import NEEDED, Interface, OldName, count, line_ran
 from shapegcode.cli.options import RESULT, load_machine
 from shapegcode.io.data_file import write_lines
 
-# Ratio of the progress bar for the regions; the motion in time takes the rest.
+# Fraction of the progress bar for the cuts; the motion in time takes the rest.
 _REGIONS_SHARE = 0.1
 
 
@@ -286,8 +286,8 @@ COMPARE = Interface(
         ("against", "B", None, "second program, such as the output of convert"),
         *options.MACHINE_OR_NONE,
         ("--allow", "WORDS", None,
-         "differences that are allowed, for example feeds,blocks,path=20um,calls; any other word: an error that lists "
-         "all of them", ""),
+         "differences that are allowed, for example feeds,blocks,path=20um,calls; an unknown word is an error that "
+         "lists the known ones", ""),
         *RESULT,
     ),
     _compare,

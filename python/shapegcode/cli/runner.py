@@ -43,7 +43,7 @@ def output_console(json_target: str | None = None, *, file: TextIO | None = None
     stream = file or sys.stdout
     # A pipe has no width: rich would assume 80 characters and break the tables.
     width = None if stream.isatty() or "COLUMNS" in os.environ else _PIPE_WIDTH
-    # rich would still print in bold.
+    # With NO_COLOR alone, rich would still print in bold.
     colours: Literal["auto"] | None = None if os.environ.get("NO_COLOR") else "auto"
     console = Console(
         file=stream, width=width, quiet=json_target == "-", highlight=False, soft_wrap=False, color_system=colours
@@ -54,7 +54,7 @@ def output_console(json_target: str | None = None, *, file: TextIO | None = None
 
 
 def wrapped(text: str) -> str:
-    """Wrap text between words on a terminal; elsewhere keep its lines, for searching."""
+    """Wrap text between words on a terminal; elsewhere return it unchanged, so that its lines can be searched."""
     if not sys.stdout.isatty():
         return text
     width = shutil.get_terminal_size().columns
@@ -78,7 +78,7 @@ class ProgressBar:
         self.bar: Progress | None = None
 
     def update(self, fraction: float) -> None:
-        """Show the finished ratio of the work, 0 to 1; cheap enough for every step of a loop."""
+        """Show the finished fraction of the work, 0 to 1; cheap enough for every step of a loop."""
         if self.bar is not None:
             self.bar.update(self.bar.task_ids[0], completed=min(max(fraction, 0.0), 1.0), total=1.0)
 
@@ -89,7 +89,7 @@ class ProgressBar:
             self.bar.update(self.bar.task_ids[0], description=text)
 
     def open(self) -> None:
-        """Show it."""
+        """Show the bar."""
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
@@ -109,7 +109,7 @@ _NEVER_PIPED = {"npz": "an archive", "html": "a page"}
 def check_files(
     args: argparse.Namespace, *, also_written: Sequence[str | Path] = (), also_read: Sequence[str | Path] = ()
 ) -> None:
-    """Refuse to write a file that the run also reads or writes twice; only one may go to standard output."""
+    """Refuse an output file that the run also reads or writes twice, and a second output to standard output."""
     given = {name: value for name in _WRITTEN if (value := getattr(args, name, None)) is not None}
     piped = ["-o -" if name == "output" else f"--{name} -" for name, value in given.items() if value == "-"]
     if len(piped) > 1:
@@ -166,7 +166,7 @@ def _write_page(
     """Write provenance into the JSON, and the page of --html; return the files."""
     html = getattr(args, "html", None)
     if html is None and getattr(args, "json", None) is None:
-        return []  # the hashes are not used
+        return []  # no file contains the provenance
 
     from shapegcode.results.json import plain
 
@@ -250,7 +250,7 @@ def _say(
         console.print(line, markup=False, soft_wrap=True)
 
 
-# Options for files that a command reads; those that may be a built-in machine.
+# Options for files that a command reads, and those of them that may name a built-in machine.
 _READ = ("input", "inputs", "files", "machine", "tool", "stock", "against", "cut", "update", "dump", "base")
 MACHINES = ("machine", "base", "files")
 

@@ -1,7 +1,7 @@
-"""``--program all``: a command over every program of a file that no other one calls, each as if it were alone.
+"""``--program all``: run a command for every program of a file that no other one calls, each as if it were alone.
 
-Emitted programs are written into one file; everything else in it is unchanged, except for subprograms whose moves
-the shaped programs now contain.
+Emitted programs are written into one file. Everything else in it is unchanged, also subprograms whose moves the shaped
+programs now contain.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def run_all(args: argparse.Namespace) -> int:
 
 
 def _called(several: Gathered, machine: Machine) -> set[int]:
-    """Indices of programs that another one in the file calls: they are expanded there."""
+    """Indices of programs that another one in the file calls: they are expanded there, or left as calls."""
     called: set[int] = set()
     folder = Path(several.source).parent
     for place in several.places:
@@ -61,7 +61,7 @@ def _called(several: Gathered, machine: Machine) -> set[int]:
         except ProgramError:
             continue  # its own run reports the error
         called |= {*program.core.called, *(each.index for each in program.kept_calls)} - {place.index}
-    # Programs that call each other in a cycle are run nevertheless.
+    # If every program is called by another one, as in a cycle, all are run.
     return called if len(called) < len(several.places) else set()
 
 
@@ -125,7 +125,7 @@ class Gathered:
     text: bytes
     places: tuple[ProgramPlace, ...]  # its programs
     reports: list[dict[str, Any]] = field(default_factory=list)  # the report of each for --json
-    # by index, the file of a command and its program
+    # output file and emitted program, by index of the program
     written: dict[int, tuple[Path | str, bytes]] = field(default_factory=dict)
     at: int = 0  # index of the current program
 
@@ -155,7 +155,7 @@ def _unframed(text: bytes) -> bytes:
     """Remove the '%' lines of a single program."""
     begin = text.find(b"\n") + 1 if text.startswith(b"%") else 0
     end = text.rfind(b"%")
-    # The line end of the first mark may be LF CR CR: its remaining characters belong to it.
+    # The line end after the first % may be LF CR CR: remove its CR, too.
     while text[begin : begin + 1] == b"\r":
         begin += 1
     return text[begin : end if end > begin else len(text)]

@@ -103,15 +103,15 @@ class BudgetOutcome(OldNames):
     """Effect of a budget on a conversion."""
 
     limits: Budget  # the budget; null: no limit
-    # of the program with every cut shaped; if the budget lengthens the block period: at the period without budget,
-    # before any region is slowed for the contour tolerance
+    # needs with every cut shaped; if the budget lengthens the block period: at the period without budget, before any
+    # region is slowed for the contour tolerance
     before: TextNeeds
     after: TextNeeds  # of the emitted program
     block_period_s: float  # block period of the program
     left_unchanged: tuple[GivenUp, ...]  # regions left unchanged
 
 
-# A section on a longer period may have fewer blocks than on a shorter one, but hardly below this ratio.
+# On a longer block period a section may have fewer blocks per period, but hardly below this ratio.
 _LEAST_FILLED = 0.5
 _LINES_NAMED = 5  # regions listed in the warning
 
@@ -123,8 +123,8 @@ class Spending:
         self.budget = budget
         self.left_unchanged: dict[int, GivenUp] = {}  # regions left unchanged, by index
         self._program = program
-        self._tick_s = machine.controller.interpolation_period_s
-        self._most_ticks = math.floor(machine.shaping.max_duration_s / self._tick_s + _ROUNDING)
+        self._period_s = machine.controller.interpolation_period_s
+        self._max_periods = math.floor(machine.shaping.max_duration_s / self._period_s + _ROUNDING)
         self._fixed_period = machine.emission.block_period_s is not None
         self._keepable = [keepable(region, machine) for region in program.regions]
         self._unit_um = [residual_floor_um(region, machine) or 1.0 for region in program.regions]
@@ -144,26 +144,26 @@ class Spending:
         loads = written.loads
         if self._fixed_period or not self._factors(loads):
             return grid
-        ticks = measured = round(grid.block_period_s / self._tick_s)
+        periods = measured = round(grid.block_period_s / self._period_s)
         best, best_loads = grid, loads
-        while self._factors(best_loads) or ticks * self._tick_s < best.shaper.duration_s:
+        while self._factors(best_loads) or periods * self._period_s < best.shaper.duration_s:
             # A shaper has at least one period; after the first period without excess, shorter shapers are still tried.
             factors = self._factors(loads)
-            ticks = max(ticks + 1, math.floor(measured * min(factors, default=1.0) * _LEAST_FILLED))
-            if ticks > self._most_ticks:
+            periods = max(periods + 1, math.floor(measured * min(factors, default=1.0) * _LEAST_FILLED))
+            if periods > self._max_periods:
                 break
             try:
-                longer = design(ticks * self._tick_s)
+                longer = design(periods * self._period_s)
                 if not self._factors(best_loads) and longer.shaper.duration_s >= best.shaper.duration_s:
                     continue
                 loads = write(longer).loads
             except (_core.DesignError, _core.ProgramError):  # no shaper or no region on this grid
                 continue
-            measured = ticks
+            measured = periods
             if self._worth(longer, loads, weights) > self._worth(best, best_loads, weights):
                 best, best_loads = longer, loads
         self._longer = best is not grid
-        if self._longer:  # else set from the program that is judged
+        if self._longer:  # otherwise `give_up` sets it
             self._before = _needs(grid, written)
         return best
 
@@ -221,9 +221,9 @@ class Spending:
         return [factor for factor in factors if factor > 1.0 + _ROUNDING]
 
     def _worth(self, grid: Grid, loads: Mapping[int, TransferLoad], weights: Sequence[float]) -> tuple[float, int, int]:
-        """Gain of the regions that are not too fast, their number, and the shaper duration in interpolation periods."""
+        """Rank of a grid: gain and number of the regions that are not too fast, then the shorter shaper."""
         slow = [index for index, load in loads.items() if not self.budget.too_fast(load)]
-        return math.fsum(weights[index] for index in slow), len(slow), -round(grid.duration_s / self._tick_s)
+        return math.fsum(weights[index] for index in slow), len(slow), -round(grid.duration_s / self._period_s)
 
     def _too_large(
         self, size: int, loads: Mapping[int, TransferLoad], simulated: Mapping[int, RegionVerdict]

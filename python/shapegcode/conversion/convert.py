@@ -65,7 +65,7 @@ def convert(
         rapids: write rapids as shaped moves where that saves time: `shaping.rapids`.
         budget: limits of the emitted program; None: no limit.
         arc_feed_ratio: feed on arcs relative to the programmed one, reached before the arc: `shaping.arc_feed_ratio`.
-        block_period_s: duration of a short block, s: `emission.block_period_s`; None in both: see `choose_grid`.
+        block_period_s: duration of a shaped block, s: `emission.block_period_s`; None in both: see `choose_grid`.
         max_time_increase_percent: largest increase of the program's time: `price.program_time_percent`.
         max_cut_time_increase_percent: likewise of one cut: `price.cut_time_percent`.
         only: shape nothing but the cuts in these lines of the original, each first and last; None: all.
@@ -84,7 +84,7 @@ def convert(
         MachineError: a value that is invalid in a machine file.
         DesignError: no shaper exists on this grid.
         ArgumentError: the program was read with settings that differ from the machine's; a block period that the
-            controller cannot run, a budget without a choice, lines without a cut.
+            controller cannot run, a budget that cannot be kept, lines without a cut.
         RoundTripError: the emitted program would not be equivalent: a defect of shapegcode.
     """
     stated = {
@@ -183,7 +183,7 @@ def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
     return written
 
 
-# The program read back, and trackers of its new cuts, by index of the cut.
+# The program read back, and trackers of its new cuts, by rank among the shaped cuts.
 ReadBack = tuple[Program, dict[int, _core.ContourTracker]]
 
 

@@ -27,7 +27,7 @@ _NAMED_LINES = 4
 _SHOWN_POINTS = 12
 _SINGLE_BLOCKS = 200  # number of the fastest blocks that are simulated
 _PRESSES_PER_S = 2.0
-_FAST_RATIO, _FAST_BLOCKS = 0.5, 4000  # least ratio to the highest feed; largest number used
+_FAST_RATIO, _FAST_BLOCKS = 0.5, 4000  # of fast blocks: least ratio to the highest feed; largest number
 _CHUNK = 1 << 16  # bytes
 _TAPE_CHARACTERS_PER_M = 1000.0 / 2.54  # a row of holes every tenth of an inch
 
@@ -137,7 +137,7 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFi
     fast = np.flatnonzero(feeds >= _FAST_RATIO * feeds.max())
     fast = fast[:: math.ceil(len(fast) / _FAST_BLOCKS)]
     slowest = np.array(slowest_excited_hz(model.machine))
-    # Speed step that each block applies to the modes; the softest axis has the largest weight.
+    # Speed step that each block applies to the modes; the axis with the lowest frequency has the largest weight.
     chords = np.array([blocks[int(one)].end_mm - blocks[int(one)].start_mm for one in fast])
     steps = chords / np.maximum(np.linalg.norm(chords, axis=1), 1e-9)[:, None] * feeds[fast, None]
     fastest = fast[np.argsort(-np.linalg.norm(steps / slowest, axis=1), kind="stable")[:_SINGLE_BLOCKS]]

@@ -26,7 +26,7 @@ from shapegcode.shaping.grid import Grid
 from shapegcode.verdict import figures as parts, judge as judging
 from shapegcode.verdict.figures import Placed, ProgramFigures, RegionVerdict
 
-_MOSTLY = 0.7  # ratio of the command's contour error to that of the machine table
+_MOSTLY = 0.7  # least ratio of the command's contour error to the target's, if the filter is its cause
 _TRIALS = (0.9, 0.7, 0.5)  # tried ratios to the time constant that suffices if rounding is proportional to it
 # A warning is issued for a figure worse than the original's by this ratio and by this size in um.
 _WORSE_RATIO, _WORSE_UM = 1.2, 5.0
@@ -82,7 +82,7 @@ def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> 
     program, machine, written = plan.program, plan.machine, shaped.written
     core, tolerance, tools_by_index = program.core, machine.tolerance, tables.tools_of_cuts(program)
     tools = [tools_by_index.get(plan.aims.index(place.region)) for place in written.placed]
-    # Uses a core that is idle during the last simulations.
+    # On a processor that is idle during the last simulations.
     mark = plan.pool.submit(lambda: shaped.emitted.mark)
     warnings = _warnings(plan, shaped, verdict.figures)
     sensitivity, tried = _sensitivity(plan, shaped)
@@ -387,7 +387,7 @@ def _simulation_warnings(plan: ConversionPlan, figures: ProgramFigures) -> Itera
 
 
 def _binding(plan: ConversionPlan, figures: ProgramFigures) -> Iterator[str]:
-    """Yield tolerances that a conversion exceeds, with the excess and feasible values."""
+    """Yield tolerances that a conversion exceeds, with the value reached and a feasible one."""
     tolerance = plan.machine.tolerance
     contour = max((region.contour_error_um for region in figures.regions), default=0.0)
     if contour > tolerance.contour_um:

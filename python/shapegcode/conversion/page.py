@@ -79,7 +79,7 @@ def sections_of(conversion: Conversion, provenance: Provenance | None = None) ->
 
 
 def _picker(conversion: Conversion, provenance: Provenance | None) -> model.CutPicker:
-    """The cuts to choose from; figures of a cut that was not shaped are not known."""
+    """Make the picker of cuts; a cut that was not shaped has no emitted figures."""
     rows = [
         model.CutRow(
             cut.lines, "" if cut.tool is None else f"T{cut.tool}", cut.gain_um, _tried(cut.residual_um, cut),
@@ -201,7 +201,7 @@ def _times(conversion: Conversion) -> model.Section:
 
 
 def _machine(machine: Machine) -> model.Section:
-    """The machine data used: modes, tolerances, and all unverified values."""
+    """Machine data used: axes, tolerances, settings of the verdict, and all values that are assumed or inherited."""
     values = [value for value in machine.values() if value.unmeasured or value.key.startswith(_SHOWN_KEYS)]
     unmeasured = sum(value.unmeasured for value in values)
     columns = (

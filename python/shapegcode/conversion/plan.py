@@ -31,7 +31,7 @@ _SLOWER = 0.98  # factor below the feed that is just slow enough
 _LEAST_FEED_RATIO = 0.5  # of the programmed feed: below it, a too high speed has other causes
 _HELPED = 0.98  # ratio of errors: a tighter plan with less improvement is reverted
 _PRICE_MARGIN = 0.995  # ratio of the permitted time used for a plan
-_LOOSER = 1.05  # smallest step after a plan that was still too expensive
+_LOOSER = 1.05  # smallest factor on the deviation after a plan that was still too expensive
 _LEVELS = 40  # steps of a bisection
 
 
@@ -39,7 +39,7 @@ _LEVELS = 40  # steps of a bisection
 class _Attempt:
     """The last plan of a cut beyond its tolerance."""
 
-    room_um: float
+    allowed_um: float
     reached_um: float  # deviation reached with it
     overridden: bool  # beyond tolerance only at another feed override
     helps: bool = True  # a tighter one helps
@@ -56,7 +56,7 @@ class Aims:
         self._places = {id(region): index for index, region in enumerate(program.regions)}
         self.reasons = reasons  # why a cut is left unchanged; empty: it is shaped; updated here
         self._asked_um = machine.tolerance.contour_um
-        self.room_um = [machine.tolerance.contour_um * _MARGIN] * count  # deviation for which its feed is planned
+        self.allowed_um = [machine.tolerance.contour_um * _MARGIN] * count  # deviation for which its feed is planned
         self.feed_ratio = [1.0] * count  # ratio of the planned to the programmed feed
         self.original_s: dict[int, float] = {}
         self.emitted_s: dict[int, float] = {}  # of every cut once shaped, until the set-points rest
@@ -68,7 +68,7 @@ class Aims:
     def wanted(self) -> dict[int, Aim]:
         """Planned deviation and feed ratio of each cut to shape."""
         return {
-            index: (self.room_um[index], self.feed_ratio[index]) for index, why in enumerate(self.reasons) if not why
+            index: (self.allowed_um[index], self.feed_ratio[index]) for index, why in enumerate(self.reasons) if not why
         }
 
     def index(self, figures_place: object) -> int:
@@ -99,12 +99,12 @@ class Aims:
     def tighten(self, written: Written, figures: Sequence[RegionFigures], judge: Judge) -> bool:
         """Plan cuts beyond their contour tolerance more tightly, so that they are slower. False if there are none.
 
-        The bound on the feed treats corners and arcs one by one, but those within one shaper duration add up. If the
-        planned deviation of a cut is below its tolerance, tightening starts from that deviation (a bound above it
-        would change nothing). A cut that exceeds the limit at other overrides only is tightened once. A cut gets its
+        The bound on the feed treats corners and arcs one by one, but deviations within one shaper duration add up. If
+        the planned deviation of a cut is below its tolerance, tightening starts from that deviation (a bound above it
+        would change nothing). A cut that exceeds the limit only at other overrides is tightened once. A cut gets its
         former plan back if tightening does not help, or was not enough at other overrides.
         """
-        room_um = self.room_um
+        allowed_um = self.allowed_um
         tightened = False
         for place, region in zip(written.placed, figures, strict=True):
             index = self.index(place.region)
@@ -118,12 +118,12 @@ class Aims:
                 continue
             tightened = True
             if before is not None and (before.overridden or (not overridden and reached > _HELPED * before.reached_um)):
-                room_um[index] = before.room_um
+                allowed_um[index] = before.allowed_um
                 before.helps = False
                 continue
-            self._tried[index] = _Attempt(room_um[index], reached, overridden)
-            room_um[index] = min(room_um[index], written.planned_um.get(index, math.inf))
-            room_um[index] *= _MARGIN * limit / reached
+            self._tried[index] = _Attempt(allowed_um[index], reached, overridden)
+            allowed_um[index] = min(allowed_um[index], written.planned_um.get(index, math.inf))
+            allowed_um[index] *= _MARGIN * limit / reached
         return tightened
 
     def keep_cut_price(self, written: Written, keepable: Callable[[int], bool], attempts_left: int) -> bool:
@@ -161,17 +161,17 @@ class Aims:
         wanted_s = math.fsum(self.emitted_s[index] for index in cuts) - excess_s
 
         def total_s(level_um: float) -> float:
-            return math.fsum(self._planned_s(index, max(level_um, self.room_um[index])) for index in cuts)
+            return math.fsum(self._planned_s(index, max(level_um, self.allowed_um[index])) for index in cuts)
 
         if cuts and total_s(math.inf) <= wanted_s:
             level_um = _bisect(
-                min(self.room_um),
+                min(self.allowed_um),
                 max(self._curve_of(index).loosest_um for index in cuts),
-                lambda room_um: total_s(room_um) <= wanted_s,
+                lambda allowed_um: total_s(allowed_um) <= wanted_s,
             )
             for index in cuts:
-                saved_s = self._planned_s(index, self.room_um[index]) - self._planned_s(index, level_um)
-                if level_um > self.room_um[index] and saved_s > 1e-3 * excess_s:
+                saved_s = self._planned_s(index, self.allowed_um[index]) - self._planned_s(index, level_um)
+                if level_um > self.allowed_um[index] and saved_s > 1e-3 * excess_s:
                     self._loosen(index, level_um)
             return True
         costs = {index: self.emitted_s[index] - self.original_s[index] for index in cuts if keepable(index)}
@@ -194,7 +194,7 @@ class Aims:
 
     def shaped_for_um(self, index: int) -> float:
         """Contour tolerance of a shaped cut, µm: the requested one, or the tightest within its price."""
-        return max(self._asked_um, self.room_um[index] / _MARGIN) if index in self._priced else self._asked_um
+        return max(self._asked_um, self.allowed_um[index] / _MARGIN) if index in self._priced else self._asked_um
 
     def time_s(self, index: int, tolerance_um: float) -> float:
         """Time of a cut at a contour tolerance: simulated for the requested one, else planned."""
@@ -229,27 +229,29 @@ class Aims:
         within = increase <= price.program_time_percent and dearest * 100.0 <= price.cut_time_percent
         return TolerancePoint(name, tolerance_um, time_s, increase, within)
 
-    def _planned_s(self, index: int, room_um: float) -> float:
+    def _planned_s(self, index: int, allowed_um: float) -> float:
         """Time of a cut planned for a deviation, s, with the simulated cost of slowing."""
         curve, blocks_s = self._curve_of(index), self._blocks_s[index]
-        least_s, now_s, then_s = (curve.time_s(um) for um in (math.inf, self.room_um[index], room_um))
+        least_s, now_s, then_s = (curve.time_s(um) for um in (math.inf, self.allowed_um[index], allowed_um))
         ratio = max(0.0, blocks_s - least_s) / (now_s - least_s) if now_s > least_s else 1.0
         slowest_s = least_s if now_s > least_s else max(least_s, blocks_s)
         return self.emitted_s[index] - blocks_s + slowest_s + ratio * (then_s - least_s)
 
-    def _loosen(self, index: int, room_um: float) -> None:
-        self.room_um[index] = max(room_um, _LOOSER * self.room_um[index])  # more if the plan was too optimistic
+    def _loosen(self, index: int, allowed_um: float) -> None:
+        self.allowed_um[index] = max(
+            allowed_um, _LOOSER * self.allowed_um[index]
+        )  # more if the plan was too optimistic
         self._priced.add(index)
 
     def _tightest_um(self, index: int, allowed_s: float) -> float | None:
         """Smallest deviation for which a cut can be planned within a time; None if there is none."""
         if self._planned_s(index, math.inf) > allowed_s:
             return None
-        now_um = self.room_um[index]
+        now_um = self.allowed_um[index]
         return _bisect(
             now_um,
             max(self._curve_of(index).loosest_um, now_um),
-            lambda room_um: self._planned_s(index, room_um) <= allowed_s * _PRICE_MARGIN,
+            lambda allowed_um: self._planned_s(index, allowed_um) <= allowed_s * _PRICE_MARGIN,
         )
 
 
@@ -336,7 +338,7 @@ def plan_curve(
     planned = _core.plan_tolerances(path, fir, options, tried)
     reached_um = max(planned[0][1] * 1e3, 1e-3)
     points = {reached_um: planned[0][0]}
-    # Points that need no slowing are redundant; a search may end slightly above the time of a looser one.
+    # Points that need no slowing are redundant; a search may end slightly below the time of a looser one.
     slowest = planned[0][0]
     for tolerance_um, (time_s, _) in zip(wanted, planned[1:], strict=True):
         if tolerance_um < reached_um:
@@ -411,7 +413,7 @@ Progress = Callable[[str, float, int], None]
 
 @dataclass(frozen=True)
 class CutChoice:
-    """What the caller chose: cuts not to shape, and what else to do."""
+    """Options of the caller: cuts to shape, tolerance curve."""
 
     not_shaped: dict[int, str]  # reason not to shape a cut, by its index
     shape_all: bool  # shape whatever can be shaped
@@ -524,7 +526,7 @@ class ConversionPlan:
             self.gains_um[index] = gained_um
 
     def leave_out(self) -> None:
-        """Before shaping, leave cuts unchanged that have nothing to gain or keep their limits already."""
+        """Before shaping, leave cuts unchanged that have nothing to gain; all of them if every cut keeps its limits."""
         self.original_within = self._original_is_within()
         if self.choice.shape_all:
             return

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def plots_of(conversion: Conversion) -> dict[str, Plot]:
-    """Path, feed and vibration of the region that vibrates most after its stop, before and after."""
+    """Path, feed and vibration of the cut with the largest residual vibration in the original; tolerance curve."""
     found = motion_pictures(partial(_simulated, conversion)) if conversion.regions else {}
     if conversion.tolerance_curve is not None and len(conversion.tolerance_curve.points) > 1:
         found["tolerance"] = partial(plot_tolerance, conversion.tolerance_curve)
@@ -25,7 +25,7 @@ def plots_of(conversion: Conversion) -> dict[str, Plot]:
 
 
 def plot_tolerance(curve: ToleranceCurve, ax: Axes | None = None) -> Axes:
-    """Plot the cycle time over the contour tolerance, and mark the knee.
+    """Plot the increase of the cycle time over the contour tolerance, and mark the knee.
 
     Args:
         curve: tolerance curve of a conversion.
@@ -58,7 +58,7 @@ def _simulated(conversion: Conversion) -> SimulatedRegion:
         range(len(conversion.regions)), key=lambda rank: max(conversion.regions[rank].residual_vibration_um.original)
     )
     place, handle = conversion.placed[worst], conversion.simulated
-    assert handle is not None  # a conversion from JSON has no regions either
+    assert handle is not None  # in a result from JSON, `placed` raises NotKeptError before
     model = MachineModel(handle.machine)
     path, blocks = place.region.path, place.blocks(conversion.emitted)
     offset = model.offset(place.region)

@@ -200,7 +200,7 @@ class RestartPlaces:
             while until - at > self._interval:
                 index = int(np.searchsorted(begins, at + aim, side="right")) - 1
                 if index < 0 or begins[index] <= at + near:
-                    index += 1  # a long segment: after it
+                    index += 1  # a long segment: stop after it
                 if index >= len(begins) or begins[index] >= until - near:
                     break
                 at = float(begins[index])
@@ -219,7 +219,7 @@ def _why_none(region: _core.Region) -> str:
 
 
 def block_lines(text: bytes, blocks: int) -> tuple[IntArray, IntArray]:
-    """Lines of the blocks in a text, without comment lines."""
+    """Begin and end of the line of each block in a text, in bytes; comment lines are skipped."""
     letters = np.frombuffer(text + b"(", dtype=np.uint8)  # so that a character follows the last line end
     ends = np.flatnonzero(letters == ord("\n")) + 1
     begins = np.concatenate([[0], ends[:-1]]).astype(np.int64)[: len(ends)]

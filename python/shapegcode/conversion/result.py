@@ -106,13 +106,13 @@ class Conversion(ProgramFigures, Result):
         reason: reason of the recommendation.
         cuts: every cut, shaped or left unchanged, with its gain and its price.
         tolerance_curve: what other contour tolerances cost in time; null: not computed, or nothing can be shaped.
-        proof: that nothing but the shaped cuts changed; null: nothing was shaped.
+        proof: that nothing but the shaped cuts changed; null: nothing was shaped, or rapids were without a header.
         advice: a smaller filter of the control that makes shaping unnecessary; null: none.
         cycle_time_s: whole program: cuts, rapids with in-position wait, dwells, drilling cycles.
         cutting_time_s: the cuts alone, until the set-points rest.
-        block_period_s: grid of the shaped blocks.
-        shaper: the shaper on this grid.
-        blocks: number of blocks.
+        block_period_s: common duration of the shaped blocks.
+        shaper: the shaper; its impulses are whole block periods apart.
+        blocks: number of blocks read, and of shaped blocks.
         expanded: true if the original was expanded (calls, macros, coordinate modes) before shaping.
         expanded_radii_mm: radii of cutter compensation included in the path, by offset.
         bytes_read: size of the original, expanded.
@@ -198,12 +198,12 @@ class Conversion(ProgramFigures, Result):
 
     @property
     def nothing_shaped(self) -> bool:
-        """True if the program is unchanged."""
+        """True if no cut was shaped."""
         return self.blocks.emitted == 0
 
     @property
     def kept(self) -> tuple[CutOutcome, ...]:
-        """The cuts left unchanged, except for a budget."""
+        """The cuts left unchanged for a reason other than the budget."""
         over_budget = {each.lines for each in self.budget.left_unchanged} if self.budget is not None else set()
         return tuple(cut for cut in self.cuts if not cut.is_shaped and cut.lines not in over_budget)
 
@@ -322,7 +322,7 @@ class Conversion(ProgramFigures, Result):
                 yield "lines {} to {}: {}".format(*cut.lines, miss)
 
     def tables(self, *, every_cut: bool = False) -> list[Table]:
-        """Tables: original and emitted; cut by cut; tolerance against time; operating conditions; sensitivity.
+        """Tables: before and after, cuts, tolerance against time, conditions, sensitivity, control, restart points.
 
         Args:
             every_cut: list all cuts; else those that miss a limit or gain most.
@@ -422,9 +422,9 @@ class Conversion(ProgramFigures, Result):
         return found
 
     def _completed(self, scene: Scene) -> Scene:
-        """The motion with the verdict in the emitted program, which was read back before it was written."""
+        """The motion with the final text of the emitted program, which contains the verdict."""
         *others, last = scene.variants
-        # In FANUC's words, to whose lines the simulated motion refers.
+        # The FANUC program, to whose lines the motion refers, even if another dialect is written.
         with_verdict = replace(last, text=self.emitted.text.decode("utf-8", "replace"))
         return replace(scene, variants=(*others, with_verdict))
 

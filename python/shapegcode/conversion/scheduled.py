@@ -53,7 +53,7 @@ class ScheduledConversion(Conversion):
     """A program with scheduled feeds, shaped; `original` is the program with these feeds, not yet shaped.
 
     Attributes:
-        feed_schedule: the feeds; its loads of the emitted program are those of the shaped one.
+        feed_schedule: the feeds; as emitted, the loads are those of the shaped program.
     """
 
     feed_schedule: FeedSchedule
@@ -135,7 +135,7 @@ def convert_scheduled(
         The conversion with its feed schedule.
 
     Raises:
-        ProgramError, DesignError, ArgumentError, StockError, RoundTripError: as the two functions.
+        ProgramError, DesignError, ArgumentError, StockError, RoundTripError: as `schedule_feed` and `convert`.
     """
     machine = Machine.of(machine)
     surveyed = survey(

@@ -24,10 +24,10 @@ from shapegcode.verdict.judge import Judge, RegionFigures
 
 _LEAST_SHARE = 0.01  # of a limit: smaller effects do not matter
 _MOST_SHOWN = 8
-_FREE_S = 60.0  # of motion: always simulated
+_FREE_S = 60.0  # total duration of motion that may always be simulated with contour error
 _FULL_RUNS = 2  # simulations of a whole region; the verdict needs about twice as many
-_FILTER_S = 0.024  # moving average of 1769 or 1622 on a machining centre, if the file has none
-_MODE = {"frequency_hz": 40.0, "damping_ratio": 0.02}  # of an axis of a machining centre, if none is known
+_FILTER_S = 0.024  # typical time constant (parameter 1769 or 1622) of a machining centre, if the file has none
+_MODE = {"frequency_hz": 40.0, "damping_ratio": 0.02}  # typical of a machining centre, if no mode of an axis is known
 _USUAL_MODE = f"a mode of {_MODE['frequency_hz']:g} Hz"
 _PERCENT = {"frequency_hz": 5.0, "damping_ratio": 50.0, "participation": 30.0}  # default uncertainties
 
@@ -38,9 +38,9 @@ class Sensitivity(OldNames):
 
     key: str  # dotted name in the machine file
     value: str  # as in the file, with its unit
-    origin: str  # "assumed", "inherited" from another machine, or "default"
+    origin: str  # "assumed", or "inherited" from another machine
     tested_value: str  # the changed value, as text
-    figure: str  # the judged figure with the largest effect relative to its limit
+    figure: str  # the figure that changes most relative to its limit
     figure_um: float  # that figure with the value of the file
     tested_um: float  # that figure with the changed value
     limit_um: float  # its limit
@@ -87,7 +87,7 @@ class _Region:
         return case_figures(run, contour=contour, response=self.judge.target == "response")
 
     def needs_contour(self, trial: _Trial) -> bool:
-        """True if the changed value affects the judged deviation."""
+        """True if the changed value affects the deviation that the contour tolerance limits."""
         return trial.moves_command or self.judge.target == "response"
 
     @property
@@ -96,7 +96,7 @@ class _Region:
         return "".join(axis for axis, extent in zip("xyz", extent_mm, strict=True) if extent > 0.0)
 
     def sensitivity(self, value: KeyValue, tested: str, figures: RegionFigures, simulated: CaseFigures) -> Sensitivity:
-        """The figure with the largest effect of a value relative to its limit, compared with the nominal condition."""
+        """The figure that a changed value increases most, relative to its limit, over the nominal condition."""
         limits = self.judge.limits(figures, self.place)
         own = figures.emitted[self.judge.rules.index(self.judge.own_rule)]
         before = {each.figure: each for each in judge_region(case_figures(own), limits)}
@@ -111,7 +111,7 @@ class _Region:
 def start_trials(
     judge: Judge, machine: Machine, place: Placed, emitted: Program, tracker: _core.ContourTracker, pool: Executor
 ) -> StartedTrials:
-    """Start the simulations with contour error that `parameter_sensitivity` needs; only if there is one region."""
+    """Start the simulations with contour error that `parameter_sensitivity` needs, for a program with one region."""
     region = _Region(place, emitted, judge, tracker)
     trials = filter(region.needs_contour, islice(_trials(machine, region.moving), _FULL_RUNS))
     return {_name(trial): pool.submit(region.simulate, trial, contour=True) for trial in trials}
@@ -155,7 +155,7 @@ def parameter_sensitivity(
 
 
 def _ranked(rows: Sequence[Sensitivity]) -> tuple[Sensitivity, ...]:
-    """The worst trial of each key, largest effect first; axes with unknown modes are always listed."""
+    """The worst trial of each key, largest effect first; small effects only of axes with unknown modes."""
     worst: dict[str, Sensitivity] = {}
     for row in rows:
         matters = row.share >= _LEAST_SHARE or row.key.endswith(".modes")
@@ -206,7 +206,7 @@ def _axis_trials(machine: Machine) -> dict[str, _Trial]:
 
 
 def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[Sensitivity, ...]:
-    """Rank axes with unknown modes, which to measure first: by how much a typical mode there would vibrate."""
+    """Rank axes with unknown modes by how much a typical mode there would vibrate: measure the first one first."""
     from shapegcode.simulation.simulate import simulate
 
     unknown = unknown_axes(machine)
@@ -224,7 +224,7 @@ def rank_unknown_axes(program: Program | str | Path, machine: Machine) -> tuple[
 def _modes(
     machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str, name: str
 ) -> Iterator[tuple[str, AxisMode]]:
-    """Yield key and mode of every mode with this value unverified that a moving axis excites."""
+    """Yield key and mode of every mode that a moving axis excites and whose value `name` is unverified."""
     for stem, axis, mode in numbered_modes(machine):
         excited = any(share and by in moving for share, by in zip(mode.excitation(axis), "xyz", strict=True))
         if excited and f"{stem}.{name}" in unmeasured:
@@ -272,7 +272,6 @@ def _key_of(case: Case) -> tuple[str, str]:
     return ("controller.block_end", case.name) if case.nominal else ("", "")
 
 
-# Round-off in sums of increments is far below this, a least increment far above.
 # Percentages of smaller values would compare round-off errors.
 _LEAST_COMPARED_UM = 1.0
 
@@ -300,7 +299,7 @@ class BeforeAfter:
 
     @property
     def change(self) -> str:
-        """Change from original to emitted; empty without an original, or if it is too small."""
+        """Change from original to emitted; empty if the original is missing or too small."""
         least = _LEAST_COMPARED_UM if self.unit == "µm" else 0.5 * 10.0**-self.digits
         if self.original is None or abs(self.original) < least:
             return ""
@@ -367,8 +366,8 @@ class CutOutcome(OldNames):
     tool: int | None  # T number that cuts; null: none programmed before
     is_shaped: bool  # False: it was left unchanged
     reason: str  # why it was left unchanged; empty if shaped
-    # gain of shaping: the larger reduction of residual vibration and contour error; for a cut left unchanged the
-    # expected gain, if it was tried
+    # gain of shaping: the larger reduction of residual vibration and contour error; for a cut that was never simulated
+    # as shaped, its upper bound
     gain_um: float
     residual_um: Pair[float]  # residual vibration of the worst axis
     contour_um: Pair[float]  # contour error of the target of the tolerance
@@ -376,7 +375,7 @@ class CutOutcome(OldNames):
     time_s: Pair[float]  # until the set-points rest
     bytes: Pair[int]  # size of its text
     misses: tuple[str, ...]  # limits that it misses, as text
-    # remedy for limits missed by a cut left unchanged; empty: none missed, or none known
+    # remedy for limits missed by a cut left unchanged; empty: none missed, or the cut is shaped
     remedy: str = ""
 
     @property
@@ -399,7 +398,7 @@ def remedy_for(reason: str) -> str:
 
 
 def cut_table(cuts: Sequence[CutOutcome], *, every: bool) -> Table:
-    """Table of cuts: first those that miss a limit, then by gain."""
+    """Table of cuts in program order: all, or those that miss a limit or gain most."""
     ranked = sorted(cuts, key=lambda cut: (not cut.misses, -cut.gain_um))
     shown = list(cuts) if every else sorted(ranked[:_SHOWN], key=lambda cut: cut.lines)
     columns = (
@@ -484,7 +483,7 @@ class RapidMove:
     settling_s: Pair[float]  # from the end of the set-points until the table stays within the band
     residual_vibration_um: Pair[Xyz[float]]  # largest |table - command| while the set-points rest
     residual_limit_um: Xyz[float]  # limit of the emitted one
-    misses: tuple[str, ...]  # missed tolerances; always empty: such a rapid is left unchanged
+    misses: tuple[str, ...]  # missed tolerances; always empty: a rapid that would miss one is left unchanged
 
 
 @dataclass(frozen=True)

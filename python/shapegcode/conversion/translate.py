@@ -1,7 +1,7 @@
 """Translate an emitted FANUC program into the dialect of another control.
 
-Nothing is shaped or judged here. A word with another or unknown meaning in the dialect
-is refused with its line; so the original is translated before it is shaped.
+Nothing is shaped or simulated here. A word whose meaning differs or is unknown in the dialect is refused with its
+line. The original is translated once before shaping, to refuse it early.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _MOVE = re.compile(r"(N\d+)?(?:G0?([0123]))?((?:[XYZIJKRF]-?(?:\d+\.\d*|\.\d+))+
 _RADIUS = re.compile(r"R|(?<![\d.])\.")
 _COMMENT = re.compile(r"\(([^()]*)\)")
 _ACTIVE_COMMENT = re.compile(r"\s*(MSG|DEBUG|PRINT|LOG|PROBE|PY|AXIS)")
-_PLACE = re.compile(r"(N\d+)?\(EMISSION (PROLOGUE|EPILOGUE|LOCK|UNLOCK)\)")
+_EMISSION_COMMENT = re.compile(r"(N\d+)?\(EMISSION (PROLOGUE|EPILOGUE|LOCK|UNLOCK)\)")
 _MOTION = ("G00", "G01", "G02", "G03")
 _CYCLES = {"G73", "G81", "G82", "G83", "G85"}
 _GROUPS = ({"G20", "G21"}, {"G93", "G94", "G95"}, {"G61", "G64"}, {f"G{code}" for code in range(54, 60)})
@@ -51,7 +51,7 @@ class Translation:
     """A program in the dialect of another control."""
 
     text: bytes
-    lines: npt.NDArray[np.int64]  # its line, from 1, by line of the FANUC program, from 0
+    lines: npt.NDArray[np.int64]  # line in it, from 1, of each line of the FANUC program
     blocks: int  # blocks added to those of the FANUC program: chords of arcs
     cautions: tuple[str, ...]  # words whose meaning depends on the setup of the control
 
@@ -163,7 +163,7 @@ class _State:
     is_open: bool = False  # the first block was written
     percents: int = 0  # `%` so far
     ended_at: int = 0  # line of M02 or M30
-    feed: str = ""  # active F, if a rapid needs its own
+    feed: str = ""  # active F: written again after a rapid, which has its own
     needs_feed: bool = False
     added: int = 0
 
@@ -243,7 +243,7 @@ class _Translator:
         )
 
     def lines(self, number: int, line: str) -> list[str]:
-        """Translate a line; add the path tolerance of shaped cuts around them."""
+        """Translate a line; set the path tolerance of shaped cuts before each of them, and restore it after."""
         if self._tolerance is None or not {number} & (self._begins | self._ends):
             return self._line(number, line)
         before, behind = list[str](), list[str]()
@@ -261,11 +261,11 @@ class _Translator:
         if number in self._linear:
             return self._linear[number]
         if state.percents > 1 or (state.ended_at and line.lstrip()[:1] not in ("%", "(", "")):
-            # Another control might run it.
+            # Another control might execute this line.
             left_out = f"{self._where(number)}: lines after the end of the program are left out"
             self.cautions.setdefault("end", left_out)
             return []
-        if (place := _PLACE.fullmatch(line)) is not None:
+        if (place := _EMISSION_COMMENT.fullmatch(line)) is not None:
             first, *rest = self._machine.emission.around_cuts[place[2]]
             return [("" if self._dialect.one_code else place[1] or "") + first, *rest]
         compact = line.replace(" ", "")
@@ -276,7 +276,7 @@ class _Translator:
         if not body or body[0] in "%O:<":
             return self._frame(body, comments, line)
         if self._has_percent and not state.percents:
-            return []  # a leader, which controls skip
+            return []  # the leader before the first %, which controls skip
         before = [] if state.is_open else self.opening(body)
         skip = re.match(r"(?:/\d?)?", body)[0]  # type: ignore[index]
         if skip and self._dialect.one_code:
@@ -380,7 +380,7 @@ class _Translator:
         return lines
 
     def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
-        """Words of an original for the output control, in place of the FANUC words into which they were translated."""
+        """Words of an original that was written for the output control, in place of the FANUC words read for them."""
         held = dict(words)
         found = {}
         if (tool := self._names.get(f"T{held.get('T', '')}")) is not None:
@@ -535,7 +535,7 @@ class _Translator:
         is_circle = state.motion in (2, 3) and not named.keys().isdisjoint("IJK")
         if "G04" in codes or not (move or is_circle):
             return [*lines, *late]
-        # G0 is as fast as G1 there: each has its F.
+        # In a dialect with one code per line, G0 moves at F as G1 does: each gets its own F.
         feed = f"F{self._rapid:g}" if state.motion == 0 else state.feed if state.needs_feed else ""
         state.needs_feed = state.motion == 0
         if state.motion in (2, 3):

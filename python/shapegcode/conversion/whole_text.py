@@ -16,10 +16,10 @@ from shapegcode import _core
 from shapegcode.conversion.restart import CutRestarts, FreeNumbers
 from shapegcode.conversion.write import (
     EmittedRegion,
-    NoRoomError,
+    OverBudgetError,
     RegionText,
     RegionWriter,
-    Room,
+    SpaceLeft,
     TransferLoad,
     keepable,
     measure_load,
@@ -106,10 +106,10 @@ class Written:
 
 
 class Prefetch(Generic[T]):
-    """Runs tasks in a pool some steps before their results are fetched, in their order.
+    """Runs tasks in a pool, in their order, a few of them before their results are fetched.
 
-    `tasks` by number; each calls its argument with its finished ratio. `on_progress` is called with the sum of the
-    finished weights, including those without a task, by the thread that fetches results; it may be replaced.
+    `tasks`: by number; each reports its finished ratio to its argument. `on_progress`: called with the sum of the
+    finished weights, also of parts without a task, by the thread that fetches results; it may be replaced.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class Prefetch(Generic[T]):
         self._done = 0.0
 
     def start(self) -> None:
-        """Start the first tasks before a result is fetched."""
+        """Start tasks, up to the limit of results that are not fetched."""
         while self._waiting and len(self._running) < _WAITING * cores():
             number, task = self._waiting.pop()
             future = self._pool.submit(task, partial(self._put, number))
@@ -209,8 +209,8 @@ class TextWriter:
             if not reason:
                 try:
                     shaped = self._shaped_region(index, aims[index], ahead)
-                    self._room(size - bytes_read, blocks + kept_moves).require(shaped.text.size, shaped.blocks)
-                except NoRoomError as error:
+                    self._space_left(size - bytes_read, blocks + kept_moves).require(shaped.text.size, shaped.blocks)
+                except OverBudgetError as error:
                     shaped = None
                     written.no_room[index] = str(error)
                     kept_moves += len(region.path)
@@ -248,9 +248,9 @@ class TextWriter:
         numbered = (replace(mark, number=number) for mark, number in zip(marks, numbers, strict=True))
         return replace(shaped.restarts, marks=tuple(numbered))
 
-    def _room(self, size: int, moves: int) -> Room:
+    def _space_left(self, size: int, moves: int) -> SpaceLeft:
         controller = self._machine.controller
-        return Room(controller.max_program_bytes - size, controller.max_program_moves - moves, self._machine)
+        return SpaceLeft(controller.max_program_bytes - size, controller.max_program_moves - moves, self._machine)
 
     def _ahead(self, aims: Mapping[int, Aim], on_moves: Callable[[float], None]) -> Prefetch[EmittedRegion]:
         """Shape regions in the pool, except those with unchanged tolerance and feed."""
@@ -261,9 +261,9 @@ class TextWriter:
             return prefetch
         regions = self._program.regions
         # Each is limited to the size of the whole program; together they may still exceed it.
-        room = self._room(0, 0)
+        space = self._space_left(0, 0)
         tasks = {
-            index: partial(self._shaped_anew, regions[index], *aim, room)
+            index: partial(self._shaped_again, regions[index], *aim, space)
             for index, aim in aims.items()
             if self._is_new(index, aim)
         }
@@ -285,13 +285,15 @@ class TextWriter:
             ahead.skip(index)
         return self._shaped[index][1]
 
-    def _shaped_anew(
-        self, region: _core.Region, room_um: float, feed_share: float, room: Room, on_share: OnShare
+    def _shaped_again(
+        self, region: _core.Region, allowed_um: float, feed_share: float, space: SpaceLeft, on_share: OnShare
     ) -> EmittedRegion:
         limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
         limits.feed_override = feed_share
         try:
-            return self._regions.write(self._program, region, limits, self._regions.tolerance(room_um), room, on_share)
+            return self._regions.write(
+                self._program, region, limits, self._regions.tolerance(allowed_um), space, on_share
+            )
         except _core.ArgumentError as error:
             raise self._program.region_error(region, str(error)) from error
 

@@ -39,7 +39,7 @@ class RegionText:
         if self._inside is not None:
             program, begin = self._inside
             return [program.text_slice(begin, begin + self.size)]
-        assert self._parts is not None  # handed over, and not read back
+        assert self._parts is not None  # else it was handed over and not read back yet
         return self._parts
 
     def number(self, restarts: Sequence[restart.RestartMark], numbers: Sequence[int]) -> None:
@@ -71,7 +71,7 @@ class EmittedRegion:
 
     text: RegionText  # whole lines
     blocks: int  # number of shaped blocks, without the lines around them
-    # block periods of each block, by part with blocks
+    # number of block periods of each block, one array per piece of the region
     block_periods: list[npt.NDArray[np.uint32]]
     block_bytes: list[npt.NDArray[np.uint32]]  # likewise the characters of each block
     planned_um: float  # deviation for which the feed was planned, µm; 0 without a target
@@ -108,12 +108,12 @@ def keepable(region: _core.Region, machine: Machine) -> bool:
     return machine.input.arc_centre != "absolute" or region.path.largest_sweep_rad <= 0.0
 
 
-class NoRoomError(Exception):
+class OverBudgetError(Exception):
     """The shaped text of a region exceeds the permitted size of the program."""
 
 
 @dataclass(frozen=True)
-class Room:
+class SpaceLeft:
     """Largest size of the shaped text of a region."""
 
     bytes: int  # bytes of text
@@ -129,7 +129,7 @@ class Room:
             limit = f"{controller.max_program_moves} moves (controller.max_program_moves)"
         else:
             return
-        raise NoRoomError(f"its shaped text would take the program over {limit}")
+        raise OverBudgetError(f"its shaped text would take the program over {limit}")
 
 
 _DEGREE = math.pi / 180.0
@@ -148,7 +148,7 @@ _TARGETS = {
 
 
 def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
-    """Data that keep the shaped command within a tolerance at corners and on arcs."""
+    """Contour tolerance for the planner, with the figures of the filters that decide the error at corners and arcs."""
     tolerance = _core.FilterTolerance()
     tolerance.variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own.variance_s2
     tolerance.mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own.mean_deviation_s
@@ -168,7 +168,7 @@ class _Marks:
         """N word at the start of the region, as written, to put before its prologue; empty: none."""
 
     def within(self, piece: _core.ShapedCommand, *, last: bool) -> tuple[list[_core.BlockMark], list[int]]:
-        """Restart marks within a piece, and the periods from its start at which blocks must end for them."""
+        """N words and comments within a piece, and the periods from its start at which blocks must end for them."""
         first = piece.first_period
         end = first + len(piece.middle_mm)
         reached = piece.segment_periods
@@ -247,7 +247,7 @@ class RegionWriter:
         region: _core.Region,
         limits: _core.MotionLimits,
         tolerance: _core.FilterTolerance,
-        room: Room | None = None,
+        space: SpaceLeft | None = None,
         on_progress: Callable[[float], None] = lambda _share: None,
     ) -> EmittedRegion:
         """Shape one region and write it, from a full safe line to the modal state of the original."""
@@ -258,10 +258,10 @@ class RegionWriter:
         shaper = _core.RegionShaper(region.path, self._grid.fir, marked, options)
         shaper.begin_early()
         try:
-            return self._write(program, region, shaper, room, on_progress, stopped)
+            return self._write(program, region, shaper, space, on_progress, stopped)
         except _WithdrawnError:
             shaper.begin_anew()
-        return self._write(program, region, shaper, room, on_progress, stopped)
+        return self._write(program, region, shaper, space, on_progress, stopped)
 
     def _places(self, region: _core.Region) -> restart.RestartPlaces:
         places = restart.RestartPlaces(region, self._machine, self._grid.block_period_s)
@@ -292,7 +292,7 @@ class RegionWriter:
         program: Program,
         region: _core.Region,
         shaper: _core.RegionShaper,
-        room: Room | None,
+        space: SpaceLeft | None,
         on_progress: Callable[[float], None],
         stopped: tuple[int, int],
     ) -> EmittedRegion:
@@ -320,8 +320,8 @@ class RegionWriter:
                 end = piece.first_period + len(piece.middle_mm)
                 texts.append(text)
                 periods.append(fitted.periods)
-                if room is not None:
-                    room.require(sum(map(len, texts)), sum(map(len, periods)))
+                if space is not None:
+                    space.require(sum(map(len, texts)), sum(map(len, periods)))
                 on_progress(share)
         # A search for the region's N word must not skip the prologue.
         number = marks.first_word

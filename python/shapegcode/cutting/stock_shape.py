@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 Points = NDArray[np.float64]
 _SAME_MM = 2e-3  # points of a program nearer than this coincide
-_CLOSED_RATIO = 0.5  # least closed fraction of a sequence's length to be a closed contour with lead-in and lead-out
+_CLOSED_RATIO = 0.5  # least length of closed contours in a sequence that has some; the rest is lead-in and lead-out
 _SAGITTA_MM = 4e-5  # largest deviation of chords from their arcs
 _SNAP = 2e-3  # GEOS merges corners nearer than this, relative to the distance; tolerance of corners
 _ROUNDS = 3
-_TURN_RAD = 0.1  # a corner, not two chords of an arc
+_TURN_RAD = 0.1  # least turn at a corner; between two chords of an arc it is smaller
 _RAMP_STEP_RATIO = 0.1  # of the tool's diameter: height of the layers on ramps and helices
-_MAX_LAYERS = 200  # sweeping one costs time in every layer above the tip
+_MAX_LAYERS = 200  # a sweep takes time for every layer above the tip
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ def _extended(points: Points, length_mm: float) -> Points:
 
 
 def _with_touched(points: Points) -> Points:
-    """Insert into each piece of a line the line's other points that lie on it, as where the end overlaps the start."""
+    """Insert into each segment of a line the other points of the line on it, as where its end overlaps its start."""
     import shapely
 
     pieces = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))

@@ -79,7 +79,7 @@ def move_load(move: SurveyedMove) -> PathLoad | None:
 
 
 def load_of(part: SurveyedRegion | SurveyedMove, travelled: Travelled) -> Load:
-    """Load along a region, or along a move outside of them."""
+    """Load along a region, or along a move outside of the regions."""
     assert part.tool is not None and part.track is not None
     # The engagement at a station applies with the feeds of the intervals before and after it.
     feeds = travelled.feed_mm_per_min.copy()

@@ -22,7 +22,7 @@ _LOWERING = 3  # attempts that only slow down earlier, before feeds are reduced 
 _SAME_DIRECTION = 0.95  # cosine of a turn that does not change the load
 _MIN_SHARE = 0.9  # least ratio of one reduction of a feed
 _TOO_FAST = 1e-4  # relative: rounding of the travel, far below the margin
-_DEEPER_PLUNGE = 0.01  # plunge depth of the tool's end in material, as a ramp cuts with the end
+_DEEPER_PLUNGE = 0.01  # fraction of the tool's end area in material above which a move is a plunge, not a ramp
 _AIR_MM2 = 1e-9
 _STEEPEST_AIR = 0.7  # least ratio of travel in XY for a move in air that is no plunge
 _MIN_PROGRAMMED = 0.1  # ratio to the programmed feed, without a least chip in the tool file
@@ -39,7 +39,7 @@ PROGRAMMED, MAX_FEED, AIR, KEPT, MINIMUM = "programmed", "max_feed", "air", "kep
 class Travelled:
     """Travel along a path, one value per station."""
 
-    feed_mm_per_min: Vector  # largest feed per tooth on the interval before the station, as a feed
+    feed_mm_per_min: Vector  # largest on the interval before the station, each a mean over the window of the travel
     time_s: Vector  # time on that interval
 
     @classmethod
@@ -60,7 +60,7 @@ class Mover:
         return 0.5 * self.period_s * sum(filter_.duration_samples for filter_ in self.filters)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
-        """Simulate `path`, a cut with other feeds; its speed at stations along `along`, mean over the window."""
+        """Simulate `path`, a cut with other feeds; return its speed at stations along `along`, mean over the window."""
         raise NotImplementedError
 
 
@@ -79,7 +79,7 @@ class OrdinaryMotion(Mover):
 def travel_emitted(
     blocks: _core.Path, path: _core.Path, machine: Machine, stations_mm: Vector, window_s: float
 ) -> Travelled:
-    """Simulate shaped blocks; their speed at stations along the programmed path, mean over the window."""
+    """Simulate shaped blocks; return their speed at stations along the programmed path, mean over the window."""
     model = MachineModel(machine)
     return Travelled.of(
         _core.travel_blocks(blocks, path, model.own_rule, stations_mm, model.period_s, model.shaped.filters, window_s)
@@ -95,7 +95,7 @@ class FeedPlan:
     holds: npt.NDArray[np.str_]  # reason of that feed, (n,) names
     kept: tuple[str, ...]  # why each segment's feed stays; empty if it may change
     stretches: tuple[_core.FeedStretch, ...]  # the feeds to write
-    # stations where the least feed per tooth exceeds the limits, (n,) of bool
+    # stations where even the lowest feed exceeds the limits, (n,) of bool
     held_at_minimum: npt.NDArray[np.bool_]
 
 
@@ -129,7 +129,7 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
     assert tool is not None and track is not None
     segment, stations_mm, window_s = np.asarray(track.segment), np.asarray(track.s_mm), surveyed.window_s
     programmed = path.segment_feeds_mm_per_s * 60.0
-    # Without a least chip, avoid rubbing for hours to keep an impossible limit.
+    # Without a least chip, a tenth of the programmed feed is the lowest, so that an impossible limit causes no rubbing.
     chip_mm = tool.limits.feed_per_tooth_min_mm or 0.0
     share = 0.0 if chip_mm else _MIN_PROGRAMMED
     teeth_per_min = tool.tool.flutes * surveyed.spindle_rev_per_min
@@ -231,14 +231,14 @@ def _limits_along(
 
 
 def goes_on(track: _core.EngagementTrack) -> npt.NDArray[np.bool_]:
-    """Per station but the last, (n - 1,): whether direction and so load continue nearly unchanged."""
+    """Whether the direction, and so the load, stays nearly the same up to the next station, (n - 1,)."""
     turn = np.diff(np.asarray(track.direction_rad))
     level = np.asarray(track.horizontal)
     return np.asarray((np.cos(turn) > _SAME_DIRECTION) & (level[1:] > 0.0) & (level[:-1] > 0.0))
 
 
 def _stepped(limit: Vector, programmed: Vector) -> Vector:
-    """Round feeds down, in steps of half a percent: below the programmed feed from that, above it from the largest."""
+    """Round feeds down in steps of 0.5 %, counted from the programmed feed, or from the largest for feeds above it."""
     top = np.where(limit > programmed, limit.max(initial=0.0), programmed)
     steps = np.ceil(np.log(top / limit) / math.log1p(_STEP) - 1e-9)
     return np.asarray(top * (1.0 + _STEP) ** -steps)

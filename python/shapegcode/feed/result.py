@@ -55,7 +55,7 @@ class PeakLoad:
 
     original: float  # with the original feeds
     emitted: float  # with the new feeds
-    place: str  # file and line of the latter; empty if there is none
+    place: str  # file and line of the largest value with the new feeds; empty if there is none
 
 
 @dataclass(frozen=True)

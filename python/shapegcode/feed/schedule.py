@@ -31,8 +31,8 @@ from shapegcode.results.outcome import Pair
 
 MARGIN = 0.015  # safety margin to each limit, for errors of the model and the load's position
 
-_SWEEPING = 0.5  # fraction of the progress bar; of the rest for planning
-_PLANNING = 0.7
+_SWEEPING = 0.5  # fraction of the progress bar
+_PLANNING = 0.7  # fraction of the rest
 _SAME_PLACE_INCREMENTS = 1.0
 _NEEDS_FEED = re.compile(rb"F|G0*[123](?!\d)|G\s*[78]\d|G\s*6[56]|M\s*\d*9[789]|[#<]")  # cuts, cycles, calls
 
@@ -59,7 +59,7 @@ def schedule_feed(
         stock: stock before the first block.
         motion: motion at the new feeds; None: the controller's own, as for an ordinary program.
         margin: safety margin to each limit, as a ratio.
-        resolution_mm: grid spacing of the simulated material; None: a hundredth of the tool's diameter.
+        resolution_mm: grid spacing of the simulated material; None: a hundredth of the smallest tool's diameter.
         on_progress: called with the completed fraction, 0 to 1.
 
     Returns:
@@ -126,7 +126,7 @@ def _plan_all(
         part = surveyed.regions[index]
         if part.kept or part.track is None or len(part.track) == 0:
             return None
-        options = _writer_options(part.region, machine)
+        options = _writer_options(program, part.region, machine)
         divisible = _core.divisible_segments(program.core, part.region, options)
         control = machine.controller
         feed_unit_mm_per_min = 10.0**-control.feed_decimals_mm
@@ -143,7 +143,7 @@ def _plan_all(
 
 
 def _writer_options(
-    region: _core.Region, machine: Machine, *, modal_feed: float = 0.0, restore_feed: bool = True
+    program: Program, region: _core.Region, machine: Machine, *, modal_feed: float = 0.0, restore_feed: bool = True
 ) -> _core.FeedWriterOptions:
     unit = MM_PER_INCH if region.exit.units == 20 else 1.0
     increment = least_increment_mm(machine, region.exit.units)
@@ -151,7 +151,7 @@ def _writer_options(
         increment_mm=increment,
         unit_mm=unit,
         position_decimals=-round(math.log10(increment / unit)),
-        absolute_centres=machine.input.arc_centre == "absolute",
+        absolute_centres=program.has_absolute_arc_centres,
         modal_feed=modal_feed,
         restore_feed=restore_feed,
     )
@@ -173,7 +173,7 @@ def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine)
             modal_feed = 0.0
         else:
             restore = not _says_its_own_feed(program, plans, index)
-            options = _writer_options(region, machine, modal_feed=modal_feed, restore_feed=restore)
+            options = _writer_options(program, region, machine, modal_feed=modal_feed, restore_feed=restore)
             refed = _core.write_feeds(core, region, list(plan.stretches), options)
             text = refed.text
             blocks += refed.blocks
@@ -197,7 +197,10 @@ def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index
 def _read_back(text: bytes, program: Program, first_lines: Sequence[int], machine: Machine) -> Program:
     """Read the new text back; its regions must match the original's in position, length and end."""
     try:
-        emitted = Program.from_text(text, machine, source="the written program", emitted=True)
+        emitted = Program.from_text(
+            text, machine, source="the written program", emitted=True,
+            absolute_arc_centres=program.has_absolute_arc_centres,
+        )  # fmt: skip
     except _core.ProgramError as error:
         raise RoundTripError(f"the written program cannot be read: {error}") from error
     if len(emitted.regions) != len(program.regions):

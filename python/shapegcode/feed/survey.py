@@ -142,8 +142,8 @@ class SurveyedRegion:
     spindle_rev_per_min: float  # speed of the spindle, 0 if unknown
     sense: _core.SpindleSense  # sense of rotation
     kept: str  # why the feeds of the region stay unchanged; empty if they may change
-    # certainly air at each sample, (n,): after a ramp the layers of the material are partly cut,
-    # but are whole or gone in the track. None: as in the track
+    # whether a sample is certainly in air, (n,): a layer that a ramp has cut only in part still counts as material
+    # here, but may count as removed in the track. None: as in the track
     clear: npt.NDArray[np.bool_] | None = None
 
     @property

@@ -63,7 +63,7 @@ class _Amplitudes:
 
 
 def measured(sources: Sequence[Any], options: ReadOptions) -> list[Measured]:
-    """Split measurements into records and frequency responses; read those that are files."""
+    """Records and frequency responses of all sources; files are read."""
     found: list[Measured] = []
     for each in sources:
         found += [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options)
@@ -92,7 +92,7 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
         for letter, parts in along.items():
             ratio, moves[letter] = in_phase = _ratio(own, parts, index)
             out_of_phase = abs(ratio.imag) > max(_OUT_OF_PHASE * abs(ratio.real), LEAST_MOVE)
-            if out_of_phase and _is_told(in_phase[1], abs(ratio)):
+            if out_of_phase and _is_significant(in_phase[1], abs(ratio)):
                 notes.append(
                     f"{mode.frequency_hz.value:.4g} Hz: {letter.upper()} moves {abs(ratio):.3g} times as far, "
                     f"{abs(np.degrees(np.angle(ratio))):.0f}° out of phase: only the part in phase is used"
@@ -108,15 +108,15 @@ def left_by(modes: Sequence[IdentifiedMode], record: Record) -> float:
     return float(left @ left) / max(float(values @ values), 1e-300)
 
 
-def told_moves(mode: IdentifiedMode) -> dict[str, Estimate]:
-    """The significant motions of a mode along other axes: those whose interval does not include zero."""
+def significant_motions(mode: IdentifiedMode) -> dict[str, Estimate]:
+    """The significant motions of a mode by axis, its own included: those whose interval does not include zero."""
     if mode.moves is None:
         return {}
     named = zip(_AXES, mode.moves, strict=True)
-    return {letter: each for letter, each in named if each is not None and _is_told(each, abs(each.value))}
+    return {letter: each for letter, each in named if each is not None and _is_significant(each, abs(each.value))}
 
 
-def _is_told(estimate: Estimate, size: float) -> bool:
+def _is_significant(estimate: Estimate, size: float) -> bool:
     return size > 0.5 * (estimate.high - estimate.low)
 
 
@@ -200,7 +200,7 @@ def _beside(use: Record, records: Sequence[Record], files: Sequence[str]) -> Rec
 
 
 def _is_of_refused(each: Measured, found: Identification) -> bool:
-    """True if it was recorded with impacts or stops that were all refused."""
+    """Whether a measurement is of a file whose impacts or stops were all refused."""
     own = any(f"{each.source} ".startswith(f"{name} ") for name in found.files)
     return own and isinstance(each, Record) and not any(_same_file(use, each, found.files) for use in found.taps)
 

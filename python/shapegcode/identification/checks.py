@@ -1,4 +1,4 @@
-"""Which records can be used: double hits, overload, missing force, too short, too slow; measures their noise."""
+"""Refuses unusable records (double hit, overload, no force, too short, too slow) and measures noise of the others."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ class RecordUse:
     source: str  # file, with the number of the impact or the channel
     used: bool  # whether the modes were fitted to it
     reason: str = ""  # why it is not used; empty: it is
-    samples: int | None = None  # number of recorded samples; null if not used, as for the following
+    samples: int | None = None  # number of recorded samples; null if not used, like the following values
     period_s: float | None = None  # time between two samples
     start_s: float | None = None  # time of the first sample in the file
     quantity: Quantity | None = None  # what the sensor measured
@@ -82,14 +82,14 @@ class Prepared:
 
 # A second pulse above this fraction of the first is refused: the impulse, and so the mass, would be wrong by as much.
 DOUBLE_HIT = 0.1  # Below, it may be the ringing of an anti-aliasing filter, which reaches 9 %
-MIN_FORCE = 10.0  # Least ratio of force to its noise: the mass would be wrong by about the inverse
+MIN_FORCE = 10.0  # Least ratio of the peak force to its noise: the error of the mass is about the inverse
 MIN_PULSE = 3  # Least samples of a pulse: with three, the impulse of a half sine is known to about 10 %
 MIN_LEAD = 8  # Least samples before the impact to measure noise and offset: a standard deviation to 25 %
 _CUT_PULSE = 0.2  # Refuse a record that begins within the pulse above this fraction of its peak
 _AT_REST = 0.1  # At rest before the impact: vibration below this fraction of that afterwards
 _MIN_MARGIN = 3  # The force is used for half a pulse on either side, at least this many samples
 _OFFSET_ERRORS = 2.0  # An offset above this many standard errors of its mean is removed
-_OFFSET_TOLD = 0.05  # An offset of the force above this fraction of the peak is reported
+_REPORTED_OFFSET = 0.05  # An offset of the force above this fraction of the peak is reported
 _OPPOSED = -0.7  # Correlation of force and response below which they are opposite
 _SAME_PERIOD = 1e-5  # Allowed relative difference of sampling periods, as in files of six digits
 
@@ -164,7 +164,7 @@ def _windowed(
     assert record.force_n is not None
     where = record.source
     offset = _mean_to_remove(quiet) if quiet.size >= MIN_LEAD else 0.0
-    if abs(offset) > _OFFSET_TOLD * abs(hit.peak_n):
+    if abs(offset) > _REPORTED_OFFSET * abs(hit.peak_n):
         warnings.append(f"{where}: offset of the force, {offset:.4g} N, removed")
     force = np.zeros(len(record.force_n))
     margin = max(_MIN_MARGIN, (hit.end - hit.first) // 2)
@@ -283,7 +283,7 @@ MIN_PERIODS = 8.0  # Least periods to find damping without full decay; fewer can
 _STRONG_PEAK = 0.3  # ... of the lowest spectral peak above this fraction of the largest
 DECAYED = 0.1  # Decayed: the last tenth of the record is below this fraction of the beginning
 _MIN_SAMPLES = 32  # Least samples after the impact for any model
-FOLDING = 0.8  # highest strongest frequency relative to half the sampling rate: above, filters cut and modes alias
+FOLDING = 0.8  # limit of the strongest frequency, relative to half the sampling rate: modes above may be aliased
 
 
 def is_clipped(values: FloatArray) -> bool:
@@ -339,7 +339,7 @@ def excited_hz(force_n: FloatArray, period_s: float) -> float:
 def refuse_short(
     record: Record, response: FloatArray, noise: float, band_hz: float | None, warnings: list[str]
 ) -> float:
-    """Refuse a record that is too short, or sampled too slowly for the strongest mode."""
+    """Refuse a record that is too short, or sampled too slowly for its strongest mode; returns that frequency, Hz."""
     half_rate = 0.5 / record.period_s
     if len(response) < _MIN_SAMPLES:
         raise RecordError(
@@ -382,17 +382,17 @@ def refuse_short(
     if last > DECAYED * first and record.force_n is not None:
         warnings.append(
             f"{record.source}: the response is still at {100 * last / first:.0f} % at the end of the record: its "
-            " FRF is smeared (leakage), the fit over time is not"
+            "FRF is smeared (leakage), the fit over time is not"
         )
     return frequency
 
 
-_PULSE_ENDS = 0.01  # A pulse ends below this share of its peak; a half sine then lacks 0.01 % of its impulse
+_PULSE_ENDS = 0.01  # A pulse ends below this ratio to the peak; a half sine then lacks 0.01 % of its impulse
 _NOISE_ENDS = 3.0  # ... or below this many standard deviations of noise
 _SMALLEST_PULSE = 0.03  # Pulses are searched above this fraction of the largest force
 _SMALLEST_HIT = 0.1  # An impact is above this fraction of the largest force; below, someone touched the hammer
-_PULSE_NOISE = 7.0  # ... and above so many standard deviations of noise, not reached by a million samples of noise
-_RINGING_SAMPLES = 8  # A pulse this many samples later is ringing of the anti-aliasing filter
+_PULSE_NOISE = 7.0  # ... and above this many standard deviations, which a million samples of noise do not reach
+_RINGING_SAMPLES = 8  # A further pulse within this many samples is ringing of the anti-aliasing filter
 _BOUNCE_S = 0.1  # A second impact within this time is a bounce of the hammer
 _RESTED = 0.1  # Before an intended next impact the response has fallen to this fraction of its peak
 _LEAD_SHARE = 0.1  # A record of one impact begins this fraction of the time between impacts before it

@@ -25,7 +25,7 @@ from shapegcode.identification.frf_model import (
 )
 from shapegcode.identification.frf_search import Pole, StablePole, Uncertainty, Window, cut, fitted, starts_of
 from shapegcode.identification.model_search import OPPOSED, Sought, chart_of, interval_refusal, mode_estimates
-from shapegcode.identification.problem import MIN_SWINGS, Starts
+from shapegcode.identification.problem import MIN_CYCLES, Starts
 from shapegcode.identification.result import ChartPole, Identification, IdentifiedMode, by_support
 from shapegcode.io.record import ComplexArray, FrequencyResponse
 from shapegcode.io.units import FloatArray
@@ -35,21 +35,21 @@ _COMMON = 0.5  # least common fraction of the bands of several responses
 _FURTHER = 1.3  # fit lines up to this factor above the excited frequency
 _SAME_POINT = 0.1  # largest relative difference of responses of one point
 _MIN_WIDTH = 1.0  # least width of a resonance, in line spacings: narrower may be leakage
-_HUM = 0.1  # at a mains harmonic, not decayed to this ratio at the end of the record: may be hum
+_HUM = 0.1  # a mode at a mains harmonic may be hum if it has not decayed to this ratio when the record ends
 _MAINS_HZ, _HARMONICS, _HUM_WIDTH = (50.0, 60.0), 20, 1.5  # width in frequency lines
 _MAINS_WIDTH_HZ = 2.0
 _VERY_CLEAR = 6.0  # added evidence needed by a mode without a peak of its own or a stable pole
 _LOCAL, _LOCAL_WIDTHS = 30.0, 2.0  # % residual; range in half-power widths
 _TURNED = 1.0  # tan of the phase of a residue: beyond, hammer and sensor are at different points
 _ACCEPTED_PERCENT = 50.0  # largest accepted half interval of the damping ratio
-_MAX_MODES, _IN_WINDOW = 40, 24  # by default for a structure; in a window
+_MAX_MODES, _IN_WINDOW = 40, 24  # default largest number of modes of a structure; largest one of a window
 _NO_VIBRATION = 0.3  # damping ratio above which it is background, not a mode
 _BEYOND = "beyond the requested number of modes: its peak is lower"
 _SMALL = 0.02  # ratio to the highest supported peak: refused modes below are ignored
 _DIFFERENT = 0.5  # residual ratio of one impact after the model of all: another point, axis or sign
 _OUT_OF_NOISE = 5.0
 _ENOUGH = 3.0  # least independent samples per parameter of a comparison fit
-_PEAK = 0.5  # half-power widths
+_PEAK = 0.5  # range around a mode in which its peak must be, in half-power widths
 _RISES = 2.0  # factor by which a peak exceeds its surroundings
 POOR = 0.3  # largest residual ratio in the band of a usable model
 
@@ -93,7 +93,7 @@ def find_frf_modes(responses: Sequence[FrequencyResponse], files: tuple[str, ...
             "damping, unless --exponential-window states it"
         )
     found = _in_responses(merged, sought)
-    # Reverse the sign if the significant supported modes move opposite to the force.
+    # Reverse the sign if the modes opposite to the force have higher peaks in total than the supported ones.
     with_it, against = (sum(_height(m) for m in found.modes if m.refusal == each) for each in ("", OPPOSED))
     turned = [f"{responses[0].source}: {model_search.TURNED}"] if against > with_it else []
     if turned:
@@ -187,7 +187,7 @@ def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -
     period = ready.records[0].period_s
     duration = min(len(each) for each in responses) * period
     excited = min(max(each.excited_hz or 0.0 for each in ready.usable), 0.45 / period)
-    low_hz, high_hz = MIN_SWINGS / duration, excited
+    low_hz, high_hz = MIN_CYCLES / duration, excited
     if sought.band_hz is not None:
         low_hz, high_hz = max(low_hz, sought.band_hz[0]), sought.band_hz[1]
     highest = min(_FURTHER * high_hz, 0.49 / period)
@@ -289,7 +289,7 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
-    """Reweight lines by the model residual: constant, proportional to the response, or half of each."""
+    """Weight lines by the noise in the model residual: constant, proportional to the model, or half of each."""
     left = np.abs(lines.response - model) ** 2
     # Lines without a mode nearby have no model: they keep their assumed noise.
     left = np.where(left > 0.0, left, np.log(2.0) / lines.weight**2)
@@ -526,7 +526,7 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
     share = min(lines.independent for lines in window.parts)
     starts = [each for place, each in enumerate(starts_of(fit)) if place != index]
     apart = np.abs(fit.omega - omega) > zeta * omega + fit.zeta * fit.omega
-    # A neighbour within its width must not move to its frequency: few iterations.
+    # Poles move only if one is within the width of the mode, in few iterations, so that it does not replace the mode.
     effort = (0, 1.0) if np.count_nonzero(~apart) == 1 else (10, 1e-4)
     without = fitted(window.parts, starts, effort)
     gain = np.inf if without is None else frf_search.evidence_of(without, share) - frf_search.evidence_of(fit, share)

@@ -1,6 +1,6 @@
-"""Lines of frequency responses, measured or of impacts, with their noise; maximum-likelihood fit of modes to them.
+"""Lines of frequency responses, measured or from impacts, with their noise; maximum-likelihood fit of modes to them.
 
-Poles are shared by all responses, residues are of each.
+All responses share the poles; each has its own residues.
 """
 
 from collections.abc import Sequence
@@ -198,12 +198,12 @@ def fit_modes(
     )  # fmt: skip
 
 
-_END = 1e-2  # of the exponential window at the end of the record
-_LEAD, _LAGS = 4, 64  # samples before a pulse
+_END = 1e-2  # value of the exponential window at the end of the record
+_LEAD, _LAGS = 4, 64  # samples used before a pulse; lags of the correlation between lines
 _QUIETEST = 1e-6  # least noise of a sensor, relative to the largest line
 _LATE = 0.4  # a steady disturbance is searched after this fraction of the record
 _STANDS_OUT = 8.0  # times the median of the spectrum there
-_STEADY = (0.8, 1.25)  # range of the last quarter's amplitude over that of the quarter before
+_STEADY = (0.8, 1.25)  # range of the second half's amplitude over that of the first half, both after `_LATE`
 _MOST_STEADY = 12
 
 

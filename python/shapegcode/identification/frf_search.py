@@ -1,4 +1,4 @@
-"""Searches modes of frequency responses: poles stable over model orders and bands, fitted window by window."""
+"""Searches for modes in frequency responses: poles stable over model orders and bands, fitted window by window."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,9 +18,9 @@ _EDGE = 1.05  # poles this near to the end of a band belong to the next one
 _SAME, _SAME_DAMPING = 0.35, 0.4  # poles count as one: distance in half-power half widths, and in ln zeta
 _CORE = 1.35  # upper end of a window over its lower end
 _MARGIN = 1.3  # a window's lines extend beyond its ends by this factor
-_BESIDE = 0.02, 3.0  # modes used beyond the lines: within this ratio of the frequency, and damping ratios
-STABLE = 0.34  # fraction of higher orders with a pole that is fitted from the start
-_SEEN = 0.12  # ... that is tried
+_BESIDE = 0.02, 3.0  # relative distance beyond the lines within which modes are fitted: constant; per damping ratio
+STABLE = 0.34  # a pole found in this fraction of the higher orders is fitted from the start
+_SEEN = 0.12  # ... is tried later
 _CLEARLY = 40.0  # times ln(samples): a mode is certainly needed if the fit without it, not refitted, is worse by more
 _QUICK, _FULL = (8, 1e-3), (40, 1e-8)  # iterations, and the gain that ends them
 _TRIED, _WEAKEST = 3, 2
@@ -29,10 +29,10 @@ _UNUSUAL = 2.0  # times the median residual: a mode with more near it may be two
 _LINES_PER_MODE = 4
 _FEW = 350  # lines of a window used in trials
 _BAND_LINES = 48  # least lines of a band or window
-_MAX_CHANGES, _ROUNDS = 60, 4  # with few lines, then with all
-_FEWEST = 12  # least lines of a fitted window
+_MAX_CHANGES, _ROUNDS = 60, 4  # largest number of changes of a model: with few lines, then with all
+_FEWEST = 12  # a window with no more lines is not fitted
 _DEGREE = 2  # polynomial degree of a window's background
-_CLEAR, _OPPOSED = 6.0, 8.0  # gain over Bayes' criterion that a mode needs; if opposite to the force
+_CLEAR, _OPPOSED = 6.0, 8.0  # gain needed by a mode beyond the information criterion; more if opposite to the force
 _TWINS = 0.02  # modes nearer than this fraction of their width are one
 _START_DAMPING = (0.005, 0.02, 0.06)
 _NO_VIBRATION = 0.5
@@ -201,7 +201,7 @@ def residues_of(fit: ModalFit) -> ComplexArray:
 def _fit_window(
     parts: Sequence[Lines], near: Starts, spare: Starts, low: float, high: float, most: int, final: bool
 ) -> list[Window]:
-    """Fit a window, modes chosen by evidence, from the starts near it; None with too few lines or no mode."""
+    """Fit a window, modes chosen by evidence, from the starts near it; empty with too few lines or no mode."""
     found: list[tuple[float, Window]] = []
     for complex_modes in (True, False) if final else (True,):
         wide = tuple(cut(lines, low / _MARGIN, high * _MARGIN, complex_modes) for lines in parts)
@@ -377,7 +377,7 @@ def _pruned(parts: Sequence[Lines], starts: Starts) -> Starts:
 
 
 def evidence_of(fit: ModalFit, share: float) -> float:
-    """Bayes' criterion of a fit: lower is better."""
+    """Bayesian information criterion of a fit, with more cost for each mode: lower is better."""
     samples = 2 * sum(len(part) for part in fit.left) * share
     opposed = np.count_nonzero(fit.residues.real < 0.0) if len(fit.residues) == 1 else 0
     cost = (fit.parameters + len(fit.omega)) * np.log(samples) + _OPPOSED * opposed + _CLEAR * len(fit.omega)
@@ -488,7 +488,7 @@ _LINES_PER_ORDER, _MAX_ORDER, _MIN_ORDER, _MOST_POLE_DAMPING = 4, 24, 2, 0.3
 
 
 def band_poles(parts: Sequence[Lines], low: float, high: float) -> list[Pole]:
-    """Poles between two angular frequencies, of models of growing order, ascending.
+    """Poles between two angular frequencies, of models of ascending order.
 
     Source: P. Guillaume et al., A poly-reference implementation of the least-squares complex frequency-domain
     estimator, IMAC 21, 2003.

@@ -1,4 +1,4 @@
-"""A tap test or a decay from files to modes: read, check, identify."""
+"""Identifies modes from files of tap tests, decays, sweeps or frequency responses: reads, checks and fits them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from shapegcode.identification import model_search
 from shapegcode.identification.across import left_by, measured, with_moves
 from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.frf_fit import POOR, FrfModes, doubt_of, find_frf_modes, find_hit_modes
-from shapegcode.identification.problem import HIGHEST_SHARE, Fit, FitProblem, are_blows, problem_of
+from shapegcode.identification.problem import HIGHEST_SHARE, Fit, FitProblem, are_pulses, problem_of
 from shapegcode.identification.result import Identification, MassCheck, by_support
 from shapegcode.identification.spectra import split_stops
 from shapegcode.identification.sweep import find_modes_of_captures, find_swept_modes, is_capture
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _LARGEST_MODEL = 99
 _OPTIONS = {"period_s": "sample_period", "exponential_window_s": "exponential_window"}  # options with another name
 _MIN_SAMPLES = 3
-_FIRST_STOPS, _STOP_LEFT = 4, 0.1  # stops with least motion; largest residual energy ratio of a stop after their modes
+_FIRST_STOPS, _STOP_LEFT = 4, 0.1  # least number of stops fitted first; largest residual energy ratio of a used stop
 
 
 def identify(
@@ -55,7 +55,7 @@ def identify(
     across: bool | str | Path | Record | FrequencyResponse | Sequence[str | Path | Record | FrequencyResponse] = False,
     strict: bool = True,
 ) -> Identification:
-    """Modes in one or several taps of a point (with force), in free decays (without), or in frequency responses.
+    """Identify modes from taps of one point (with force), free decays (without force), sweeps or frequency responses.
 
     Args:
         source: a file (CSV, UFF, WAV, MATLAB), several files, records or frequency responses; of one point and axis.
@@ -65,26 +65,26 @@ def identify(
         force: of the hammer at these instants in N, shape (n,); None: a free decay.
         options: information missing in the files.
         quantity: of `response`: "acceleration" in m/s², "velocity" in m/s or "displacement" in m.
-        max_modes: largest number of modes; None: 40 over frequency, 8 over time.
+        max_modes: largest number of modes; None: 40 over frequency, 8 over time, 4 in a sweep without force.
         modes: number of modes; None: by information criterion.
         band_hz: lowest and highest frequency of interest; None: all.
         start_s: time at which a decay begins; None: found automatically.
         stops: the records are of an ordinary run: every stop after which the machine rests is a decay; the 20
             strongest of a record are used. Motion below 10 Hz, or the lower end of `band_hz`, is no vibration.
-        accepted_percent: largest half of the 95 % interval of damping (in a fit over time also of stiffness); a mode
-            beyond it is refused; None: 5 % over time, 50 % over frequency.
+        accepted_percent: largest accepted half width of the 95 % interval of the damping ratio, in percent (in a fit
+            over time also of the stiffness); None: 5 % over time, 50 % over frequency.
         sweep: the program that ran during the record and moves one axis, as from `write_sweep`: its command takes the
-            place of the force, the logger's start and clock error are found from the record.
+            place of the force. The logger's start and clock error are found from the record.
         machine: the machine whose controller ran it.
-        across: find the mode shapes along the other axes too: True: from other channels of the same files, which
-            state their axes (a triaxial sensor); or from other files or records, of impacts at the same point.
+        across: also find the mode shapes along the other axes. True: from other channels of the same files, which
+            must state their axes (a triaxial sensor); else from these files or records of impacts at the same point.
         strict: raise if no record can be used; False: the reason is in the result's `reason`.
 
     Returns:
         The modes with their uncertainties, those that were refused and why, and how well they fit.
 
     Raises:
-        ArgumentError: a number of modes that is not from 1 to 99; a sweep without its machine.
+        ArgumentError: a number of modes outside 1 to 99; a sweep without its machine; options that cannot be combined.
         RecordError: no record can be used; the message says why and what is needed. No response along another axis.
         OSError: a file cannot be read.
 
@@ -126,18 +126,18 @@ def _identified(
     start_s: float | None, sweep: Program | str | Path | None, machine: Machine | str | Path | None, *, stops: bool,
     across: bool, strict: bool,
 ) -> Identification:  # fmt: skip
-    """Modes along one axis; of a sweep also their mode shapes."""
+    """Find the modes along one axis; with `across`, for a known command, also their shapes along the others."""
     ready: Prepared | None = None
     band_hz = sought.band_hz
     try:
         # The matrices are small: several BLAS threads would wait for each other, up to twenty times as long.
         with threadpool_limits(limits=1, user_api="blas"):
             if sweep is not None and machine is not None:
-                # Imported here: it simulates a control, which no tap needs.
+                # Imported here: the simulation of a control is needed for no other record.
                 from shapegcode.identification.known_command import find_modes_of_command, known_command
 
                 return find_modes_of_command(known_command(sweep, machine), sources, options, sought, across=across)
-            # A column named as a sensor's makes a capture a record of that sensor.
+            # If a response column is named, a capture is read as the record of a sensor.
             files = [] if options.response_columns else [Path(each) for each in sources if isinstance(each, str | Path)]
             if captures := [each for each in files if is_capture(each)]:
                 _refuse_of_sensors(captures[0], options, start_s, stops=stops, across=across)
@@ -161,8 +161,8 @@ def _identified(
     except (ArgumentError, NumericError) as error:
         if strict:
             raise
-        told: dict[str, Any] = {} if ready is None else {"warnings": ready.warnings, "notes": ready.notes}
-        return Identification(files=names, prepared=ready, reason=str(error), **told)
+        reported: dict[str, Any] = {} if ready is None else {"warnings": ready.warnings, "notes": ready.notes}
+        return Identification(files=names, prepared=ready, reason=str(error), **reported)
 
 
 def _refuse_of_sensors(
@@ -188,7 +188,7 @@ def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: 
 
 
 def _turned_if_opposed(ready: Prepared, found: Identification, sought: model_search.Sought) -> Identification:
-    """The modes found; with the sign of the responses reversed if all significant modes move against the force."""
+    """The modes found; if all are refused, some as opposite to the force, those of responses with reversed sign."""
     if found.modes or not any(mode.refusal == model_search.OPPOSED for mode in found.refused):
         return found
     text = f"{ready.records[0].source}: {model_search.TURNED}"
@@ -269,15 +269,15 @@ def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
     return read_sweep(found[0], options)
 
 
-_FEW_MODES, _MORE, _START_DAMPING = 4, 2, 0.02  # most modes fitted over time; more than those visible in the spectrum
-_SAMPLES_IN_TIME = 20_000  # most samples of all records for a fit over time
+_FEW_MODES, _MORE, _START_DAMPING = 4, 2, 0.02  # largest number of modes for a fit over time; further modes tried
+_SAMPLES_IN_TIME = 20_000  # largest number of samples, of all records, for a fit over time
 _EXPLAINED, _NOISE_SHARE = 0.003, 1.5  # largest residual of few modes, relative to the record's RMS, or to its noise
 _MANY = "many modes, or vibration that is no mode: fitted over frequency, band by band, within the excited band"
-_COLOURED = 4.0  # residuals count as coloured above so many standard errors of their autocorrelation
+_COLOURED = 4.0  # residuals are coloured if their autocorrelation exceeds this many standard errors
 _SPECTRUM = 4096  # points of the force's transform
 _FOLDED = 2.0 / 3.0
 _FILTER_ERROR = 3e-4  # largest error of a mass by decimation: the filters attenuate by 80 dB
-_FILTER_MOVES = (1e-6, 1e-4)  # ... and to a frequency and a damping ratio
+_FILTER_MOVES = (1e-6, 1e-4)  # ... of a frequency and of a damping ratio
 _FINER = 16  # steps per sampling period of the check by Wilson's method
 _POSSIBLY = 15.0  # allowed loss of evidence (twice the log odds) of another intersample behaviour of the force
 
@@ -290,8 +290,8 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sou
         raise RecordError(
             "an exponential window of a free decay cannot be separated from its damping: state it with the force"
         )
-    if problem.forces is not None and (windowed or (sought.modes is None and not are_blows(ready))):
-        # In the frequency domain all are cut to the shortest.
+    if problem.forces is not None and (windowed or (sought.modes is None and not are_pulses(ready))):
+        # In the frequency domain all records are cut to the length of the shortest.
         longest = max(len(record.response) for record in ready.records)
         short = [each for each in ready.usable if 2 * len(each.record.response) < longest]
         long = ready.without(short, "shorter than half of the longest record")
@@ -426,7 +426,7 @@ def _result(
         white_share=white_share,
         least=(0.0, 0.0) if thinned is None else _FILTER_MOVES,
     )
-    found = model_search.judged_modes(fit, _alone(problem, fit), others, doubts)
+    found = model_search.checked_modes(fit, _alone(problem, fit), others, doubts)
     left = float(np.sqrt(fit.sum_of_squares / squares)) if squares > 0.0 else 1.0
     return replace(
         without,
@@ -459,7 +459,7 @@ def _thinned_note(ready: Prepared, problem: FitProblem, band_hz: tuple[float, fl
 
 
 def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
-    """Fraction of the force's spectrum at a frequency that may be aliased from above half the sampling rate."""
+    """Fraction of the force's spectrum that may be aliased from above half the sampling rate, as a function of Hz."""
     is_simulated = problem.force_noise_n == 0.0 and problem.hold != "band_limited"
     record = ready.records[0]
     least = 0.0 if problem.thinned is None else _FILTER_ERROR
@@ -470,7 +470,7 @@ def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
     share = np.fft.rfftfreq(_SPECTRUM)
     highest = float(np.sqrt(np.mean(spectrum[share > HIGHEST_SHARE] ** 2)))
     noise = (ready.usable[0].force_noise_n or 0.0) * np.sqrt(len(pulse))
-    # A half sine falls with the square of the frequency: two thirds of it alias from both sides of the rate.
+    # The spectrum of a half sine falls with the square of the frequency: two thirds of its end count as aliased.
     folded = _FOLDED * np.sqrt(max(highest**2 - 2.0 * noise**2, 0.0))
 
     def at(frequency_hz: float) -> float:

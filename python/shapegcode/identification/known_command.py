@@ -34,16 +34,16 @@ _COARSE_STEP, _FINE_STEP = 0.001, 5e-4
 _FURTHEST_RATE, _EXACT_RATE = 0.003, 3e-6  # largest change from the rate found below 40 Hz; tolerance
 _LONGEST_WAIT_S, _WAIT_STEP_S = 0.21, 0.015  # largest difference of a part's duration from the simulated one; step
 _WAIT_GRID_S = np.arange(-0.025, 0.025, 2.5e-4)  # around the wait found below 40 Hz
-_TOLD_WAIT_S, _NEAR_S = 0.005, 0.03
-_CLOCK_KNOWN, _CLOCK_HZ = 3e-4, 150.0  # relative, 95 %; highest line that refines the clock
+_REPORTED_WAIT_S, _NEAR_S = 0.005, 0.03
+_CLOCK_KNOWN, _CLOCK_HZ = 3e-4, 150.0  # relative uncertainty of the clock (95 %); highest line used to refine it
 _COARSE_HZ = 40.0  # start and clock are first searched below this frequency
-_AFTER_S, _RINGS_S = 3.0, 2.0  # of record after the last part; needed after a part unless the next follows
+_AFTER_S, _RINGS_S = 3.0, 2.0  # record used after the last part; record needed after a part, unless the next one begins
 _OVER_HALF = 2.5  # samples per cycle of the highest line
 _LONGEST_LAG_S = 0.02  # largest lag of a part relative to the others
 _IRREGULAR_S = 0.008  # irregularity of the time between a rise and its fall
 _LAST_LAG_S = 0.004  # below half a cycle of the fastest moves
 _LAG_STEP_S = 5e-4
-_UNLIKELY = 0.3  # weight of a correlation at the longest lag
+_UNLIKELY = 0.3  # cost of the longest lag; a perfect correlation gains 1
 _EXPLAINED = 0.5  # least fraction of a part's power explained by the others
 _FEWEST_PARTS = 2
 _LOWEST_HZ, _NARROWEST = 4.0, 8.0  # lowest line; highest line over it
@@ -51,7 +51,7 @@ _HELD = 0.002  # fraction of samples at a range end with an equal neighbour
 _LOUD, _QUIET, _LEVELLED_HZ = 0.1, 0.01, 1.0  # energy of a used part over the loudest; whitening: floor, width
 _SAME_START_S, _AWAY_S, _STANDS_OUT = 0.15, 0.5, 2.0
 _GAINS_PER_S = np.geomspace(10.0, 200.0, 14)
-_LOWEST_SHARE = 0.15  # relative to the power of the command
+_LOWEST_SHARE = 0.15  # the lowest lines, with this fraction of the power of the command, determine the sign
 _CORRELATED = 0.25  # least squared correlation of a part, below 40 Hz
 _OWN = 0.1  # relative to the largest line of a part, in power
 _LAGS_S = np.arange(-0.1, 0.1, 2.5e-4)
@@ -133,7 +133,7 @@ def find_modes_of_command(
 
 
 def _between(each: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyResponse:
-    """Lines common to all records."""
+    """Lines of a response between two frequencies."""
     inside = (each.frequency_hz >= low_hz) & (each.frequency_hz <= high_hz)
     assert each.coherence is not None
     lines, coherence = each.response[inside], each.coherence[inside]
@@ -258,7 +258,7 @@ class _Clock:
         return best[1:]
 
     def aligned(self, band_hz: tuple[float, float] | None, chosen: bool, others: Sequence[Record]) -> _Aligned:
-        """Ratio −response/command with start and clock found; also for others on the same clock."""
+        """Ratio −response/command with start and clock found; also for other axes of the sensor."""
         rows = self._recorded(self._clear_parts(), _FEWEST_PARTS)
         clear = np.isin(np.arange(len(self.windows)), rows)
         spectra = self._spectra(None)
@@ -393,7 +393,7 @@ class _Clock:
             f"the program begins {abs(begins_s):.3f} s {'after' if begins_s >= 0.0 else 'before'} the record; the "
             f"logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
         ]
-        if abs(waits) > _TOLD_WAIT_S:
+        if abs(waits) > _REPORTED_WAIT_S:
             notes.append(
                 f"each part of the program with the rest after it takes {1e3 * abs(waits):.0f} ms "
                 f"{'longer' if waits > 0.0 else 'less'} than simulated: the control's ramps or waits are not those of "
@@ -461,8 +461,9 @@ def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
         return lags
 
     lags = moved(np.zeros(len(rows)), each, _LONGEST_LAG_S)
-    # In the band of a pair the rise and the fall outweigh the harmonics of other parts, so each determines the lag of
-    # the other: all parts first get the median of it. Then pairs are shifted as a whole: a single part would not move.
+    # In its band a pair (rise and fall) outweighs harmonics of other parts, so that the two set each other's lag.
+    # Parts first get the median lag from rise to fall, times their number. Then pairs are shifted as a whole: a single
+    # part would not move.
     between = [lags[pair[1]] - lags[pair[0]] for pair in pairs if len(pair) > 1]
     lags = np.asarray((float(np.median(between)) if between else 0.0) * (rows - np.mean(rows)), dtype=np.float64)
     lags = moved(lags, each, _IRREGULAR_S)
@@ -472,7 +473,7 @@ def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
 
 
 def _lag(spectra: Spectra, block: npt.NDArray[np.intp], own: npt.NDArray[np.bool_], longest_s: float) -> float:
-    """Delay of some parts' response relative to the prediction of the others, s; 0 if these do not explain it."""
+    """Delay of some parts' response relative to the prediction of the others, s; 0 for an unexplained pair."""
     others = spectra.of(np.setdiff1d(np.arange(len(own)), block)).ratio() * spectra.command[block]
     expected, response = (np.where(own[block], each, 0.0) for each in (others, spectra.response[block]))
     whole = float(np.sqrt(np.sum(np.abs(expected) ** 2) * np.sum(np.abs(response) ** 2)))

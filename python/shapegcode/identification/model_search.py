@@ -10,7 +10,7 @@ from scipy import stats
 
 from shapegcode import _core
 from shapegcode.errors import RecordError
-from shapegcode.identification.problem import MIN_SWINGS, Fit, FitProblem, Starts
+from shapegcode.identification.problem import MIN_CYCLES, Fit, FitProblem, Starts
 from shapegcode.identification.result import ChartPole, Estimate, IdentifiedMode
 from shapegcode.io.units import FloatArray
 
@@ -23,9 +23,9 @@ _STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of a stable pole: largest rel
 _APART = np.pi  # rad: two modes must differ by this phase over the record
 _CHART_ORDERS = 20  # of the stabilisation chart
 # Chart poles merged to one start: distance in half-power half widths, and in ln of damping.
-_SAME_PLACE, _SAME_DAMPING = 0.2, 0.2
+_SAME_FREQUENCY, _SAME_DAMPING = 0.2, 0.2
 _MAX_DAMPING = 0.7  # of a pole used as a start
-_PATIENCE = 2  # Consecutive unsupported models that end the search: one may have missed its start
+_PATIENCE = 2  # Consecutive unsupported models that end the search: one alone may have started badly
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ def _pool(problem: FitProblem) -> Starts:
     kept: Starts = []
     for w, z in reversed([mode for modes in chart_modes(problem) for mode in modes]):
         inside = z < _MAX_DAMPING and low <= w / (2.0 * np.pi) <= high
-        near = [y for v, y in kept if abs(w - v) < _SAME_PLACE * min(z, y) * w]
+        near = [y for v, y in kept if abs(w - v) < _SAME_FREQUENCY * min(z, y) * w]
         if inside and not any(abs(np.log(z / y)) < _SAME_DAMPING for y in near):
             kept.append((w, z))
     return kept
@@ -285,7 +285,7 @@ def rival_of(order: int, fits: Sequence[Fit], white_share: float) -> Fit | None:
     return larger if gain > by_chance else None
 
 
-def judged_modes(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Doubts) -> list[IdentifiedMode]:
+def checked_modes(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Doubts) -> list[IdentifiedMode]:
     """The modes by ascending frequency, each with its refusal if any, without drift and modes outside the band."""
     low, high = doubts.band_hz
     found = [
@@ -299,10 +299,10 @@ def judged_modes(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: 
 def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
     """Why the data do not support a mode; empty if they do."""
     frequency, damping, stiffness = mode.frequency_hz, mode.damping_ratio, mode.stiffness_n_per_m
-    if frequency.value * doubts.record_s < MIN_SWINGS:
+    if frequency.value * doubts.record_s < MIN_CYCLES:
         return (
             f"{frequency.value * doubts.record_s:.1f} cycles in the record of {doubts.record_s:.3g} s: "
-            f"{MIN_SWINGS:g} or more are needed"
+            f"{MIN_CYCLES:g} or more are needed"
         )
     refusal = lasting_refusal(frequency.value, damping.value, doubts.record_s)[0]
     refusal = refusal or interval_refusal(mode, doubts.limit_percent, 100.0 * doubts.aliased(frequency.value))

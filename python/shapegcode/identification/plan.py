@@ -88,7 +88,7 @@ _FALLEN_TO = 0.01  # The record lasts until the slowest mode has decayed to this
 _PERIODS = 20  # ... and at least this many of its periods
 _PRE_TRIGGER_SHARE, _PRE_TRIGGER_SAMPLES = 0.1, 100
 _RATES = (1.0, 2.0, 2.5, 5.0, 10.0)
-_TIPS = (  # Highest frequency that a tip typically excites, with the matching shortest pulse
+_TIPS = (  # Highest frequency that a tip typically excites, Hz
     (300.0, "soft rubber"),
     (1000.0, "hard rubber or soft plastic"),
     (3000.0, "hard plastic (nylon)"),
@@ -104,7 +104,7 @@ def _round_up(value: float) -> float:
 
 
 def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisRecording:
-    """How to record."""
+    """How to record an axis whose modes are known (Hz, damping ratio); without any, for the usual range."""
     known = modes or tuple((frequency, _USUAL_DAMPING) for frequency in _USUAL_HZ)
     highest = max(_LOOK_LEAST_HZ, _LOOK_ABOVE * max(frequency for frequency, _ in known))
     pulse = checks.EXCITED_HALF_SINE / highest

@@ -17,13 +17,13 @@ from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
 from shapegcode.results.outcome import Plot
 
-_MAX_TRACES, _SEEN, _ROOM = 3, 0.02, 2.5
+_MAX_TRACES, _SEEN, _SHOWN_ABOVE = 3, 0.02, 2.5
 _FILE_TIME = "time in the file in s"
 _FAINT = 0.35  # opacity of poles that are not stable
 _MIN_SHOWN = 1e-5  # of the largest value, on a logarithmic axis
 _CLEAR = 3.0  # times the noise: above this the model's envelope is that of the mode
 _BELOW_NOISE = 0.3
-_BEYOND_NOISE = 1.25  # times the decay's duration is drawn, to show the noise
+_BEYOND_NOISE = 1.25  # ratio of the time drawn to the decay's duration, to show the noise
 _MAX_ENVELOPES = 4
 _MEASURED, _FITTED = plot.GREY, plot.COLOURS[0]
 
@@ -46,7 +46,7 @@ def plots_of(found: Identification) -> dict[str, Plot]:
 
 
 def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:
-    """Force and response over time, with the model's response; the first ones of many taps.
+    """Force and response over time, with the model's response, of at most three records.
 
     Args:
         found: the identification.
@@ -280,9 +280,12 @@ def _spectrum(found: Identification) -> tuple[FloatArray, FloatArray]:
 
 
 def _seen(frequency_hz: FloatArray, found: Identification, peaks_hz: Sequence[float] = ()) -> slice:
-    """Range of frequencies to draw: from the first bin above 0 to well above the highest mode."""
+    """Range of frequencies to draw: without 0 Hz, to well above the highest mode."""
     marked = [*peaks_hz, *(mode.frequency_hz.value for mode in (*found.modes, *found.refused))]
-    return slice(1, int(np.searchsorted(frequency_hz, _ROOM * max(marked, default=frequency_hz[-1] / _ROOM))))
+    first = int(frequency_hz[0] == 0.0)
+    return slice(
+        first, int(np.searchsorted(frequency_hz, _SHOWN_ABOVE * max(marked, default=frequency_hz[-1] / _SHOWN_ABOVE)))
+    )
 
 
 def _mark_modes(column: list[Axes], found: Identification) -> None:

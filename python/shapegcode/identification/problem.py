@@ -1,4 +1,4 @@
-"""Data of a fit over time: taps with force, or free decays, in the form of the core's fits."""
+"""Data of a fit over time: taps with force, or free decays, as the core's fit functions take them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from shapegcode.io.units import FloatArray
 
 Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
 Fit = _core.ModalFit | _core.DecayFit
-MIN_SWINGS = 2.0  # Least cycles of a mode in the record to find its frequency
+MIN_CYCLES = 2.0  # Least cycles of a mode in the record to find its frequency
 HIGHEST_SHARE = 0.45  # Ratio to the sampling rate up to which the force between samples is known
 _STEPS, _QUICK_STEPS = 60, 15  # iterations of a fit; of one that only locates a mode
 _PEAKS = 2  # tried peaks of the residual's spectrum
@@ -26,13 +26,13 @@ class Thinned:
     """Decimated tap records."""
 
     responses: list[FloatArray]  # (n,) each
-    forces: list[FloatArray]  # (n,) each, force as from a recorder
+    forces: list[FloatArray]  # (n,) each, force band-limited between samples, as from a recorder
     straight: list[FloatArray]  # (n,) each, force linear between samples
     period_s: float  # time between two samples
     # power of white noise after the filter, relative to the band up to half the new rate
     white_share: float
     noise_correlation: float  # correlation of consecutive samples of filtered white noise
-    # noise per sample of the pulse relative to the original; the pulse's impulse is known as before
+    # noise of a sample of the pulse relative to the original, so that its impulse is as uncertain as before
     force_noise: float
     first_s: list[float]  # time of the first new sample relative to the first old one, per record
 
@@ -62,13 +62,13 @@ class FitProblem:
             )
         return _core.fit_modes(
             self.forces, responses, self.period_s, omega, zeta, quantity=self.quantity, hold=self.held,
-            # Readings after an impact lack force/mass, so a multiple of the force is fitted too.
+            # Samples after an impulse do not contain force/mass, so a multiple of the force is fitted too.
             with_mass_line=self.hold == "impulse" and self.held != "impulse" and self.quantity == "acceleration",
             force_noise_n=0.0 if quick else self.force_noise_n, coloured_residuals=coloured, most_iterations=steps,
         )  # fmt: skip
 
     def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
-        """Indices of the candidates that explain most in addition to those already chosen."""
+        """Indices of the first `kept` candidates, and of the one that explains most in addition to them."""
         omega, zeta = np.array(candidates).T
         records = self.responses, self.period_s
         ranking = _core.rank_modes(*records, omega, zeta, kept + 1, self.forces, self.quantity, kept)
@@ -139,7 +139,7 @@ class FitProblem:
 
 
 def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: bool = False) -> FitProblem:
-    """The records of a fit, and the band to search; a strong mode outside also contributes within it."""
+    """The records of a fit, and the band to search: unless `within`, wider than `band_hz`, as modes outside matter."""
     first = ready.records[0]
     responses = [record.response for record in ready.records]
     longest_s = max(len(response) for response in responses) * first.period_s
@@ -148,7 +148,7 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
             f"band of {band_hz[0]:g} to {band_hz[1]:g} Hz: must ascend and end below half the sampling rate, "
             f"{0.5 / first.period_s:g} Hz"
         )
-    band = (MIN_SWINGS / longest_s, HIGHEST_SHARE / first.period_s)
+    band = (MIN_CYCLES / longest_s, HIGHEST_SHARE / first.period_s)
     if band_hz is not None:
         band = band_hz if within else (min(band[0], band_hz[0]), max(band[1], band_hz[1]))
     widest = max(record.widened for record in ready.records)
@@ -167,7 +167,7 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
     return replace(
         taps, forces=thinned.forces, responses=thinned.responses, period_s=thinned.period_s, thinned=thinned,
         band_hz=(band[0], min(band[1], FLAT / thinned.period_s)), force_noise_n=noise_n * thinned.force_noise,
-        hold="impulse" if are_blows(ready) else taps.hold,
+        hold="impulse" if are_pulses(ready) else taps.hold,
     )  # fmt: skip
 
 
@@ -176,7 +176,7 @@ _STOP_DB = 80.0  # ... and has fallen to -80 dB at half of it, as the filters of
 _BAND = 0.34  # Highest end of the band, relative to the new rate
 _FEW = 4096  # Fewer samples than this need no decimation
 _MARGIN = 1.25  # Margin for response peaks above the band that the impact excites
-_MARGIN_OF_BLOWS = 2.0
+_MARGIN_OF_PULSES = 2.0
 _GRID = 8  # points of the filter's transform per coefficient
 
 
@@ -184,8 +184,8 @@ def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
     """Highest frequency to keep in an impact, Hz: that of the band and of response peaks above it."""
     excited = max(each.excited_hz or 0.0 for each in ready.usable)
     margin = _MARGIN
-    if are_blows(ready):  # they excite all up to half the rate
-        excited, margin = 0.0, _MARGIN_OF_BLOWS
+    if are_pulses(ready):  # short pulses excite all frequencies up to half the rate
+        excited, margin = 0.0, _MARGIN_OF_PULSES
     peaks = [
         peak.frequency_hz
         for each in ready.usable
@@ -201,7 +201,7 @@ def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
     factor = int(_BAND / (highest_hz * period)) if highest_hz > 0.0 else 1
     longest = max(len(record.response) for record in ready.records)
     factor = min(factor, longest // (_FEW // 2))
-    if factor < 2 or longest <= _FEW or (are_blows(ready) and ready.records[0].quantity == "velocity"):
+    if factor < 2 or longest <= _FEW or (are_pulses(ready) and ready.records[0].quantity == "velocity"):
         return None
     plain, straight = _filters(factor)
     reach = len(plain) // 2
@@ -229,8 +229,8 @@ def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
     return Thinned(responses, forces, courses, period * factor, whole * factor, correlation, force_noise, first_s)
 
 
-def are_blows(ready: Prepared) -> bool:
-    """Whether the pulses have only one or two samples."""
+def are_pulses(ready: Prepared) -> bool:
+    """Whether any pulse has only one or two samples."""
     forces = (record.force_n for record in ready.records)
     return any(np.count_nonzero(force) < MIN_PULSE for force in forces if force is not None)
 

@@ -148,7 +148,7 @@ class Sweep:
     frequency_hz: FloatArray  # (n,) middles of the bins
     amplitude: FloatArray  # (n,) amplitude of the response relative to the command, any unit
     fitted: FloatArray  # (n,) amplitude of the model
-    command: str = ""  # program or capture with the command; empty: command assumed from the record
+    command: str = ""  # program or capture with the command; empty: its spectrum is assumed
     kind: str = "sweep without force"
 
 
@@ -361,7 +361,7 @@ class Identification(Result):
     def plots(self) -> Mapping[str, Plot]:
         """`identify-traces`, `-stabilisation`, `-decay`, and `-response` or `-spectrum`; none without a model.
 
-        Of a frequency response without time record `-response` and `-stabilisation`, of a sweep `-sweep`.
+        For a frequency response without time record: `-response` and `-stabilisation`; for a sweep: `-sweep`.
         """
         return self._drawn_beside() if self.fitted or self.fitted_lines or self.sweep is not None else {}
 

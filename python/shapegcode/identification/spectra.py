@@ -212,8 +212,8 @@ _MODE_SHARE = 0.2  # Modes are peaks above this fraction of the tail's largest; 
 # A window of one period with this fraction of the largest RMS begins at most half a period early, so the decay
 # begins this fraction of a period later.
 _ONSET = 0.7
-_SLOWER = 0.8  # Below this fraction of the slowest mode's frequency it is motion of the axis
-_MOTION_SHARE = 0.4  # The axis moves: mean over a period of the lowest mode above this fraction of the envelope
+_SLOWER = 0.8  # Vibration below this fraction of the slowest mode's frequency is motion of the axis
+_MOTION_SHARE = 0.4  # The axis moves if the mean over a period of the lowest mode exceeds this fraction of the envelope
 _FEWEST_PERIODS = 3.0  # of the strongest frequency in the record
 _STOP_PERIODS, _STOP_FALLS = 3.0, 0.3  # periods of the lowest frequency after a stop; ratio to which the envelope falls
 _LOWEST_HZ = 10.0  # lowest mode in an ordinary run; slower is motion

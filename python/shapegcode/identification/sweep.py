@@ -30,7 +30,7 @@ _WIDENED = 2.0  # Factor on intervals for the command's spectrum, friction and b
 _MIN_FREQUENCY, _MIN_DAMPING = 0.005, 0.1  # narrowest half intervals, relative
 _FREQUENCY_LIMIT, _DAMPING_LIMIT = 2.0, 30.0  # widest accepted half intervals, %
 _NO_VIBRATION = 0.5
-_MIN_SHARE = 0.02  # least ratio to the axis' motion of a significant mode
+_MIN_SHARE = 0.02  # least motion of a significant mode, relative to that of the axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class _Model:
         return [tuple(row) for row in np.exp(self.parameters[2:].reshape(-1, 3))]
 
     def evidence(self, bins: int) -> float:
-        """Bayes' criterion; a bin's error is some percent at least, since harmonics of the command interfere."""
+        """Bayesian information criterion; a bin's error is 5 % or more, since harmonics of the command interfere."""
         return float(bins * np.log(self.squares / bins + _BIN_NOISE**2) + len(self.parameters) * np.log(bins))
 
 
@@ -65,7 +65,7 @@ def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> 
     best = fits[order]
     # Differences due to a free slope of the command's spectrum widen the intervals.
     other = _fit(frequency, power, best.starts, free=True)
-    found = [_judge_mode(best, other, index, len(power)) for index in range(order)]
+    found = [_checked_mode(best, other, index, len(power)) for index in range(order)]
     found = [mode for mode in found if band[0] <= mode.frequency_hz.value <= band[1]]
     found.sort(key=lambda mode: mode.frequency_hz.value)
     fitted = np.exp(0.5 * _log_power(best.parameters, frequency))
@@ -122,7 +122,7 @@ def _log_power(parameters: FloatArray, frequency: FloatArray) -> FloatArray:
 
 
 def _fit(frequency: FloatArray, power: FloatArray, starts: list[tuple[float, ...]], *, free: bool) -> _Model:
-    """Fit the logarithm; robust against a few outlying bins."""
+    """Fit the logarithm of the power, robustly against a few outlying bins."""
     goal = np.log(power)
     first = np.concatenate(([float(np.median(goal)), 0.0], np.log(np.array(starts, dtype=np.float64)).ravel()))
     slope = 1.0 if free else 1e-9
@@ -158,7 +158,7 @@ def _next(frequency: FloatArray, power: FloatArray, last: _Model) -> _Model:
     return min(tried, key=lambda fit: fit.squares)
 
 
-def _judge_mode(best: _Model, other: _Model, index: int, bins: int) -> IdentifiedMode:
+def _checked_mode(best: _Model, other: _Model, index: int, bins: int) -> IdentifiedMode:
     """One mode with its intervals, and its refusal, if any."""
     place = 2 + 3 * index
     quantile = _WIDENED * float(student.ppf(0.975, max(bins - len(best.parameters), 1)))
@@ -214,7 +214,7 @@ def find_modes_of_captures(paths: Sequence[Path], options: ReadOptions, sought: 
 
 
 def _axis_of(source: str, traces: Sequence[ServoTrace], axis: str | None) -> ServoTrace:
-    """The trace of an axis: X, X1, 1 (X1)."""
+    """The trace of an axis, by its name, such as X, X1 or 1 (X1)."""
     linear = [each for each in traces if each.unit == "mm"]
     named = [each for each in linear if axis is not None and axis in each.name.lower()]
     if len(named) == 1 or (axis is not None and len(linear) == 1 and not set("xyz") & set(linear[0].name.lower())):

@@ -78,7 +78,7 @@ class SweepProgram(Result):
         acceleration_percent: stated limit of the amplitude, relative to the axis' largest acceleration.
         duration_s: simulated duration of the program.
         size_bytes: size of the program.
-        warnings: read before the program runs.
+        warnings: to be read before the program is run.
     """
 
     machine: str
@@ -135,7 +135,7 @@ def write_sweep(
 ) -> SweepProgram:
     """Write a program that shakes one axis over a band of frequencies, for `identify` with `sweep`.
 
-    Back-and-forth moves (G91, G01), whose frequency rises, then falls, band by band, each after a pause. Their
+    It consists of back-and-forth moves (G91, G01), whose frequency rises, then falls, band by band, with pauses. Their
     lengths and feeds are planned on the controller's model: the amplitude of the commanded acceleration stays within
     the stated ratio to the axis' limit, the moves within the travel, the feed within the maximum. The program
     ends where it begins, and may be stopped by feed hold at any time.
@@ -214,7 +214,7 @@ def commanded(program: Program, machine: Machine) -> tuple[FloatArray, float]:
 
 
 @dataclass(frozen=True)
-class _Stroke:
+class _Move:
     hertz: float  # of one move back and forth
     length_mm: float
     feed_mm_per_min: float
@@ -227,7 +227,7 @@ class _Planner:
         self._axis = "xyz".index(axis)
         self._feed, controller = limits.max_feed_mm_per_min, machine.controller
         if controller.motion == "look_ahead" and controller.corner_rule == "speed_difference":
-            # Such a reversal needs no ramp: a move takes length/feed whatever the time constants.
+            # A reversal at this feed needs no ramp: a move takes length/feed whatever the time constants.
             at_once = _OF_STEP * getattr(controller.corner_speed_difference_mm_per_min, axis)
             if at_once >= _LEAST_AT_ONCE:
                 self._feed = min(self._feed, at_once)
@@ -235,7 +235,7 @@ class _Planner:
         self._block_s = max(controller.block_time_s, 2.0 * controller.interpolation_period_s)
         self._least_mm = _MIN_INCREMENTS * controller.least_increment_mm
 
-    def plan(self, low: float, high: float) -> tuple[list[_Stroke], str]:
+    def plan(self, low: float, high: float) -> tuple[list[_Move], str]:
         """Moves from the lowest frequency to the highest reachable one, and its limit."""
         most = 0.5 / (_SPARE * self._block_s)
         spare = f"with {100.0 * (_SPARE - 1.0):.0f} % margin"
@@ -246,23 +246,23 @@ class _Planner:
         if not top >= _MIN_BAND * low:
             raise ArgumentError(f"band of {low:g} to {high:g} Hz: must ascend by {_MIN_BAND:g} times or more; {limit}")
         count = 2 + math.ceil(_DESIGNED_PER_OCTAVE * math.log2(top / low))
-        found: list[_Stroke] = []
+        found: list[_Move] = []
         for hertz in np.geomspace(low, top, count):
-            stroke, amplitude = self._stroke(float(hertz))
-            short = stroke.length_mm < self._least_mm
+            move, amplitude = self._move(float(hertz))
+            short = move.length_mm < self._least_mm
             if short or amplitude < _LEAST_MM_S2:
                 limit = f"at {hertz:.4g} Hz " + (
-                    f"a move would be {1e3 * stroke.length_mm:.2g} µm, less than {1e3 * self._least_mm:g} µm"
+                    f"a move would be {1e3 * move.length_mm:.2g} µm, less than {1e3 * self._least_mm:g} µm"
                     if short
                     else f"the control commands only {amplitude:.2g} mm/s², less than {_LEAST_MM_S2:g} mm/s²"
                 )
                 break
-            found.append(stroke)
+            found.append(move)
         if not found or found[-1].hertz < _MIN_BAND * low:
             raise ArgumentError(f"band of {low:g} to {high:g} Hz: {limit}")
         return found, limit
 
-    def _stroke(self, hertz: float) -> tuple[_Stroke, float]:
+    def _move(self, hertz: float) -> tuple[_Move, float]:
         """The move with the wanted amplitude, or the largest possible one, and its amplitude in mm/s²."""
         top = min(self._feed, 60.0 * self._travel_mm / (0.5 / hertz))
         tried = [self._tried(hertz, float(feed)) for feed in np.geomspace(top / 100.0, top, _FEEDS)]
@@ -273,12 +273,12 @@ class _Planner:
             (below, low), (above, high) = tried[place - 1], tried[place]
             share = (math.log(goal) - math.log(low)) / (math.log(high) - math.log(low))
             tried[place] = self._tried(hertz, below.feed_mm_per_min ** (1.0 - share) * above.feed_mm_per_min**share)
-        stroke, size = tried[place]
-        if size > self.wanted:  # Too much even at the lowest feed: shorter moves would be faster ones
-            return self._tried(hertz, stroke.feed_mm_per_min * (self.wanted / size))
-        return stroke, size
+        move, size = tried[place]
+        if size > self.wanted:  # Too much even at the lowest feed tried: reduce the feed further
+            return self._tried(hertz, move.feed_mm_per_min * (self.wanted / size))
+        return move, size
 
-    def _tried(self, hertz: float, feed: float) -> tuple[_Stroke, float]:
+    def _tried(self, hertz: float, feed: float) -> tuple[_Move, float]:
         """The move that takes half a cycle, and its amplitude."""
         half_s = 0.5 / hertz
         low, high = 0.0, min(feed / 60.0 * half_s, self._travel_mm)
@@ -289,7 +289,7 @@ class _Planner:
             low, high = (middle, high) if lasts_s < half_s else (low, middle)
         x = self._motion(high, feed, _TRIED[1])
         size = amplitude(x, self._model.period_s, (0.8 * hertz, 1.2 * hertz), _TRIED[1] / 2 / hertz)
-        return _Stroke(hertz, high, feed), size
+        return _Move(hertz, high, feed), size
 
     def _motion(self, length_mm: float, feed: float, count: int) -> FloatArray:
         """Set-points of moves back and forth, (n,) mm."""
@@ -311,7 +311,7 @@ def amplitude(command_mm: FloatArray, period_s: float, band_hz: tuple[float, flo
     return math.sqrt(2.0 * energy / lasts_s)
 
 
-def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[list[_Stroke]]:
+def _bands(strokes: list[_Move], machine: Machine, seconds: float) -> list[list[_Move]]:
     """Moves back and forth of each rise and fall of the frequency, rounded to increments and feed decimals."""
     hertz, length, feed = np.array([astuple(each) for each in strokes]).T
     octaves = math.log2(hertz[-1] / hertz[0])
@@ -332,7 +332,7 @@ def _bands(strokes: list[_Stroke], machine: Machine, seconds: float) -> list[lis
             size, speed = (math.exp(np.interp(math.log(at), np.log(hertz), np.log(each))) for each in (length, feed))
             rounded = max(round((size + carried) / step), 1) * step
             carried = size + carried - rounded
-            rising.append(_Stroke(at, rounded, round(speed, digits)))
+            rising.append(_Move(at, rounded, round(speed, digits)))
             now_s += 1.0 / at
         found += [rising, rising[::-1]]
     return found
@@ -343,9 +343,9 @@ def plain_name(name: str) -> str:
     return "".join(sign for sign in name.upper() if sign.isalnum() or sign in " -.")[:30]
 
 
-def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) -> str:
+def _text(bands: list[list[_Move]], machine: Machine, axis: str, number: int) -> str:
     decimals = max(1, round(-math.log10(machine.controller.least_increment_mm)))
-    reach = max(stroke.length_mm for band in bands for stroke in band)
+    reach = max(move.length_mm for band in bands for move in band)
     lines = [
         "%", f"O{number:04d}(SWEEP {axis.upper()})", f"(SWEEP BY SHAPEGCODE FOR {plain_name(machine.name)})",
         f"(SHAKES {axis.upper()}: 0 TO +{reach:.{decimals}f} MM FROM THE START POINT)",
@@ -356,17 +356,17 @@ def _text(bands: list[list[_Stroke]], machine: Machine, axis: str, number: int) 
     ]  # fmt: skip
     for count, band in enumerate(bands):
         code, feed = f"G01 {axis.upper()}", ""
-        for stroke in band:
-            new = f" F{stroke.feed_mm_per_min:.{machine.controller.feed_decimals_mm}f}"
+        for move in band:
+            new = f" F{move.feed_mm_per_min:.{machine.controller.feed_decimals_mm}f}"
             new = new if "." in new else f"{new}."
-            size = f"{stroke.length_mm:.{decimals}f}".lstrip("0")
+            size = f"{move.length_mm:.{decimals}f}".lstrip("0")
             lines += [f"{code}{size}{'' if new == feed else new}", f"{axis.upper()}-{size}"]
             code, feed = axis.upper(), new
         lines.append(f"G04 P{round(1e3 * _PAUSE_S[count % 2])}")
     return "\n".join([*lines, "G90", "M30", "%"]) + "\n"
 
 
-def _swept(bands: list[list[_Stroke]], x_mm: FloatArray, period_s: float) -> tuple[SweptBand, ...]:
+def _swept(bands: list[list[_Move]], x_mm: FloatArray, period_s: float) -> tuple[SweptBand, ...]:
     moves = moving_parts(x_mm, period_s)
     if len(moves) != len(bands):
         raise ArgumentError(

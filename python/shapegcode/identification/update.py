@@ -16,7 +16,7 @@ from scipy.optimize import linear_sum_assignment
 from tomlkit.items import AoT, Key, SingleKey, Table
 
 from shapegcode.errors import ArgumentError, MachineError
-from shapegcode.identification.across import LEAST_MOVE, told_moves
+from shapegcode.identification.across import LEAST_MOVE, significant_motions
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, MachineFile
 from shapegcode.machine import Machine, check_axes
 from shapegcode.settings import edit
@@ -377,10 +377,14 @@ class ModeTables:
                 values[uncertain] = _rounded_up(estimate.uncertainty_percent), _MEASURED
         values["source"] = self.source, ""
         values = {key: values[key] for key in _KEYS if key in values}
-        told = {letter: each for letter, each in told_moves(mode).items() if abs(each.value) >= LEAST_MOVE}
-        if len(told) > 1:  # motion along other axes is significant
-            others = (f"{axis} {each.low:.3g} ... {each.high:.3g}" for axis, each in told.items() if axis != self.axis)
-            moves = {axis: _rounded(each.value, 4) for axis, each in told.items()}
+        significant = {
+            letter: each for letter, each in significant_motions(mode).items() if abs(each.value) >= LEAST_MOVE
+        }
+        if len(significant) > 1:  # motion along other axes is significant
+            others = (
+                f"{axis} {each.low:.3g} ... {each.high:.3g}" for axis, each in significant.items() if axis != self.axis
+            )
+            moves = {axis: _rounded(each.value, 4) for axis, each in significant.items()}
             values["moves"] = moves, f"95 %: {', '.join(others)}"
         return values
 
@@ -443,7 +447,7 @@ def _line(key: str, value: object, remark: str) -> str:
     return f"{key} = {toml(value)}" + (f"  # {remark}" if remark else "")
 
 
-SAME_MODE = 0.1  # Two frequencies, relative to the old one, up to which a mode is that of the file
+SAME_MODE = 0.1  # A mode is that of the file if its frequency differs by no more than this, relative to the old one
 _NO_PAIR, _SHARE_DIGITS = 1e3, 4
 
 
@@ -457,7 +461,7 @@ def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
 
 
 def matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:
-    """Index of the old mode by that of the new: the most pairs within 10 %, nearest first."""
+    """Index of the old mode by that of the new: as many pairs within 10 % as possible, with least total distance."""
     if not old_hz or not modes:
         return {}
     new_hz = np.array([mode.frequency_hz.value for mode in modes])

@@ -28,7 +28,7 @@ MAX_TEXT_BYTES = 1 << 20  # of one text, key, or line
 MAX_SETTINGS_BYTES = 4 << 20  # of a TOML file
 _MAX_BYTES = 2 << 30
 _MAX_INTEGER = 2**63 - 1
-#: Unpacked over packed: numbers of a log reach 5 to 15. Up to some size any ratio is accepted.
+#: Limit of unpacked over packed size (logs of numbers: 5 to 15), and unpacked size up to which any ratio is accepted.
 _MAX_RATIO, _ANY_RATIO_BYTES = 50, 16 << 20
 #: Memory limit of a JSON file's values, relative to its bytes, and the limit for small files.
 _MAX_GROWTH, _ANY_GROWTH_BYTES = 60, 600 << 20
@@ -125,7 +125,7 @@ class DataFile:
         return b"".join(self.pieces())
 
     def members(self, suffix: str) -> Iterator[tuple[str, bytes]]:
-        """Yield the files in a zip archive."""
+        """Yield name and content of the files in a zip archive whose names end in *suffix*."""
         try:
             with zipfile.ZipFile(self._file) as archive:
                 for each in archive.infolist():
@@ -229,7 +229,7 @@ def write_in_passing() -> None:
     _passing = True
 
 
-_TEMPORARY = re.compile(r"\..+\.[0-9a-f]+\.tmp")  # digits only: from earlier versions
+_TEMPORARY = re.compile(r"\..+\.[0-9a-f]+\.tmp")  # names of earlier versions have decimal digits only
 
 
 @contextlib.contextmanager
@@ -279,7 +279,7 @@ def _target_of(path: str | Path) -> Path:
 
 
 def is_temporary(path: str | Path) -> bool:
-    """Whether a file is a temporary one whose process was killed before it replaced the target."""
+    """Whether a file has the name of a temporary one, which remains if its process is killed."""
     return _TEMPORARY.fullmatch(Path(path).name) is not None
 
 

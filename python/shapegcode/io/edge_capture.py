@@ -208,10 +208,9 @@ class EdgeCapture:
     def position(self, axis: int | str, *, actual: bool = False) -> FloatArray:
         """Position of an axis, with a rotary axis' wraps by whole turns removed.
 
-        A step of more than half a turn within one cycle is a wrap if, less whole turns, it continues the steps before,
-        since no axis moves that fast (90 m/s, 15 000 rpm at 2 ms). The number of turns in a gap
-        is unknown: after it the file's value is used unchanged. Command and actual position are unwrapped by
-        the same turns, so that their difference is unchanged.
+        No axis moves half a turn within one cycle (90 m/s, 15 000 rpm at 2 ms). A step of more is a wrap if, less whole
+        turns, it continues the steps before. The number of turns in a gap is unknown: after it the file's value is used
+        unchanged. Command and actual position are unwrapped by the same turns, so that their difference is unchanged.
 
         Args:
             axis: number or label.

@@ -96,7 +96,7 @@ def _numbers(where: str, rows: Any, addresses: tuple[str, ...]) -> FloatArray:
 def _counters(
     raw: FloatArray, values: FloatArray, sources: list[str], starts: IntArray
 ) -> tuple[IntArray, npt.NDArray[np.bool_], list[str]]:
-    """Counter and index of each row used, and notes."""
+    """Counters of the rows used, the mask of these rows, and notes."""
 
     def at(row: int) -> str:
         piece = int(np.searchsorted(starts, row, side="right")) - 1
@@ -263,7 +263,7 @@ def read_edge_json(path: str | Path) -> EdgeCapture:
 
     Raises:
         RecordError: not such a file, truncated, of another version, or with impossible values; the message gives
-            the place, what was found and what is required.
+            the location, what was found and what is required.
         OSError: the file cannot be read.
     """
     path = Path(path)
@@ -435,8 +435,8 @@ def _axes(signals: tuple[tuple[str, str], ...]) -> tuple[EdgeAxis, ...]:
 def edge_runs(path: Path) -> Iterator[RunLog]:
     """Yield the run of a capture.
 
-    `block` has the line numbers of one program only, the one with most blocks in the capture: those of cycles and
-    subprograms count in other files. `block_texts` has all blocks.
+    `block` has the line numbers of one program only, the one with most blocks in the capture: lines of cycles and
+    subprograms are counted in files of their own. `block_texts` has all blocks.
     """
     capture = read_edge_json(path)
     count = Counter(block.path for block in capture.blocks if block.line is not None)

@@ -43,7 +43,7 @@ _PARTS = {
 }
 _WORDS = {word: part for part, words in _PARTS.items() for word in words.split()}
 _DB = 20.0
-_BARE_COLUMNS = (3, 4)  # without a header: frequency, real and imaginary part, in this order, for so many columns
+_BARE_COLUMNS = (3, 4)  # allowed numbers of columns without a header: frequency, real, imaginary (and coherence)
 
 
 def part_of(text: str) -> str | None:

@@ -17,7 +17,7 @@ from shapegcode.io.table import chunks, line_chunks
 
 _MAX_OBSERVATIONS = 1_000_000  # the size of an agent's largest buffer
 _MAX_ITEMS = 100_000
-#: Sub-types whose value is not the machine's actual one, by kind of item.
+#: Sub-types whose value is not the machine's actual one.
 _LEFT_OUT = {"COMMANDED", "PROGRAMMED", "JOG", "TARGET", "PROBE", "INCREMENTAL", "SCHEDULE", "OVERRIDE"}
 _AXES = ("X", "Y", "Z")
 _BEGIN = re.compile(rb"<\?xml\s|<(?:\w+:)?MTConnect(?:Streams|Devices|Error|Assets)\b")
@@ -235,7 +235,7 @@ def shdr_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Even
             fields = line.split(b"|")
             if len(fields) != 3 or odd.until:
                 pairs = odd.pairs(number, line, fields)
-            else:  # nearly every line, so kept fast
+            else:  # nearly every line: this branch must be fast
                 name = fields[1]
                 found = known[name] if name in known else odd.find(name)
                 pairs = () if found is None else ((found, fields[2]),)

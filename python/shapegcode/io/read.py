@@ -413,8 +413,8 @@ def _channels(path: Path) -> tuple[int, FloatArray, bool]:
 def read_wav(path: Path, options: ReadOptions) -> list[Record]:
     """Read a WAV file.
 
-    Float samples are in N and m/s² (or times the scales); integers are ratios of full scale, converted to N and m/s² by
-    the scales.
+    Float samples are multiplied by the scales; without scales they are in N and in SI units of the quantity. Integers
+    are ratios of full scale, which the scales convert to these units.
     """
     rate, data, shares = _channels(path)
     count, channels = data.shape

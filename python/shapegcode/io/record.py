@@ -32,7 +32,7 @@ class Record:
         response: (n,) in the unit of `quantity`.
         quantity: what the sensor measured.
         force_n: (n,) force of the hammer at the same instants; None: a free decay.
-        axis: "x", "y" or "z" None if the file does not state it.
+        axis: "x", "y" or "z"; None: the file does not state it.
         start_s: time of the first sample in the file.
         warnings: assumptions made on reading.
         notes: parts ignored on reading.
@@ -147,13 +147,13 @@ _VOLTS = {"v": 1.0, "mv": 1e-3, "µv": 1e-6, "uv": 1e-6}
 
 
 def volts_of(unit_text: str) -> float | None:
-    """Factor from V, mV or µV to volts."""
+    """Factor from V, mV or µV to volts; without a unit 1; None: another unit."""
     plain = unit_text.strip().lower().replace("μ", "µ")
     return 1.0 if plain in {"", "volt", "volts"} else _VOLTS.get(plain)
 
 
 def per_volt(option: str, text: str, allowed: tuple[Measured, ...]) -> tuple[Unit, float]:
-    """Unit and value of one volt by a sensitivity."""
+    """Unit of the quantity that a sensor measures, and the SI value of one volt, from its sensitivity."""
     match = re.fullmatch(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([mµuμ]?V)\s*/\s*\(?(.+?)\)?\s*", text)
     unit = find_unit(match[3]) if match else None
     volts = volts_of(match[2]) if match else None
@@ -190,7 +190,7 @@ class FrequencyResponse:
         response: (n,) complex, in m/s², m/s or m per N by `quantity`.
         quantity: response quantity, which was divided by the force.
         coherence: (n,) 0 to 1; None: not in the file.
-        axis: "x", "y" or "z" None if the file does not state it.
+        axis: "x", "y" or "z"; None: the file does not state it.
         warnings: assumptions made on reading.
         notes: parts ignored on reading.
         scaled: False: the force is known only up to a factor (a motor's torque), so that no mass follows.
@@ -230,7 +230,7 @@ class FrequencyResponse:
         return float(np.median(np.diff(self.frequency_hz)))
 
 
-_SIZES = 1e-50, 1e50  # whose fourth powers are finite
+_SIZES = 1e-50, 1e50  # limits of magnitudes; their fourth powers do not overflow
 
 
 def checked_response(
@@ -330,7 +330,7 @@ def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, fl
 _OFF_GRID = 0.49
 #: Allowed relative difference of a step from the period; a missing sample doubles the step.
 _OFF_STEP = 0.9
-_TELL = 0.1  # deviation from the grid that is reported, relative to the period
+_REPORTED_DEVIATION = 0.1  # deviation from the grid that is reported, relative to the period
 #: Allowed relative difference of stated and measured rate: clocks are far better, wrong units far worse.
 STATED_RATE_TOLERANCE = 0.01
 #: Rounding moves an instant by half a digit at most; if digits are finer than this fraction of the deviation, the
@@ -351,7 +351,7 @@ class UnevenTimeError(ValueError):
 def even_period(
     times_s: FloatArray, stated_s: float | None = None, *, even_clock: bool = True
 ) -> tuple[float, list[str]]:
-    """Mean period of evenly spaced instants, and warnings."""
+    """Period of evenly spaced instants, the stated one or else the mean, and warnings."""
     count = len(times_s)
     steps = np.diff(times_s)
     backwards = np.flatnonzero(steps < 0.0)
@@ -394,10 +394,10 @@ def even_period(
     if share > limit:
         text = f"{place} (limit {limit:.2g}): {_GRID_ONLY} and none may be missing"
         raise UnevenTimeError(row, text, ascending=True)
-    if not even_clock and share > _TELL and not coarse and _digit_of(times_s) < _ROUNDED * share * period:
+    if not even_clock and share > _REPORTED_DEVIATION and not coarse and _digit_of(times_s) < _ROUNDED * share * period:
         text = f"{place}, more than the digits of the file explain: {_GRID_ONLY}"
         raise UnevenTimeError(row, text, ascending=True)
-    if share > _TELL and not coarse:
+    if share > _REPORTED_DEVIATION and not coarse:
         return period, [
             f"times are up to {100 * share:.0f} % of a period from even spacing: assumed rounding, with the mean "
             f"period of {period:.6g} s"
@@ -419,8 +419,8 @@ _LONGEST_STEP = 3.0  # longest step relative to the mean: a longer one limits th
 _REACH = 16  # sinc of this many samples on either side in a Kaiser window with 80 dB, flat up to .4 of the grid's rate
 _BETA = 7.86
 _RIDGE = 1e-6
-#: Least factor on intervals: the pulse's content above the grid's band is an error in addition to noise
-#: that a fit to the grid does not detect.
+#: Minimum factor on confidence intervals: content of the pulse above the band of the grid is an error in addition to
+#: the noise, which a fit to the resampled data does not detect.
 _MIN_WIDENED = 3.0
 
 

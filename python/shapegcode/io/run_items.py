@@ -55,7 +55,7 @@ _STATES: dict[State, str] = {
     "ended": "READY IDLE RESET ABORTED CANCELLED CANCELED UNAVAILABLE OFF E_STOP EMERGENCY_STOP",
 }
 STATES: dict[str, State] = {word.replace("_", ""): state for state, words in _STATES.items() for word in words.split()}
-"""Meaning of a status, by its words in capitals without blanks, bars and hyphens."""
+"""Meaning of a status, by its words in capitals without blanks, underscores and hyphens."""
 
 
 def plain_name(name: str) -> str:
@@ -107,7 +107,7 @@ class ItemTable:
         """Identify an item by its names."""
         found = self._find(names)
         if found is not None:
-            # The same item again, in another document, is the same object, as values are stored by it.
+            # An item that another document contains too is the same object: values are stored by item.
             found = self._items.setdefault((found.name, found.role), found)
         if len(self.seen) < _MAX_NAMES:
             self.seen[names[0]] = found
@@ -167,7 +167,7 @@ _ISO = re.compile(
 _GERMAN = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4})[T ](\d\d?):(\d\d)(?::(\d\d)([.,]\d+)?)?")
 _CLOCK = re.compile(r"(\d\d?):(\d\d):(\d\d)([.,]\d+)?")
 _NUMBER = re.compile(r"\d+(\.\d*)?(e[+-]?\d+)?", re.IGNORECASE)
-#: Larger plain numbers are milliseconds since 1970, as seconds would be the year 5138.
+#: Larger plain numbers are milliseconds since 1970: in seconds they would be after the year 5138.
 _MILLISECONDS_FROM = 1e11
 _LATEST = 1e15
 

@@ -4,8 +4,8 @@
 ...     print(run.start, run.program, run.duration_s)
 
 Formats: SHDR text and MTConnect streams (`mtconnect`), Sinumerik Edge (`edge_json`), and tables, which are read here: a
-header with a time and other items, one row per instant. Each yields the events of a file; `run_cutter` splits them into
-runs. Item names are in `run_items`.
+header with a time and other items, one row per instant. A reader yields the events of a file, which `runs.RunCutter`
+splits into runs; that of Sinumerik Edge yields the run itself. Item names are in `run_items`.
 """
 
 import csv
@@ -26,7 +26,7 @@ from shapegcode.io.units import Label, Meaning, Measured, factor_between, read_l
 LogFormat = Literal["shdr", "mtconnect", "edge", "csv"]
 
 MAX_VALUES = 4_000_000  # values of one run: 10 hours at 100 per second; about 60 MB
-_SHORTEST_NAME = 4  # NIST_PLATE-12 is PLATE-12; OP2 may not be BOX_OP2
+_SHORTEST_NAME = 4  # of a name without its prefix: NIST_PLATE-12 is PLATE-12; OP2 may not be BOX_OP2
 _TABLE_LINES = 100
 _SHDR_LINE = re.compile(rb"[^|\r\n]*\d[^|\r\n]*\|[^|\r\n]+\|")
 
@@ -304,5 +304,5 @@ def _columns(path: Path, number: int, delimiter: str, items: list[tuple[Item | N
         length = measures == "displacement" and label.unit is not None
         columns.append(_UsedColumn(index, item, factor_between(label.unit, "mm") if length and label.unit else 1.0))
     assert time is not None
-    columns.sort(key=lambda column: column.item.role == "status")  # status last: a run's last row belongs to it
+    columns.sort(key=lambda column: column.item.role == "status")  # status last: the row that ends a run belongs to it
     return _Header(number, delimiter, len(items), time, columns, feed_unit, time_unit)

@@ -44,7 +44,7 @@ class RunLog:
     Attributes:
         source: file.
         start: time stamp of the start in the file; empty if there is none.
-        duration_s: from start to completion, including holds; None: not both are in the log.
+        duration_s: from start to completion, including holds; None: the log does not show both.
         block: block numbers, see `block_counts`; empty if this run has none.
         feed: feed along the path; None: not logged.
         feed_unit: unit of the feed, such as "mm/s", a unit of `shapegcode.io.units`; None: the log
@@ -101,9 +101,9 @@ _SIGNALS: tuple[Role, ...] = (
     "block", "sequence", "feed", "tool", "spindle", "feed_override", "rapid_override", "runtime", *_AXES,
 )  # fmt: skip
 _COUNTS: frozenset[Role] = frozenset({"block", "sequence"})
-#: Values set before the start remain valid; feed and block are unknown after this time.
+#: Items whose last value before the start is valid in the run; feed and block are not.
 _KEPT: frozenset[Role] = frozenset({"tool", "spindle", "feed_override", "rapid_override"})
-_LEAD_IN_S = 1.0  # a status is polled: values so shortly before it belong to the run
+_LEAD_IN_S = 1.0  # a status is polled: values that are this much earlier belong to the run, too
 _NAME_S = 5.0  # largest delay of the program name after the start
 _LATE_START = 50  # a larger first block number is no start of a program
 _RESTART_BLOCKS = 20  # a program restarted after a hold goes back by more blocks
@@ -197,7 +197,7 @@ class RunPart:
         """Split the run where the program restarted after a stop, although the log shows no end."""
         rest = self
         for hold in self.holds:
-            if hold.end is None or not hold.resumed[0] or not _began_anew(hold, rest, tracks):
+            if hold.end is None or not hold.resumed[0] or not _began_again(hold, rest, tracks):
                 continue
             yield replace(rest, end=hold.start, word=hold.word, cut_end=False, lines=(rest.lines[0], hold.resumed[1]),
                           holds=[each for each in rest.holds if each.start < hold.start],
@@ -209,7 +209,7 @@ class RunPart:
         yield rest
 
 
-def _began_anew(hold: Hold, part: RunPart, tracks: Sequence[Track]) -> bool:
+def _began_again(hold: Hold, part: RunPart, tracks: Sequence[Track]) -> bool:
     """Whether the block numbers return to the start of the run."""
     assert hold.end is not None
     for track in tracks:
@@ -281,7 +281,7 @@ def _compare_clocks(part: RunPart, runtime: Signal | None, notes: FileNotes) -> 
 
 
 def _best(part: RunPart, tracks: Sequence[Track], role: Role, notes: FileNotes) -> Signal | None:
-    """Of several items with a role: the one of preferred name, then with most values; the others are noted."""
+    """Select among the items of a role by preferred name, then by number of values; note the others."""
     found = [
         (track.item.rank, -len(signal), index, signal)
         for index, track in enumerate(tracks)
@@ -294,7 +294,7 @@ def _best(part: RunPart, tracks: Sequence[Track], role: Role, notes: FileNotes) 
 
 
 def _text_values(part: RunPart, tracks: Sequence[Track], role: Role) -> Iterator[tuple[Item, list[tuple[float, str]]]]:
-    """The text values until the end of a run, by item, preferred names first; items without values are omitted."""
+    """The text values until the end of a run, by item, preferred names first."""
     for track in sorted((track for track in tracks if track.item.role == role), key=lambda each: each.item.rank):
         pairs = zip(track.times, track.texts or (), strict=True)
         yield (
@@ -328,7 +328,7 @@ def _override(signal: Signal | None, notes: FileNotes) -> Signal | None:
 
 
 def _program(part: RunPart, tracks: Sequence[Track], notes: FileNotes) -> str | None:
-    """Program name at the start, or logged shortly after it."""
+    """Program name at the start or logged shortly after it, else the first one in the run."""
     for item, pairs in _text_values(part, tracks, "program"):
         early = [text for time, text in pairs if time <= _NAME_S]
         name = early[-1] if early else pairs[0][1] if pairs else None
@@ -345,7 +345,7 @@ _DISORDER_S = 1.0  # smaller steps back come from an adapter's item order; large
 _QUIET_S = 30.0  # a longer silence within a run is noted
 _TEXT_VALUES = 8  # weight of a text value, in values
 _EXAMPLE = 'for example items = { block = "Block_Number" }'
-_IDLE_VALUES = 100_000  # values kept between runs
+_IDLE_VALUES = 100_000  # limit of values stored between runs
 
 
 class RunCutter:
@@ -501,7 +501,7 @@ class RunCutter:
             yield from self._break_off(line, time, word)
 
     def _break_off(self, line: int, time: float, word: str) -> Iterator[RunLog]:
-        """End a run whose status shows no completion (READY, for example); if it is held, it ends with the hold."""
+        """End a run whose status shows no completion (READY, for example); a held run ends where its hold began."""
         run = self._open
         assert run is not None
         name = self._status.name if self._status else ""

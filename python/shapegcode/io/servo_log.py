@@ -60,7 +60,7 @@ def _names(name: str) -> Meaning | None:
 
 @dataclass(frozen=True)
 class _Columns:
-    """Indices of the used columns; those of positions by `kind` and axis."""
+    """Indices of the used columns; those of commanded and actual positions by axis."""
 
     labels: list[Label]
     time: int

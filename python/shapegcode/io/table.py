@@ -338,9 +338,9 @@ class TextTable:
     """A text file with columns."""
 
     def __init__(self, path: Path, *, by_number: bool = False) -> None:
-        self.path = path  # path
+        self.path = path
         data = utf8_text(path)
-        self.layout = find_layout(path, data, by_number)  # its layout
+        self.layout = find_layout(path, data, by_number)
         self.where = f"{path}:{self.layout.header_line}" if self.layout.header else f"{path}"
         self.used: list[int] = []  # indices of the columns requested last
         offset = 0

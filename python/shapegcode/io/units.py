@@ -186,7 +186,7 @@ def _split_unit(text: str, names: Names) -> tuple[str, Unit | None, str]:
 
 
 def _is_in(text: str) -> bool:
-    """Whether it is "in", a unit after a length, else a word."""
+    """Whether a text is "in": a unit after the name of a length, otherwise a word."""
     return text.strip().lower() == "in"
 
 
@@ -196,7 +196,7 @@ def _kind(name: str, names: Names) -> str | None:
 
 
 def _is_name(text: str, names: Names) -> bool:
-    """Whether it is a single word and a known name."""
+    """Whether a text is a single word, a known name, and no unit."""
     return words_of(text) == [text.lower()] and names(text) is not None and find_unit(text) is None
 
 

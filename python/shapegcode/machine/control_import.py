@@ -81,7 +81,7 @@ def import_parameters(
         _require_limits(draft, file)
         machine = Machine.from_data(draft.data, file)
         _remark_the_rest(draft, machine, base)
-    else:  # it contains nothing of the dump, nor decisions for it
+    else:  # the machine contains nothing of the dump, so no remark applies
         machine = base or Machine.load("vx500")
         draft.remarks.clear()
     for number, largest in dict(draft.values.differing).items():
@@ -145,7 +145,7 @@ def _remark_the_rest(draft: Draft, machine: Machine, base: Machine | None) -> No
 
 
 def _require_limits(draft: Draft, file: str) -> None:
-    """Require axis limits; derive feed and acceleration without a parameter from rapid rate and time constant."""
+    """Require axis limits; without a parameter derive feed and acceleration from rapid rate and time constant."""
     ramp_s = draft.get("controller.time_constant_s")
     for axis in "xyz":
         feed_key, acceleration_key = f"axes.{axis}.max_feed_mm_per_min", f"axes.{axis}.max_acceleration_mm_s2"

@@ -1,5 +1,5 @@
-"""The controller of a machine file: how it moves the axes, additional times, its state at power-on; the settings of
-other controls' planners, by the names of their own configuration files.
+"""The controller of a machine file: how it moves the axes, additional times, its state at power-on; settings of the
+planners of open controls, named as in their own configuration files.
 """
 
 from copy import deepcopy

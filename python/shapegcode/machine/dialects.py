@@ -47,13 +47,13 @@ class Dialect:
     # decimals of positions in mm in shaped blocks; None: those of `controller.least_increment_mm`
     decimals: int | None = None
     feed_decimals: int | None = None  # decimals of F; None: `controller.feed_decimals_mm`
-    # largest shift of an arc's middle for smaller angles between blocks; 0: none
+    # largest distance by which the middle of an arc may move to reduce the angle between blocks; 0: none
     smooth_arcs_um: float = 0.0
     least_block_s: float | None = None  # shortest block of the control; None: not known
     # lines that switch the feed override off, and on again; empty: none are known
     lock: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
-    lock_word: str = ""  # word in every shaped block that does it instead
-    # lines before and after a block with G09, "" after: the active mode; None: an ordinary word
+    lock_word: str = ""  # word that switches it off in a shaped block, written in each instead of those lines
+    # lines before and after a block with G09 ("" after: the word of the active path mode); None: G09 is a plain word
     exact_stop: tuple[str, str] | None = None
     header: tuple[str, ...] = ()  # comments for the operator
 

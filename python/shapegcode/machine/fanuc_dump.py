@@ -38,8 +38,8 @@ _SYSTEMS = {number: f"G{53 + number}" for number in range(1, 7)}
 class ControlTables:
     """Contents of the tables, in their units."""
 
-    # kinds of tool offset by number of G10: 1 (one value for all), 10 and 11 (geometry and wear of both, or of the
-    # length), 12 and 13 (of the radius)
+    # kinds of tool offset by L of G10: 1 (one value), 10 and 11 (geometry and wear; with memory C of the length), 12
+    # and 13 (geometry and wear of the radius); a length is its value and whether it has a decimal point
     kinds: set[int] = field(default_factory=set)
     tools: dict[int, dict[int, tuple[float, bool]]] = field(default_factory=dict)  # offsets by kind and number
     # work offsets by name; "": added to all others
@@ -56,7 +56,7 @@ class ControlTables:
 
 
 def is_table(data: bytes) -> bool:
-    """True if a file is such a table: G10 or an assignment comes first, after harmless words only."""
+    """True if a file is a table of offsets or variables: only harmless words precede the first G10 or assignment."""
     for _, words in _lines(data):
         if _G10.match(words) or _ASSIGNMENT.fullmatch(words):
             return True
@@ -88,7 +88,7 @@ def _every_line(data: bytes) -> Iterator[tuple[int, str]]:
 
 
 def _lines(data: bytes) -> Iterator[tuple[int, str]]:
-    """Lines with words, and their numbers, up to the second %."""
+    """Lines with words, and their numbers, up to the % after the first of them."""
     seen = False
     for number, line in _every_line(data):
         words = line.rstrip(";").strip()
@@ -189,7 +189,7 @@ class Dump:
     others: dict[int, int] = field(default_factory=dict)
 
     def get(self, number: int, axis: int | None = None) -> Entry | None:
-        """The value of a parameter for an axis (1, 2, ...), or of the first path; None if it is missing."""
+        """Entry of a parameter for an axis (1, 2, ...); without axis the only one, or that of path 1; None: missing."""
         targets = ("", "L1") if axis is None else (f"A{axis}",)
         return next((self.entries[number, name] for name in targets if (number, name) in self.entries), None)
 

@@ -1,6 +1,6 @@
-"""Keys of the machine file from a parameter dump: motion, then increments, power-on state, offsets, cycles, calls.
+"""Set keys of the machine file from a parameter dump: motion, increments, power-on state, offsets, cycles, calls.
 
-Sources of the meanings are in docs/reference/parameters.md, also which are unconfirmed.
+docs/reference/parameters.md states the source of each parameter's meaning, or that it is not confirmed.
 """
 
 import math
@@ -13,7 +13,7 @@ from shapegcode.machine.result import ReadTable
 _LAW = (1401, 1420, 1422, 1430, 1432, 1602, 1603, 1604, 1610, 1620, 1621, 1622, 1623, 1660, 1730, 1731, 1732)
 _AHEAD = (1735, 1737, 1769, 1770, 1771, 1772, 1773, 1774, 1783)
 _SERIAL = {0: 103, 1: 113, 2: 123, 3: 133}
-"""Channel of 0020 -> parameter of its transfer speed; other channels are cards, networks, data servers."""
+"""Parameter of the baud rate by I/O channel (0020); other channels are cards, networks, data servers."""
 _BAUD = (0, 50, 100, 110, 150, 200, 300, 600, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 76800, 115200)
 _OFFSETS = tuple(range(1220, 1227))
 NUMBERS = frozenset(
@@ -38,7 +38,7 @@ def take_parameters(draft: Draft) -> None:
     _serial_line(draft)
     before = _limits_and_law(draft)
     _shaped_filter(draft)
-    # If programs start with look-ahead on, they switch it off, and the verdict covers look-ahead left on.
+    # 1604#0: look-ahead is on at cycle start. Shaped cuts switch it off and on again; the verdict covers it left on.
     if draft.choose("verdict.look_ahead", 1604, 0):
         draft.set("emission.prologue", ("G05.1Q0",), 1604)
         draft.set("emission.epilogue", ("G05.1Q1",), 1604)
@@ -59,7 +59,7 @@ def _limits_and_law(draft: Draft) -> bool:
     elif speed and time and min(*speed, *time) > 0:
         acceleration = [v / 60 / (t / 1000) for v, t in zip(speed, time, strict=True)]
         numbers = (1770, 1771)
-    # The 16i family has no 1769 or 1772 in addition to 1770, 1771.
+    # The 16i family has 1770 and 1771 without 1769 or 1772.
     before = bool(numbers) and (numbers[0] == 1770 or filter_ms is not None or bell_ms is not None)
     if before:
         why = "the dump has acceleration before interpolation, but whether it is on the program decides (G05.1, G08)"
@@ -83,7 +83,7 @@ def _limits_and_law(draft: Draft) -> bool:
 
 
 def _look_ahead_filter(draft: Draft, time_s: float) -> None:
-    """Read 1769 with its kind by 1602#3, #6; bell and exponential become a moving average of equal error on arcs."""
+    """Read 1769; a bell or exponential filter (1602#3, #6) becomes a moving average with the same radial error."""
     key = "controller.look_ahead_filter_time_constant_s"
     linear, bell = draft.values.bit(1602, 6), draft.values.bit(1602, 3)
     if linear is None or bell is None:
@@ -114,13 +114,13 @@ def _cutting_feeds(draft: Draft) -> None:
 
 
 def _after_interpolation_s(draft: Draft) -> tuple[float, float, str, str] | None:
-    """Time constant, second moving average, shape and note of the filter of 1622; None without parameter."""
+    """Time constant, second moving average, shape and note of the filter of 1622; None if it is not in the dump."""
     time = draft.values.scalar(1622, LONGEST_MS, "ms")
     if time is None:
         return None
     linear, bell = draft.values.bit(1610, 0), draft.values.bit(1610, 1)
     if bell:
-        # Two moving averages a = b = T/√2 have the variance T²/12 of the manual's radial error.
+        # Two moving averages of T/√2 have the variance T²/12 together, and so the radial error of the manual.
         part = time / 1000 / math.sqrt(2)
         return part, part, "linear", f"bell of {time:g} ms as two moving averages of T/√2"
     if linear is None:
@@ -143,7 +143,7 @@ def _after_interpolation(draft: Draft) -> None:
 
 
 def _shaped_filter(draft: Draft) -> None:
-    """With the look-ahead off, all cutting blocks pass the filter of 1622."""
+    """Set the filter of shaped blocks: with the look-ahead off, all cutting blocks pass that of 1622."""
     if found := _after_interpolation_s(draft):
         _set_filter(draft, found, "shaped_time_constant_s", "shaped_bell_time_s", "shaped_filter_shape")
     elif draft.get("controller.shaped_time_constant_s") is None:
@@ -202,7 +202,7 @@ def _rapids(draft: Draft, before: bool) -> None:
 
 
 def _multiplier(code: float) -> float | None:
-    """Command multiplier (CMR) of a value of 1820: twice the multiplier, or 100 plus its denominator; None: invalid."""
+    """Command multiplier (CMR) from 1820, which is twice the CMR, or 100 + n for a CMR of 1/n; None: invalid."""
     if 101 <= code <= 127:
         return 1.0 / (code - 100)
     return code / 2.0 if 1 <= code <= 96 else None
@@ -253,7 +253,7 @@ def take_tables(draft: Draft, tables: ControlTables) -> None:
 def _tools(draft: Draft, tables: ControlTables) -> None:
     if not tables.tools:
         return
-    # One value for all (memory A), geometry and wear (B), or each of length and radius (C).
+    # Memory A: one value; B: geometry and wear; C: geometry and wear, separately for length and radius.
     memory = "C" if tables.kinds & {12, 13} else "B" if tables.kinds & {10, 11} else "A"
     _put(draft, tables, "tools", "controller.offset_memory", memory, 1)
     halved = 2.0 if draft.values.bit(5004, 2) else 1.0
@@ -279,7 +279,7 @@ def _tools(draft: Draft, tables: ControlTables) -> None:
 
 
 def _mm(draft: Draft, value: float, point: bool) -> float:
-    """Value of a table, in mm; one with a point is in mm or inch, by the setting, one without in least increments."""
+    """Convert a table value to mm: with a point it is in mm or inch (0000#2), without one in least increments."""
     if not point:
         return value * (increment_um(draft)[0] / 1000)
     return value * (MM_PER_INCH if draft.values.bit(0, 2) else 1.0)
@@ -319,7 +319,7 @@ def _axes(draft: Draft) -> None:
 
 
 def increment_um(draft: Draft) -> tuple[float, bool]:
-    """Least increment of a metric axis, µm: 1013#1 is IS-C, #0 IS-A, neither IS-B; and whether it is in the dump."""
+    """Least increment of a metric axis, µm (bit 1: IS-C, bit 0: IS-A, neither: IS-B), and whether it is in the dump."""
     number = _increment_parameter(draft)
     if number is None:
         return 1.0, False
@@ -405,7 +405,7 @@ def _work_offsets(draft: Draft) -> None:
 
 
 def shifted(offsets: Mapping[str, Sequence[float]], shift: Sequence[float]) -> dict[str, tuple[float, ...]]:
-    """Work offsets with the common shift added, without those that are zero."""
+    """Add the common shift to the work offsets, and leave out sums that are zero."""
     sums = {name: tuple(round(a + b, 9) for a, b in zip(each, shift, strict=True)) for name, each in offsets.items()}
     return {name: each for name, each in sums.items() if any(each)}
 
@@ -428,7 +428,7 @@ def _calls(draft: Draft) -> None:
 
 
 def _serial_line(draft: Draft) -> None:
-    """Read the baud rate of the channel in 0020; without it programs are not drip fed."""
+    """Read the baud rate of the I/O channel in 0020; without 0020 drip feed is not assumed."""
     channel = draft.values.scalar(20, 35)
     if channel is None:
         if draft.values.scalar(103) is not None:

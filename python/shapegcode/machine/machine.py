@@ -1,7 +1,7 @@
 """The machine file (TOML): description of a machine tool and its controller.
 
-:class:`Machine` and its tables are the only place for its defaults; ``docs/reference/machine.md`` is generated from
-the key descriptions.
+:class:`Machine` and its tables define all defaults; ``docs/reference/machine.md`` is generated from the descriptions
+of the keys.
 """
 
 from __future__ import annotations
@@ -48,9 +48,11 @@ from shapegcode.settings.load import (
 )
 
 _ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
+# Limits of every axis of `Machine.simple`
+_SIMPLE_LIMITS = {"max_feed_mm_per_min": 12_000.0, "rapid_mm_per_min": 24_000.0, "max_acceleration_mm_s2": 3000.0}
 _VARIABLE = re.compile(r"#\d+")
 _LOCK_LINES = ("lock_lines", "unlock_lines")
-_USUAL_DIAL_PERCENT = (70.0, 120.0)  # usual range of operators
+_USUAL_DIAL_PERCENT = (70.0, 120.0)  # range that operators usually set
 
 
 class Machine(TomlTable):
@@ -203,7 +205,7 @@ class Machine(TomlTable):
         """Copy the machine with other provenance of its values.
 
         Args:
-            remarks: by dotted key, replacing the existing ones; see `shapegcode.settings.load` for their form.
+            remarks: by dotted key, replacing the existing ones; see `shapegcode.settings.keys` for their form.
 
         Returns:
             A new machine; this one is unchanged.
@@ -220,7 +222,7 @@ class Machine(TomlTable):
 
     @property
     def dial_positions(self) -> tuple[float, ...]:
-        """Feed overrides, in steps of 10 %, for which override-tolerant blocks are made: [verdict], or 70 to 120 %."""
+        """Feed override ratios for which override-tolerant blocks are made, 0.1 apart: by [verdict], or 0.7 to 1.2."""
         low, high = self.verdict.override_percent
         if low == high == 100.0:
             low, high = _USUAL_DIAL_PERCENT
@@ -278,21 +280,21 @@ class Machine(TomlTable):
         modes: Mapping[str, float | Mode | Sequence[float | Mode]],
         *,
         name: str = "simple",
-        max_feed_mm_per_min: float = 12_000.0,
-        rapid_mm_per_min: float = 24_000.0,
-        max_acceleration_mm_per_s2: float = 3000.0,
+        max_feed_mm_per_min: float | None = None,
+        rapid_mm_per_min: float | None = None,
+        max_acceleration_mm_per_s2: float | None = None,
     ) -> Machine:
         """Make a machine from its modes and limits common to all axes.
 
-        Everything else is a default of the machine file and counts as assumed, as do limits that are not given.
+        Everything else is a default of the machine file.
 
         Args:
             modes: by axis ("x", "y", "z"): natural frequencies in Hz (damping ratio 0.02 assumed) or modes, one or
-                several; an axis without an entry counts as rigid until more is known.
+                several; an axis without an entry is simulated as rigid.
             name: of the machine.
-            max_feed_mm_per_min: largest cutting feed of an axis, mm/min.
-            rapid_mm_per_min: rapid traverse of an axis, mm/min.
-            max_acceleration_mm_per_s2: largest acceleration while cutting, mm/s².
+            max_feed_mm_per_min: largest cutting feed of an axis, mm/min; None: 12 000 is assumed.
+            rapid_mm_per_min: rapid traverse of an axis, mm/min; None: 24 000 is assumed.
+            max_acceleration_mm_per_s2: largest acceleration while cutting, mm/s²; None: 3000 is assumed.
 
         Returns:
             The machine; `with_values` changes keys, `to_toml` returns its file.
@@ -303,22 +305,24 @@ class Machine(TomlTable):
         """
         if unknown := set(modes) - set("xyz"):
             raise ArgumentError(f"modes: {min(unknown)!r} is not an axis: x, y, z are")
-        limits = {
+        stated = {
             "max_feed_mm_per_min": max_feed_mm_per_min,
             "rapid_mm_per_min": rapid_mm_per_min,
             "max_acceleration_mm_s2": max_acceleration_mm_per_s2,
         }
+        assumed = {name: value for name, value in _SIMPLE_LIMITS.items() if stated[name] is None}
+        limits = {**stated, **assumed}
         axes = {}
         for axis in "xyz":
             given = modes.get(axis, ())
             several = [given] if isinstance(given, int | float | Mode) else given
             axes[axis] = {**limits, "modes": [_table_of(mode) for mode in several]}
         machine = validated(cls, {"name": name, "axes": axes}, "Machine.simple", "", MachineError)
-        return machine.with_remarks({f"axes.{axis}.{limit}": "assumed" for axis in "xyz" for limit in limits})
+        return machine.with_remarks({f"axes.{axis}.{limit}": "assumed" for axis in "xyz" for limit in assumed})
 
     @classmethod
     def from_toml(cls, text: str, source: str = "<text>") -> Machine:
-        """Read the text of a machine file; *source* names it in messages.
+        """Read the text of a machine file.
 
         Args:
             text: TOML.
@@ -334,7 +338,7 @@ class Machine(TomlTable):
 
     @classmethod
     def from_data(cls, data: dict[str, Any], source: str = "<data>", text: str = "") -> Machine:
-        """Validate the tables of a machine file; *source* names it in messages, *text*: for line numbers.
+        """Validate the tables of a machine file.
 
         Args:
             data: tables of the file, as parsed from TOML.
@@ -392,15 +396,15 @@ class Machine(TomlTable):
         """Write the machine as a commented machine file, which loads as an equal machine with the same origins.
 
         Args:
-            remarks: text for the end of a key's line by its dotted key (modes count from 1:
-                ``axes.x.modes.1.frequency_hz``), for example the origin of the value; replacing the machine's own.
+            remarks: origin of a value by dotted key (modes count from 1: ``axes.x.modes.1.frequency_hz``), written
+                after the key and into [origin]; replacing the machine's own.
             short: leave out defaults and the descriptions of keys.
 
         Returns:
             The text of the file.
 
         Raises:
-            KeyError: a remark for a key that does not exist.
+            KeyError: a remark for a key that does not exist, unless `short`.
         """
         from shapegcode.settings.describe import write_toml
 

@@ -424,7 +424,7 @@ class Price(TomlTable):
 
 
 ANY_PRICE = {"price.program_time_percent": 1e6, "price.cut_time_percent": 1e6}
-"""Values for shaping at any price: to determine its effect, not its worth."""
+"""Keys that remove the limits of added time, to determine the effect of shaping whatever time it costs."""
 
 
 class Verdict(TomlTable):

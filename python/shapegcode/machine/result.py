@@ -47,7 +47,7 @@ class ReadTable:
 
 @dataclass(frozen=True)
 class AssumedValue:
-    """An assumed value that is not in the dump."""
+    """A value that is not in the dump, or is derived from it with an assumption."""
 
     key: str  # dotted name in the machine file, or the fact as text
     value: Value  # the assumed value
@@ -163,7 +163,7 @@ class ParameterImport(Result):
         return [table for table in found if table.rows]
 
     def _keys_by_table(self) -> Table:
-        """Keys by table of the machine file: those read, and those decided."""
+        """Keys by table of the machine file: those read, and those assumed other than by default."""
         tables: dict[str, tuple[list[str], list[str]]] = {}
         decided = [row.key for row in self.assumed if row.why != DEFAULT_WHY]
         read = [*(row.key for row in self.read), *(row.key for row in self.tables_read)]
@@ -184,7 +184,7 @@ class ParameterImport(Result):
         return Table("", columns, list(alike.items()), caption=f"{more}--verbose: every value, its line, and why")
 
     def _missing_numbers(self) -> Table:
-        """Missing parameters by reason, the first ones of many."""
+        """Missing parameters by reason, the first 20 of each."""
         reasons: dict[str, list[str]] = {}
         for row in self.missing:
             reasons.setdefault("not in the dump" if row.line is None else "not understood or not used", []).append(
@@ -368,7 +368,7 @@ def _origin(row: str | KeyValue) -> str | None:
 
 
 def describe_machine(machine: Machine | str | Path) -> MachineDescription:
-    """List every value of a machine with origin: file, default, or assumed default.
+    """List every value of a machine with its unit, origin and meaning.
 
     Args:
         machine: a machine, its file, or the name of a built-in one.

@@ -149,8 +149,7 @@ class WallProfile:
     """Wall profiles of a section."""
 
     distance_mm: FloatArray  # distance of the stations from the region's start, (n,)
-    # deviation of the left wall from that of the programmed path, positive to the left, (n,); NaN: no
-    # wall
+    # deviation of the left wall from that of the programmed path, positive to the left, (n,); NaN: no wall
     left_um: FloatArray
     right_um: FloatArray  # deviation of the right wall, likewise
     point_mm: FloatArray  # points of the programmed path there, in XY, (n, 2)
@@ -169,7 +168,7 @@ class MeasuredSection:
     time_s: float  # motion time of the command in it
     peak_vibration_um: Xyz[float]  # largest |response - command| of each axis while the command moves
     residual_vibration_um: Xyz[float] | None  # the same after its stop; None: no stop here
-    # time from then until it stays within the band; null: not within the observed time; None: no stop
+    # time from that stop until the axis stays within the band; None for an axis: not observed; None: no stop
     settling_time_s: Xyz[float | None] | None
     observed_rest_s: float | None  # observed time after the stop; None: no stop
     contour_error_um: Tracks[SidedError]  # distance of command and response from the path

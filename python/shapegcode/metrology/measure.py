@@ -103,8 +103,8 @@ def measure(
 
     limit_um = machine.tolerance.contour_um
     beside = [(each.source, ours, (against or each).source) for each, ours in zip(several, shaped, strict=True)]
-    # Compared with the tolerance are the shaped programs against the programmed path, if any; the own path of a
-    # shaped program is not the programmed one.
+    # The tolerance applies to shaped programs measured against the programmed path, which is not their own path; if
+    # there are none, to the unshaped ones.
     judged = [ours and path != name for name, ours, path in beside]
     judged = judged if any(judged) else [not ours for ours in shaped]
     measured = []
@@ -235,7 +235,7 @@ def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArra
     model = MachineModel(machine)
     memory_s = max(model.vibration_memory_s, _MIN_REST_S)
     if plant != "modal":
-        # The lag decays as exp(-gain t): wait until a millionth, as for vibration.
+        # The lag decays as exp(-gain t): wait until a millionth remains, as for vibration.
         memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
     rest_s = min(memory_s, _LONGEST_REST_S)
     options = model.options(plant=plant, offset=model.offset(job.simulated))

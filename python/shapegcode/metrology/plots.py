@@ -15,7 +15,7 @@ from shapegcode.results import plot
 from shapegcode.results.outcome import Plot
 
 _SHARE_OF_TOOL = 0.8  # drawn size of the largest deviation, relative to the tool's radius
-_SHARE_OF_PART, _MIN_DRAWN_UM, _MAX_MARKED = 0.03, 1e-3, 12
+_SHARE_OF_PART, _MIN_SHOWN_UM, _MAX_MARKED = 0.03, 1e-3, 12
 
 
 def plots_of(measurement: Measurement) -> dict[str, Plot]:
@@ -40,12 +40,12 @@ def plot_part(measurement: Measurement, ax: Axes | None = None, *, region: int |
         ValueError: no walls were measured there.
     """
     radius = measurement.tool_diameter_mm / 2.0
-    drawn = _drawn(measurement, region)
+    drawn = _shown(measurement, region)
     everything = np.concatenate([wall.point_mm for wall in _walls(drawn[0][1])])
     extent = float(np.ptp(everything, axis=0).max())
     largest_mm = max(_largest_um(each) for _, each in drawn) * 1e-3
     wanted_mm = max(_SHARE_OF_TOOL * radius, _SHARE_OF_PART * extent)
-    magnified = plot.round_below(wanted_mm / max(largest_mm, _MIN_DRAWN_UM * 1e-3))
+    magnified = plot.round_below(wanted_mm / max(largest_mm, _MIN_SHOWN_UM * 1e-3))
     title = (
         f"Walls cut by a tool of {measurement.tool_diameter_mm:g} mm, deviations magnified {magnified:g} times "
         f"(1 mm drawn is {1e3 / magnified:g} µm)"
@@ -80,7 +80,7 @@ def plot_walls(measurement: Measurement, ax: Axes | None = None, *, region: int 
     Raises:
         ValueError: no walls were measured there.
     """
-    drawn = _drawn(measurement, region)
+    drawn = _shown(measurement, region)
     title = "Deviation of the walls, positive to the left of the path"
     left, right, width = column = plot.column(ax, 3, size_inch=(9.5, 7.0), title=title, part=_part(drawn[0][1]))
     for number, (program, each) in enumerate(drawn):
@@ -112,7 +112,7 @@ def _worst_region(measurement: Measurement) -> int | None:
     return max(found, key=lambda index: found[index], default=None)
 
 
-def _drawn(measurement: Measurement, region: int | None) -> list[tuple[MeasuredProgram, MeasuredRegion]]:
+def _shown(measurement: Measurement, region: int | None) -> list[tuple[MeasuredProgram, MeasuredRegion]]:
     index = _worst_region(measurement) if region is None else region
     drawn = [(program, program.regions[index]) for program in measurement.programs if index is not None]
     if not drawn or not all(_walls(each) for _, each in drawn):

@@ -206,7 +206,7 @@ class SimulatedController:
         planned = self._planned(path)
         if planned is not None:
             return _core.SimulationStream.of_path(*planned, options, rest_s)
-        return _core.SimulationStream.of_blocks(path, self.model.block_end, 1.0, options, rest_s)
+        return _core.SimulationStream.of_blocks(path, self.model.block_end, self._override, options, rest_s)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: FloatArray, window_s: float) -> _core.Travel:
         """Speed along a path."""
@@ -275,7 +275,7 @@ class MachineModel:
 
     @property
     def vibration_memory_s(self) -> float:
-        """Time in which a vibration decays to a millionth, s; 0 if a mode is undamped."""
+        """Time in which a vibration decays to a millionth, s; 0 if a mode is undamped, or if there is none."""
         slowest = self.slowest_decay_per_s
         return math.log(1e6) / slowest if _LEAST_DECAY_PER_S < slowest < math.inf else 0.0
 
@@ -326,7 +326,7 @@ class MachineModel:
         self, path: _core.Path, *, against: _core.Path | None = None, override: float = 1.0, record_samples: int = 0,
         emitted: bool = False, **given: Unpack[_Given],
     ) -> _core.SimulationFigures:  # fmt: skip
-        """Simulate a cut of an ordinary program; `emitted`: with the emitted arcs."""
+        """Simulate a cut of an ordinary program; `emitted`: as emitted, where arcs may be chords."""
         options = self.verdict_options(**given)
         options.record_samples = record_samples
         controller = self._at_override(override, shaped=emitted and self.always_plans)

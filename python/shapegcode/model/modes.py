@@ -88,7 +88,7 @@ def slowest_excited_hz(machine: Machine) -> list[float]:
 
 
 def _excitations(machine: Machine) -> Iterator[tuple[int, float, int, AxisMode]]:
-    """An axis, the ratio with which it excites a mode, the axis under which the mode is listed, and the mode."""
+    """Yield an axis, the ratio with which it excites a mode, the axis under which the mode is listed, and the mode."""
     for _, axis, mode in numbered_modes(machine):
         for exciting, share in enumerate(mode.excitation(axis)):
             if share:
@@ -117,8 +117,8 @@ def slowest_mode(mode: AxisMode) -> tuple[float, float]:
 def damping_scale(mode: AxisMode, shift: float) -> float:
     """Factor on a mode's damping ratio if its frequency is shifted by `shift` of its uncertainty.
 
-    It is always the lower end of the stated damping. A shaper's residual is the same at either end to first order, as
-    it depends on the pole's distance |dw/w + i dzeta|; to second order it is larger at lower damping.
+    Either sign of `shift` lowers the damping. A shaper's residual is the same at either end to first order, as it
+    depends on the pole's distance |dw/w + i dzeta|; to second order it is larger at lower damping.
     """
     return 1.0 - abs(shift) * (mode.damping_uncertainty_percent or 0.0) / 100.0
 
@@ -138,8 +138,8 @@ def moving_axis(machine: Machine) -> int | None:
 def region_offset(region: _core.Region, machine: Machine) -> Offset:
     """Offset from program to machine positions in a region.
 
-    The work offset is that of `input.work_offsets`, zero if omitted there; tool length is added for Z if
-    `input.tool_length_mm` gives it. None for an axis whose position the program does not state.
+    The work offset is that of `input.work_offsets`, zero if omitted there; the tool length and wear of the active H
+    are added for Z (G44: subtracted). None for an axis whose position the program does not state.
     """
     state = region.entry
     system = f"G54.1P{state.coordinate_number}" if state.coordinate_system == 541 else f"G{state.coordinate_system}"
@@ -174,7 +174,7 @@ def machine_warnings(machine: Machine) -> list[str]:
 
 
 def region_range_warnings(regions: Sequence[_core.Region], machine: Machine) -> list[str]:
-    """Warnings, one per mode: the program leaves its table, or does not state the axis' position."""
+    """Warnings for each mode: the program leaves its table, or does not state the position of its axis."""
     warnings = []
     for name, _, mode in numbered_modes(machine):
         over = mode.frequency_over
@@ -324,14 +324,12 @@ def plant_response(
 ) -> FloatArray:
     """Response of base-excited modes to a record of set-points, exact for set-points joined by straight lines.
 
-    Bit-identical to the core's real-time plant, at the speed of a batch. At rest at
-    the first row.
+    The plant is at rest at the first row. The result is bit-identical to that of the core's real-time plant.
 
     Args:
         command_mm: set-points in mm, shape (n_samples, n_axes), one per period.
         modes: for each axis core or machine-file modes; none: the axis follows its command. A machine
-            is used for its modes of X, Y, Z, as many as the command has axes. Modes with tables over a position are
-            nominal.
+            gives those of X, Y, Z, as many as the command has axes. Modes with tables over a position are nominal.
         period_s: time between samples in s, above 0.
 
     Returns:

@@ -1,7 +1,4 @@
-"""Programs simulated for a page: both motions over time, decimated while simulated.
-
-Memory does not grow with the length of a program: each piece is decimated once simulated.
-"""
+"""Programs simulated for a page: both motions over time, each piece decimated once simulated, to bound the memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reads CNC programs like the controller, including cutter compensation."""
+"""Reads CNC programs as the controller does, including cutter compensation."""
 
 from shapegcode.errors import located_error
 from shapegcode.io.units import MM_PER_INCH

@@ -1,7 +1,7 @@
 """Compares moves, tools, offsets and functions of two programs and their order: counts, list of differences.
 
-Both are read as executed by the control, independently of any conversion: words and canonical moves of
-both programs are sequenced separately, and aligned by function (Myers 1986).
+Both programs are read as the control executes them, independently of any conversion; then their sequences of moves and
+functions are aligned (Myers 1986).
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def _length_um(word: str, length: str) -> float:
 _NOUNS = {"tools": "tool calls", "functions": "other functions", "cycles": "drilling blocks", "modal": "modal states"}
 _ALWAYS = ("rapids", "tools", "offsets")
 _SHOWN = 20
-_JOINT_TOLERANCES = 3.0  # a command may deviate from the path more than its response
+_JOINT_TOLERANCES = 3.0  # multiple of tolerance.contour_um, as the command may deviate more than the response
 
 
 @dataclass(frozen=True)
@@ -270,7 +270,7 @@ class Comparison(Result):
         )
 
     def tables(self) -> list[Table]:
-        """Number of differences of each kind, then the differences, those not allowed first."""
+        """Counts of each kind, then the differences, those not allowed first."""
         what = Column("what", value=lambda row: _noun(row.kind), left=True)
         counts = Table(
             "", (what, Column("original"), Column("other", value="emitted"), Column("unchanged")), self.counts
@@ -331,7 +331,7 @@ def compare(
     machine = Machine.of(machine)
     allowed = allow if isinstance(allow, Allowed) else Allowed.of(allow)
     (first, first_is_cut), (second, second_is_cut) = _read(original, machine), _read(emitted, machine)
-    # Tolerance for cuts of different lengths: a conversion allows any, and judges it later.
+    # Distance within which cuts of different lengths match; a conversion allows any distance, and checks it later.
     joint_um = allowed.path_um if allowed.path_um < math.inf else _JOINT_TOLERANCES * machine.tolerance.contour_um
     emission = machine.emission
     lines = [line for group in emission.around_cuts.values() for line in group]

@@ -103,8 +103,8 @@ def header_lines(radii_mm: Mapping[int, float]) -> list[str]:
 def guard_lines(radii_mm: Mapping[int, float], machine: Machine) -> list[str]:
     """Program lines that stop the control if its offset differs from the expanded one.
 
-    Offsets set by the program (G10) need none. A drip-fed program cannot contain IF: it stops with M00, and the
-    operator compares.
+    Offsets set by the program (G10) need no check. Where IF cannot run (drip feed, no macros, another dialect), and
+    with emission.compensation_guard = "stop", the program stops with M00, and the operator compares.
     """
     lines = []
     for number, radius in radii_mm.items():

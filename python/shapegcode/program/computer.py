@@ -24,7 +24,7 @@ def cores() -> int:
 
 
 def available_bytes() -> int | None:
-    """Memory still available to this process, bytes: of the machine, its control group, and its own limits."""
+    """Memory available to this process, bytes: the least by computer, control group and own limits; None: unknown."""
     found = [_kilobytes("/proc/meminfo", "MemAvailable"), *_of_groups(), *_of_own_limits()]
     known = [value for value in found if value is not None]
     return max(0, min(known)) if known else None
@@ -57,14 +57,15 @@ def _kilobytes(file: str, name: str) -> int | None:
 
 
 def _of_groups() -> list[int | None]:
-    """Memory left in the control group (version 2) of this process, bytes."""
+    """Memory left in the control group (version 2) of this process and in those that contain it, bytes."""
+    left: list[int | None] = []
     with contextlib.suppress(OSError, ValueError):
-        own = Path("/proc/self/cgroup").read_text().partition("::")[2].strip().lstrip("/")
-        for folder in {_CGROUP / own, _CGROUP}:
+        own = _CGROUP / Path("/proc/self/cgroup").read_text().partition("::")[2].strip().lstrip("/")
+        for folder in (own, *own.parents):
             limit = folder / "memory.max"
             if limit.is_file() and (limit_text := limit.read_text().strip()) != "max":
-                return [int(limit_text) - int((folder / "memory.current").read_text())]
-    return []
+                left.append(int(limit_text) - int((folder / "memory.current").read_text()))
+    return left
 
 
 def _of_own_limits() -> list[int | None]:

@@ -81,14 +81,14 @@ def expand(
         machine: whose controller reads it.
         compensation: "expand": G41/G42 become plain moves of the tool's centre; "keep": they stay unchanged.
         program_number: program of a multi-program file: its O number, or an address as in
-            `shapegcode.program.reading`; None: the first.
+            `shapegcode.program.reading.ProgramPlace`; None: the first.
 
     Returns:
         The expanded program, and the source of each of its lines.
 
     Raises:
-        ProgramError: the program cannot be read, or its compensation has a radius of 0; the message
-            starts with ``file:line:column``.
+        ProgramError: the program cannot be read, is a shaped one with macros, or has compensation with a radius of 0;
+            the message starts with ``file:line:column``.
         ArgumentError: it was read with other settings than the machine's.
         OSError: the file cannot be read.
     """

@@ -32,7 +32,7 @@ _ARC_OFF_RADIUS = "off its radius"
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """A program read.
+    """A CNC program that has been read.
 
     Attributes:
         core: its parsed form in the core: text, regions (sequences of cutting moves between stops), other moves.
@@ -70,7 +70,7 @@ class Program:
             path: the file; a string of several lines is the program's text itself.
             machine: machine whose controller reads it, its file or built-in name.
             program_number: program of a multi-program file: its O number, or an address as in
-                `shapegcode.program.reading`; None: the first.
+                `shapegcode.program.reading.ProgramPlace`; None: the first.
             expand_compensation: G41/G42 become plain moves; False: they are kept unchanged.
             collect_alarms: continue after an alarm and collect all in `core.alarms`.
 
@@ -106,6 +106,7 @@ class Program:
         expand_compensation: bool = True,
         collect_alarms: bool = False,
         folder: Path | None = None,
+        absolute_arc_centres: bool | None = None,
     ) -> Program:
         """Read a program text; `source` names it in messages.
 
@@ -115,14 +116,14 @@ class Program:
             text: the program.
             machine: whose controller reads it; None: the built-in ``vx500``.
             source: names the text in messages.
-            emitted: the text was written by shapegcode: its arcs are FANUC's in any case.
+            emitted: the text was written by shapegcode, which does not limit its number of moves.
             probe_lines: ascending line numbers after which the modal state is stored.
             program_number: program of a multi-program text: its O number, or an address as in
-                `shapegcode.program.reading`; None: the first.
+                `shapegcode.program.reading.ProgramPlace`; None: the first.
             expand_compensation: G41/G42 become plain moves; False: they are kept unchanged.
             collect_alarms: continue after an alarm and collect all in `core.alarms`.
-            folder: folder to search called programs; None: only the text and the machine's
-                folders.
+            folder: folder to search called programs; None: only the text and the machine's folders.
+            absolute_arc_centres: I, J, K are positions; None: as `input.arc_centre` says, and never in emitted text.
 
         Returns:
             The program, as from `read`.
@@ -140,11 +141,11 @@ class Program:
             raise located_error(source, line, 1, message)
         reading = Reading(
             machine,
-            # An emitted program has FANUC's arcs, whatever its original's.
             emitted=emitted or STAMP_BEGIN in data,
             probe_lines=tuple(probe_lines),
             expand_compensation=expand_compensation,
             collect_alarms=collect_alarms,
+            absolute_arc_centres=absolute_arc_centres,
         )
         return _read(data, source, reading, folder, program_number, foreign)
 
@@ -334,7 +335,7 @@ class Program:
         return f"{file or self.source}:{number}"
 
     def source_lines(self, first: int, last: int) -> tuple[int, int]:
-        """Convert lines of the expanded program to reported lines: of the source if it is for another control.
+        """Convert lines of the expanded program to those reported: of the source, if it is for another control.
 
         Args:
             first: first line, from 1.
@@ -360,8 +361,13 @@ class Program:
             return "lines {} to {}".format(*self.source_lines(region.first_line, region.last_line))
         return f"lines {region.first_line} to {region.last_line}{' expanded' if self.core.expanded else ''}"
 
+    @property
+    def has_absolute_arc_centres(self) -> bool:
+        """Whether I, J, K of the core's program are positions."""
+        return self.foreign is None and self.reading.has_absolute_arc_centres
+
     def other_arc_centre(self, data: bytes) -> str:
-        """The meaning of I, J, K ("absolute" or "incremental") that explains the arcs among its alarms.
+        """The other meaning of I, J, K ("absolute" or "incremental"), if it removes the alarms of arcs.
 
         Args:
             data: bytes from which it was read.
@@ -425,7 +431,7 @@ def _read(
 
 
 def _read_foreign(data: bytes, source: str, reading: Reading, folder: Path | None, foreign: ForeignProgram) -> Program:
-    """Read the expanded form of a program for another control; messages give its own lines."""
+    """Read the expanded form of a program for another control; messages give the lines of the source."""
     beside = folder if foreign.settings.called_text is not None else None
     try:
         core = _core.read_program(foreign.text.encode("latin-1", "replace"), reading.options(beside, foreign.settings))
@@ -450,7 +456,7 @@ def least_increment_mm(machine: Machine, units: int) -> float:
 
 
 def written_increment_mm(machine: Machine, units: int) -> float:
-    """Least increment of emitted words, mm, which are finer in some dialects."""
+    """Least increment of emitted positions, mm; in some dialects finer than the control's."""
     decimals = machine.emission.position_decimals
     if decimals is None:
         return least_increment_mm(machine, units)
@@ -467,16 +473,16 @@ _ON_INCREMENT = 1e-6  # in increments: tolerance of a position on the grid
 
 
 def end_off_grid_mm(region: _core.Region, increment_mm: float) -> list[float]:
-    """Distance of a region's end from the nearest position on its increment, mm, per axis.
+    """Distance of a region's end from the nearest multiple of the increment, mm, per axis.
 
-    A program that changes between G20 and G21, or with more digits than the control resolves, may end elsewhere.
+    It may be above 0 if the program changes between G20 and G21, or has more digits than the control resolves.
     """
     off = [abs(each / increment_mm - round(each / increment_mm)) for each in map(float, region.path.end_mm)]
     return [each * increment_mm if each > _ON_INCREMENT else 0.0 for each in off]
 
 
 def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
-    """Mask of axes at rest in a region at a position off the increment, which no word may command."""
+    """Mask of axes that rest in a region at a position between two increments: no word may command it."""
     off_mm = end_off_grid_mm(region, increment_mm)
     return [extent <= 0.0 < off for extent, off in zip(map(float, region.path.extent_mm), off_mm, strict=True)]
 
@@ -495,7 +501,7 @@ def _other_arc_centre(data: bytes, options: _core.ReaderOptions, message: str) -
 
 
 def given_program(program: Program | str | Path, machine: Machine) -> Program:
-    """The program itself if it is one; a file is read as the controller of `machine` reads it."""
+    """Return a `Program` unchanged, after a check of its settings, or read it from its file for `machine`."""
     if not isinstance(program, Program):
         return Program.read(program, machine)
     program.require_machine(machine)

@@ -1,5 +1,5 @@
-"""Reading of programs by the core: options for a machine, files of programs that another one
-calls, and multi-program files, such as memory dumps of a control.
+"""Reading of programs by the core: its options for a machine, files of called programs, and multi-program files,
+such as memory dumps of a control.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from shapegcode.program.foreign.read import (
 )
 from shapegcode.settings.keys import toml
 
-_PLACE = re.compile(r"#([1-9][0-9]{0,8})")
+_ADDRESS = re.compile(r"#([1-9][0-9]{0,8})")
 _NUMBER = re.compile(r"[Oo:]?0*([1-9][0-9]{0,7})")
 _COMMENT = re.compile(rb"\([^()\r\n]*\)")
 _CALLS = re.compile(rb"(?:M *0*1?98|G *6[56](?: *\. *1)?)(?![0-9.])")
@@ -42,8 +42,8 @@ class ProgramPlace:
     """One program of a file."""
 
     index: int  # number of programs before it
-    # unique address: its number ``O0001``, its name ``<PART>``, either after its folder
-    # (``/USER/O0001``) if in several folders; ``#3``, the third one, if nothing else is unique
+    # unique address: its number ``O0001`` or its name ``<PART>``; with the folder (``/USER/O0001``) if it is in several
+    # folders; ``#3``, the third program of the file, if nothing else is unique
     address: str
     first_line: int  # from 1
     text_begin: int  # offset of its first byte
@@ -76,7 +76,7 @@ def programs_of(text: bytes) -> tuple[ProgramPlace, ...]:
 def place_of(text: bytes, wanted: str, source: str) -> int:
     """Index of the wanted program of a text."""
     entries, places = _core.list_programs(text), programs_of(text)
-    if match := _PLACE.fullmatch(wanted):
+    if match := _ADDRESS.fullmatch(wanted):
         found = [index for index in range(len(places)) if index == int(match[1]) - 1]
     else:
         folder, _, name = wanted.rpartition("/")
@@ -134,7 +134,7 @@ def called_from(text: bytes, index: int, kept: Iterable[int]) -> tuple[ProgramPl
 
 
 def alone_with(program: bytes | memoryview, text: bytes, needed: Sequence[ProgramPlace]) -> bytes | memoryview:
-    """A program's own text, followed by the needed others of its file."""
+    """Text of a program, followed by the programs of its file that it needs."""
     if not needed:
         return program
     whole = bytes(program)
@@ -169,17 +169,27 @@ class Reading:
     """Settings with which a program was read."""
 
     machine: Machine  # whose controller read it
-    emitted: bool = False  # text written by shapegcode: its arcs are FANUC's in any case
+    emitted: bool = False  # text written by shapegcode
     keeps_calls: bool = False  # text just emitted: every call in it was kept
     probe_lines: tuple[int, ...] = ()  # ascending line numbers after which the modal state is stored
     expand_compensation: bool = True  # G41/G42 became plain moves
+    # I, J, K are positions; None: as `input.arc_centre` says, and never in emitted text
+    absolute_arc_centres: bool | None = None
     collect_alarms: bool = False  # the reader continued after an alarm
     # name and text of called programs in other files, by O number
     called: dict[int, tuple[str, bytes]] = dataclasses.field(default_factory=dict)
 
+    @property
+    def has_absolute_arc_centres(self) -> bool:
+        """Whether I, J, K are positions, unless the text was translated from another control's."""
+        if self.absolute_arc_centres is None:
+            return self.machine.input.arc_centre == "absolute" and not self.emitted
+        return self.absolute_arc_centres
+
     def options(self, folder: Path | None, foreign: ForeignSettings | None = None) -> _core.ReaderOptions:
         """Options of the core for this reading; `foreign`: the text was expanded from another control's program."""
         options = reader_options(self.machine, emitted=self.emitted)
+        options.absolute_arc_centres = self.has_absolute_arc_centres
         options.probe_lines = list(self.probe_lines)
         options.expand_compensation = self.expand_compensation
         options.collect_alarms = self.collect_alarms
@@ -207,7 +217,7 @@ class Reading:
         """Settings with which another machine would read the text differently."""
         if machine is self.machine:
             return []
-        unused = {"input.arc_centre"} if self.emitted else set()
+        unused = {"input.arc_centre"} if self.emitted or self.absolute_arc_centres is not None else set()
         unused |= {"input.opaque_programs"} if self.keeps_calls else set()
         mine, other = _settings_of_reading(self.machine), _settings_of_reading(machine)
         return [
@@ -232,7 +242,7 @@ def _shown(value: object) -> str:
 
 
 def _apply(foreign: ForeignSettings, options: _core.ReaderOptions) -> None:
-    """Apply the settings that an expanded program made from one for another control needs."""
+    """Apply the settings for an expanded program that was translated from one for another control."""
     if foreign.calculator_decimal_point is not None:
         options.calculator_decimal_point = foreign.calculator_decimal_point
     options.absolute_arc_centres = False
@@ -303,7 +313,7 @@ def _limits(machine: Machine, *, emitted: bool) -> _core.WorkLimits:
     limits.rapid_mm_per_s = [axis.rapid_mm_per_min / 60.0 for axis in axes]
     limits.tool_change_s = machine.times.tool_change_s
     limits.m_function_s = machine.times.m_function_s
-    # An emitted program within the limits has more blocks and takes slightly longer.
+    # The original was within the limits; the emitted program has more blocks and takes slightly longer.
     limits.moves = _NO_LIMIT if emitted else controller.max_program_moves
     limits.expansion_moves = _NO_LIMIT if emitted else controller.max_expansion_moves
     limits.seconds = math.inf if emitted else controller.max_program_s
@@ -366,7 +376,7 @@ _LIKELY = (
 
 
 def signs_of_turning(text: bytes) -> tuple[int, str] | None:
-    """Line and words that show a program for a lathe; None with Y words or M06."""
+    """Line and words that show a turning program; None if there are too few, or with Y words or M06."""
     code = COMMENT.sub(b"", text[:LOOKED_AT_BYTES].upper())
     sure = [(found, meaning) for sign, meaning in _SURE if (found := sign.search(code))]
     likely = [(found, meaning) for sign, meaning in _LIKELY if (found := sign.search(code))]

@@ -214,9 +214,9 @@ def _mark_of(chunks: Iterable[bytes]) -> str:
 
 
 def _what_counts(lines: bytes) -> bytes:
-    """Remove ignored parts from whole lines, which end with LF except the last; none is empty.
+    """Remove ignored parts from whole lines; the result has LF between the lines, and no empty ones.
 
-    Uses plain replacement only where needed, as a program may have a million lines.
+    Slow steps run only where needed, as a program may have a million lines.
     """
     if b"(" in lines:
         lines = _ANY_COMMENT.sub(b"", lines)
@@ -248,12 +248,12 @@ def text_with_verdict(text: bytes, *, good: bool, better: bool = False) -> bytes
 
 
 def mark_of(program: _core.ProgramText) -> str:
-    """Checksum of a program read; see `text_mark`."""
+    """Checksum of a program that was read; see `text_mark`."""
     return _mark_of(whole_lines(program))
 
 
 def write_verdict(program: _core.ProgramText, mark: str, *, good: bool, better: bool = False) -> None:
-    """Write verdict and checksum into the text of a program read, in place."""
+    """Write verdict and checksum into the text of a program that was read, in place."""
     for begin, after in _changes(program.find, mark, good=good, better=better):
         program.overwrite(begin, after)
 

@@ -1,6 +1,7 @@
 """Serialiser of all JSON, and the schema of a result from its class: fields, and properties of `json_extra`.
 
-Numbers have nine digits except `json_exact`; values below a millionth and minus zero are 0; NaN, infinity are null.
+Numbers have nine digits, unless `exact` or `json_exact`; below 1e-9 they are 0 in the units of `_COARSE_UNITS`.
+Minus zero is 0; NaN and infinity are null.
 """
 
 import dataclasses
@@ -71,7 +72,7 @@ def file_hash(name: str | Path) -> tuple[str, int]:
 @cache
 def this_version() -> str:
     """ "shapegcode" and its version."""
-    from importlib import metadata  # slow to load, and wanted where a file is written only
+    from importlib import metadata  # slow to load, and needed only where a file is written
 
     try:
         return f"shapegcode {metadata.version('shapegcode')}"
@@ -80,7 +81,7 @@ def this_version() -> str:
 
 
 _DIGITS = 9
-_NOTHING = 1e-9  # smaller values are noise in any unit
+_NOTHING = 1e-9  # smaller values are round-off in the units below
 _COARSE_UNITS = ("_um", "_mm", "_s", "_percent")
 
 

@@ -94,7 +94,7 @@ class Trace:
         """The samples between two instants.
 
         Args:
-            begin_s: instant of the first sample, if there are samples.
+            begin_s: instant of the first sample; limited to the record.
             end_s: instant of the last sample, likewise.
             zero_s: instant that becomes time zero.
 

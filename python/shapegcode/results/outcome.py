@@ -261,7 +261,7 @@ CONTOURS = {"command": "contour error of the command", "response": "contour erro
 
 @dataclass(frozen=True)
 class Tracks(Generic[T]):
-    """A figure of both paths that a machine has: of its command and of its table."""
+    """A figure of the command, and the same figure of the machine table."""
 
     command: T  # of the set-points
     response: T  # of the table
@@ -269,7 +269,7 @@ class Tracks(Generic[T]):
 
 @dataclass(frozen=True)
 class Deviation:
-    """Deviation of one of both (command or table) from the programmed path."""
+    """Deviation of the command or of the machine table from the programmed path."""
 
     largest_mm: float  # distance, either side; corners that the track cuts short count too
     left_mm: float  # to the left of the travel, or above
@@ -303,7 +303,7 @@ class ContourError:
     right: float  # largest to the right of it, or below
     # largest deviation towards the workpiece (too much material removed); only if its side is known
     gouge: float | None = field(default=None, metadata=sparse())
-    # largest deviation away from it (remaining material); likewise
+    # largest deviation away from the workpiece (remaining material); likewise only if its side is known
     excess: float | None = field(default=None, metadata=sparse())
 
     @classmethod

@@ -1,4 +1,4 @@
-"""Plots of a path and its motion from above, deviations magnified; pictures of the worst position of a region."""
+"""Plots of a path and its motion in a plane, deviations magnified; pictures of the worst position of a region."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _STRAIGHT = (
 )
 
 _CUT = "Corners: each side is drawn up to the bisector of the corner, with its own deviation."
-# A smaller angle between two segments belongs to an arc in pieces.
+# A smaller angle between two segments is one of an arc that is approximated by lines.
 _CORNER_RAD = 0.3
-# If both sides of a corner are further apart than this ratio of the picture, they are not joined.
+# If the curves at both sides of a corner are further apart than this fraction of the path's size, they are not joined.
 _APART = 0.01
 # Ratio of lengths above which a drawn curve oscillates about its path.
-_SWINGS = 4.0
+_DEFLECTED = 4.0
 
 
 def plot_path(
@@ -153,7 +153,7 @@ def _style(number: int, curve: FloatArray, polyline: FloatArray) -> dict[str, An
     drawn_mm = float(np.nansum(np.linalg.norm(np.diff(curve, axis=0), axis=1)))
     length_mm = float(_distances(polyline)[-1])
     style = line_style(number)
-    return style if drawn_mm < _SWINGS * length_mm else style | {"linewidth": 0.6}
+    return style if drawn_mm < _DEFLECTED * length_mm else style | {"linewidth": 0.6}
 
 
 def _path_label(trace: Trace, deviation: FloatArray, quantity: str, *, is_part: bool) -> str:
@@ -292,11 +292,13 @@ def polyline_of(path: _core.Path) -> FloatArray:
     return np.concatenate(parts)
 
 
-RECORD_SAMPLES = 1_000_000  # maximum number kept by a simulation for pictures
+RECORD_SAMPLES = 1_000_000  # maximum number that a simulation records for pictures
 
 # For a longer region its worst position and its stop are shown.
 _WHOLE_S = 10.0
-_PLACES = 20_000  # some milliseconds apart in minutes of motion
+_MAX_SET_POINTS = (
+    20_000  # set-points whose nearest point on the path is computed, some milliseconds apart in minutes of motion
+)
 _AROUND_S = 1.5
 _BEFORE_STOP_S = 2.0
 
@@ -351,10 +353,10 @@ class _Scene:
 
     views: tuple[View, ...]  # time ranges: the whole, or the worst position and the stop
     part: str  # part of the program
-    near: tuple[Trace, ...]  # the traces; of a long region around the worst position
-    near_part: str  # part of the program of these
-    programmed_mm: FloatArray  # the path of these, (m, 3)
-    whole_mm: FloatArray | None = None  # the whole path if that is a part of it, (k, 3)
+    near: tuple[Trace, ...]  # the traces; of a long region only around the worst position
+    near_part: str  # part of the program that `near` shows
+    programmed_mm: FloatArray  # programmed path of `near`, (m, 3)
+    whole_mm: FloatArray | None = None  # the whole path if `programmed_mm` is a part of it, (k, 3)
 
     @classmethod
     def of(cls, simulated: SimulatedRegion) -> _Scene:
@@ -378,7 +380,7 @@ def _worst_place(
     traces: tuple[Trace, ...], programmed: FloatArray, path: _core.Path
 ) -> tuple[tuple[Trace, ...], FloatArray, float]:
     """Parts of all traces around the largest deviation of the first one, each with time 0 there; the corresponding
-    part of the programmed path, (m, 3), mm; the instant of the first trace."""
+    part of the programmed path, (m, 3), mm; the instant of that deviation in the first trace."""
     first = traces[0]
     away = _core.PathFollower(path).step(first.command_mm, first.response_mm)
     at = int(np.argmax(np.linalg.norm(away, axis=1)))
@@ -398,7 +400,7 @@ def _worst_place(
 def _progress(trace: Trace, programmed: FloatArray) -> FloatArray:
     """Distance along the path of each set-point, (n,), mm, ascending; interpolated in a long motion."""
     count = len(trace.command_mm)
-    rows = np.unique(np.append(np.arange(0, count, -(-count // _PLACES)), count - 1))
+    rows = np.unique(np.append(np.arange(0, count, -(-count // _MAX_SET_POINTS)), count - 1))
     command = trace.command_mm[rows]
     found, _ = follow(command, command, programmed, complete=trace.stops)
     progress: FloatArray = np.interp(np.arange(count), rows, np.maximum.accumulate(found))

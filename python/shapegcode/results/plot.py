@@ -73,7 +73,7 @@ def grid(
 
 
 def column(ax: Axes | None, rows: int, *, sharex: bool = True, xlabel: str = "", **options: Any) -> list[Axes]:
-    """Stacked panels, the last one with a label of the axis; options as in `grid`."""
+    """Stacked panels with *xlabel* below the last one; options as in `grid`."""
     panels = [row[0] for row in grid(ax, rows, 1, sharex=sharex, **options)]
     panels[-1].set_xlabel(xlabel)
     return panels
@@ -179,7 +179,7 @@ _ID = re.compile(r'(\bid="|xlink:href="#|\bhref="#|url\(#)')
 
 
 def svg_text(drawn: Axes | Figure, key: str, *, label: str) -> str:
-    """The whole picture of the axes as an `svg` element of a page, many points as pixels; same data, same text."""
+    """The picture of the axes as an `svg` element of a page, curves of many points as pixels; same data, same text."""
     figure: Any = drawn.figure.figure
     for artist in figure.findobj(_is_heavy):
         artist.set_rasterized(True)

@@ -84,7 +84,7 @@ class Result(Outcome):
             provenance: command, version and files of the result; None: unknown.
 
         Returns:
-            Tables and pictures, unless the class adds more.
+            Main figures, warnings, next step, tables and pictures, unless the class overrides this.
         """
         return sections_of(self, self.key_figures())
 
@@ -102,7 +102,7 @@ class Result(Outcome):
             motion: simulate the programs again for the rotatable picture of the motion; False: without it.
             provenance: command, version and files of the result; None: unknown, as from Python.
             problems: problems of the page, such as a program that was changed since.
-            on_progress: called with the finished ratio.
+            on_progress: called with the finished fraction, 0 to 1.
 
         Returns:
             The page, as data.
@@ -117,7 +117,7 @@ class Result(Outcome):
         return page_of(self, self.light, self.page_sections(provenance), scene, provenance, problems)
 
     def _completed(self, scene: Scene) -> Scene:
-        """The motion with what only the result knows."""
+        """The motion, with data that only the result has; overridden by results that have such data."""
         return scene
 
     def report(self, path: str | Path, script: Script = "inline") -> list[str]:
@@ -246,7 +246,7 @@ def _unit(name: str) -> str:
     return next((unit for part in parts for ending, unit in _UNITS.items() if part.endswith(ending)), "")
 
 
-#: Keys of the entries of each method; empty: own method, or the user's.
+#: Keys of the BibTeX entries of each method; empty: a method of this program or of the user.
 METHODS: Mapping[str, tuple[str, ...]] = {
     "shaper zv": ("smith1958", "park2009"),
     "shaper zvd": ("singer1990",),

@@ -1,4 +1,4 @@
-"""Read results back from ``--json`` files: the inverse of `shapegcode.results.json.plain`, by typed fields.
+"""Read results back from ``--json`` files: the inverse of `shapegcode.results.json.plain`, by the types of the fields.
 
 Data that are not in the JSON (samples, programs) are missing: access raises an error that says so.
 """
@@ -273,7 +273,7 @@ class Reports(Result):
 
     @property
     def answer(self) -> str:
-        """Number of pages, and of those with a caution."""
+        """Number of pages, and number of pages with a caution."""
         count = len(self.pages)
         sentence = f"{count} page{'s' if count > 1 else ''} written"
         bad = sum(bool(page.problems) for page in self.pages)
@@ -283,7 +283,7 @@ class Reports(Result):
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
         if not self.ok:
-            return "run the command again for the present program: its page then has no such remark."
+            return "run the command of this result again: its new page has no caution."
         return f"open {self.pages[0].page} in a browser."
 
     def tables(self) -> list[Table]:

@@ -28,7 +28,7 @@ class Column:
     Attributes:
         name: heading.
         unit: unit after the heading; empty: none.
-        value: content of a cell: attribute of the row (dotted names allowed), or a function of the row.
+        value: content of a cell: attribute of the row (dotted names allowed; empty: `name`), or a function of the row.
         digits: decimals of numbers; None: as text.
         text: left-aligned text, which wraps; other columns are right-aligned and never wrapped.
         left: left-aligned and never wrapped: a column of names.
@@ -101,7 +101,7 @@ class Table:
         return [[column.heading for column in shown], *([column.cell(row) for column in shown] for row in self.rows)]
 
     def shown(self) -> list[Column]:
-        """The columns that are not empty in every row, as in `cells`."""
+        """The columns with a text in one row or more, as in `cells`; without rows all columns."""
         return [column for column in self.columns if not self.rows or any(column.cell(row) for row in self.rows)]
 
     def __str__(self) -> str:

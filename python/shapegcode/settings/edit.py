@@ -1,6 +1,6 @@
 """Edit a TOML file with tomlkit: change some entries or origins, keep the rest byte for byte.
 
-After editing entries, ``table.value.body``, read the result again and compare it with the intention.
+A caller that edits entries (``table.value.body``) must read the result again and compare it with the intended values.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def origin_lines(remarks: Mapping[str, str]) -> list[str]:
 
 
 def with_origin_table(text: str, remarks: Mapping[str, str] | None = None) -> str:
-    """Move the origins of values to a table at the end; of all else, only values with an inline origin change."""
+    """Move the origins of values to a table at the end; besides, only values with an inline origin change."""
     remarks = remarks_of(text) if remarks is None else remarks
     text = without_origins(text)
     newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
@@ -98,7 +98,7 @@ def without_origins(text: str) -> str:
     plain, stated = take_origins(tomllib.loads(text))
     if stated is None:
         return text
-    # Usually they are one table at the end, which can be cut off; tomlkit would take a second.
+    # Usually they are one table at the end, which can be cut off; with tomlkit it would take about one second.
     headers = list(_HEADER.finditer(text))
     if headers and headers[-1][1] == ORIGIN:
         head = text[: headers[-1].start()]

@@ -76,7 +76,7 @@ class KeyLine:
 
 
 def take_origins(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """Split the tables of a file into values and their origins; two origins of one value become a list."""
+    """Split the tables of a file into values and origins (None: no origins); two origins of a value become a list."""
     found: dict[str, Any] = {}
     inline: dict[str, Any] = {}
     plain = {name: _plain(value, name, inline) for name, value in data.items() if name != ORIGIN}
@@ -111,7 +111,7 @@ def _note(key: str, origin: Any, found: dict[str, Any]) -> None:
 
 
 def remark_of(stated: str) -> str:
-    """Remark in a file for an origin such as "assumed: note"; only the note if it alone states the same origin."""
+    """Remark for an origin such as "assumed: note"; only the note, if the note alone gives the same origin."""
     word, _, note = stated.partition(": ")
     return note if note and origin_of(note) == origin_of(word) else stated
 
@@ -128,7 +128,7 @@ def remarks_in_comments(text: str) -> dict[str, str]:
 
 
 def lines_of(text: str) -> Iterator[tuple[str, KeyLine | None]]:
-    """Yield every line with its end, and its table or key; None for other lines."""
+    """Yield every line, line end included, with its table or key; None for other lines."""
     table, counts, inside = "", dict[str, int](), 0
     texts = _lines_of_long_texts(text)
     for number, raw in enumerate(text.splitlines(keepends=True)):
@@ -223,7 +223,7 @@ class TomlTable(BaseModel):
                 noted["unit"] = _UNITS[max((end for end in _UNITS if name.endswith(end)), key=len, default="")]
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Refuse, and name the alternative."""
+        """Refuse to set a key, and name the alternative."""
         if not name.startswith("_"):
             raise AttributeError(
                 f"{type(self).__name__}.{name} cannot be set: values never change; "
@@ -315,7 +315,7 @@ class KeyValue:
     assumed: bool  # True if the value is an assumption, in the file or as a default
     meaning: str  # its meaning
     fanuc: str  # numbers of the FANUC parameters that correspond to it, or empty
-    remark: str = ""  # comment after the value in the file
+    remark: str = ""  # text of its origin in the file
 
     @property
     def unmeasured(self) -> bool:

@@ -49,7 +49,7 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
     for detail in details[:MAX_PROBLEMS]:
         location, value = _locate(detail["loc"], data, detail["type"])
         if detail["type"] == "too_short" and isinstance(value, list) and len(value) >= detail["ctx"]["min_length"]:
-            continue  # too short only without its bad items, which are listed themselves
+            continue  # pydantic does not count its bad items, each of which has its own error
         # A list counts from 0 in pydantic, from 1 for users.
         key = ".".join(str(part + 1) if isinstance(part, int) else toml_key(part) for part in location)
         limit = _limit(detail["type"], detail.get("ctx", {}), detail["msg"])
@@ -77,7 +77,7 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
 
 
 def further_problems(count: int) -> tuple[Problem, ...]:
-    """A problem that counts those beyond `MAX_PROBLEMS`, whose lines are not searched."""
+    """One problem that states how many more than `MAX_PROBLEMS` there are; empty if there are not more."""
     more = count - MAX_PROBLEMS
     return (Problem("", "", f"{more} further problems are not listed"),) if more > 0 else ()
 
@@ -201,7 +201,7 @@ def parsed(text: str, source: str, error: type[FileError]) -> dict[str, Any]:
 
 
 def validated(model: type[_Model], data: dict[str, Any], source: str, text: str, error: type[FileError]) -> _Model:
-    """The tables of a file as their model; *source* names it in messages, *text*: for line numbers."""
+    """Validate the tables of a file as a model; *source* names it in messages, *text* is for line numbers."""
     try:
         return model.model_validate(data)
     except ValidationError as bad:
@@ -245,7 +245,7 @@ def with_values(settings: _Model, values: Mapping[str, object], source: str, err
 
 
 def missing_row(settings: TomlTable, key: str) -> str:
-    """Problem of a dotted key with a wrong list index, which counts from 1; empty without one."""
+    """Problem of a dotted key whose list index, from 1, does not exist; empty if there is none."""
     held: Any = settings
     parts = _parts(key)
     for rank, name in enumerate(parts):

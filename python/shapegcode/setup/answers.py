@@ -6,7 +6,7 @@
     dnc_baud = 9600
     modes = { x = "46:0.02", y = "taps/y.csv", z = "rigid" }
 
-Every question may be left open: without its key the machine file has no value for it.
+Every question may be left open: a limit of the axes is then assumed, any other key has its default.
 """
 
 import json
@@ -127,7 +127,7 @@ def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
         The answers.
 
     Raises:
-        AnswersError: an unknown key, a wrong type, or a missing value; every problem with its line.
+        AnswersError: an unknown key, a wrong value, or a file that does not exist; every problem with its line.
         OSError: the file cannot be read.
     """
     if isinstance(source, Mapping):

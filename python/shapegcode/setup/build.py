@@ -158,7 +158,7 @@ def _plain(answers: Answers) -> Machine:
 
 
 def _answered_values(answers: Answers) -> Iterator[tuple[str, tuple[object, str]]]:
-    """Yield key, value and remark of all answers except limits and parameter file."""
+    """Yield key, value and remark of the answers; limits only with a parameter file, else `_plain` sets them."""
     yield "name", (answers.name, "")
     if answers.dump is not None:
         yield "description", (f"read from {Path(answers.dump).name}; set up by answers", "")
@@ -192,7 +192,7 @@ def _answered_values(answers: Answers) -> Iterator[tuple[str, tuple[object, str]
 
 
 def _for_axes(machine: Machine, remarks: dict[str, str]) -> dict[str, str]:
-    """Remarks of existing keys; modes from answers are in separate tables."""
+    """Remarks of existing keys, with those of modes from answers and of axes without modes."""
     held = {value.key for value in machine.values()}
     found = {key: remark for key, remark in remarks.items() if key in held and remark}
     for axis, table in zip("xyz", machine.axes.as_tuple(), strict=True):

@@ -1,4 +1,4 @@
-"""Shapers: modes with `bands`, families in `registry`, `comparison` of designs, `grid`: the choice for a conversion.
+"""Shapers: modes (`bands`), families (`registry`), their `comparison`, the choice for a conversion (`grid`).
 
 Their names are also available here, each loaded on first use.
 """

@@ -20,7 +20,7 @@ NO_MODE = (
     "describes the test"
 )
 NARROW_PERCENT = 0.2  # half width above which a shaper is designed for a mode's band
-_SLOWEST_HZ = 0.1  # the period of a load on 25 m of rope; no machine tool has a slower mode
+_SLOWEST_HZ = 0.1  # of a load on 25 m of rope; no machine tool has a slower mode
 _FASTEST_HZ = 10_000.0  # as in a machine file
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _SIZE = r"(?:\d+\.?\d*|\.\d+)"

@@ -36,7 +36,7 @@ from shapegcode.shaping.result import (
 )
 from shapegcode.shaping.robust import least_worst
 
-_SLOWEST_PERIODS = 3.0  # default longest shaper: three-hump EI of the slowest mode and of a faster one
+_SLOWEST_PERIODS = 3.0  # default longest shaper, for the three-hump EI of the slowest mode and of a faster one
 _ROBUST = "robust"  # the family whose best design is shown even above the limit
 _OWN_TAPS = "taps"  # the family of the user's impulses
 _MOST_PERIODS = 5000  # periods in the longest shaper: finer grids are as good as continuous times
@@ -78,7 +78,7 @@ def choose_shaper(
             `shaping.vibration_limit`, without a machine 0.05.
         objective: "shortest", "contour" (least contour cost) or "robust" (smallest worst residual).
         allow_negative: allow a design with negative impulses.
-        taps: a shaper of the user's own, compared with the others: as text ("0:.5,10.9ms:.5") or as it is.
+        taps: the user's own shaper, compared with the others: a `Shaper`, or its text, such as "0:.5,10.9ms:.5".
         on_progress: called with the completed fraction, 0 to 1.
 
     Returns:

@@ -22,7 +22,7 @@ from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import ModeBand
 
 # Tolerance and presolve: occasionally the solver fails or cycles with the first of them.
-_WAYS = ((1e-10, False), (1e-9, True), (1e-9, False), (1e-8, True), (1e-7, True), (1e-7, False))
+_ATTEMPTS = ((1e-10, False), (1e-9, True), (1e-9, False), (1e-8, True), (1e-7, True), (1e-7, False))
 _MOST_PIVOTS = 20  # per unknown and condition; about 1 is usual
 
 
@@ -81,7 +81,7 @@ class LinearProgram:
     def solve(self) -> FloatArray | None:
         """Minimise; None if infeasible."""
         pivots = _MOST_PIVOTS * (len(self._columns) + self._rows)
-        for attempt, (tolerance, presolve) in enumerate(_WAYS):
+        for attempt, (tolerance, presolve) in enumerate(_ATTEMPTS):
             if attempt:  # restart
                 self._solver.clearSolver()
             if tolerance != self._tolerance or attempt:
@@ -193,7 +193,7 @@ class CutPool:
     omegas: list[list[float]]
     directions: list[list[float]]
     starts: int = 0
-    """Planes of each band that are never removed."""
+    """Number of planes of each band, the first ones, that are never removed."""
 
     @classmethod
     def around(cls, bands: Sequence[ModeBand]) -> Self:

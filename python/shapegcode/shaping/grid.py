@@ -28,7 +28,7 @@ from shapegcode.shaping.bands import (
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.track import MovingMode, ShaperTrack, design_per_axis, design_track, shaper_fir
 
-_ASSUMED_TICK_S = 0.001  # interpolation period without a machine
+_ASSUMED_PERIOD_S = 0.001  # interpolation period without a machine
 _LONGEST_BLOCK_PERIOD_S = 0.02
 _PERIODS_COMPARED = 3
 _FINEST_SHARE = 1.0 / 32.0  # of the fastest mode's period; finer grids are as good as continuous times
@@ -211,11 +211,12 @@ def check_block_period(period_s: float, machine: Machine) -> None:
     """Refuse a block period that the machine's controller cannot run."""
     if not (math.isfinite(period_s) and period_s > 0.0):
         raise ArgumentError(f"block period is {period_s} s, must be finite and above 0")
-    tick_s, block_time_s = machine.controller.interpolation_period_s, machine.controller.block_time_s
-    ticks = period_s / tick_s
+    interpolation_s, block_time_s = machine.controller.interpolation_period_s, machine.controller.block_time_s
+    ticks = period_s / interpolation_s
     if round(ticks) < 1 or abs(ticks - round(ticks)) > _WHOLE:
         raise ArgumentError(
-            f"block period {period_s * 1e3:g} ms is not a multiple of the interpolation period {tick_s * 1e3:g} ms"
+            f"block period {period_s * 1e3:g} ms is not a multiple of the interpolation period "
+            f"{interpolation_s * 1e3:g} ms"
         )
     if period_s < block_time_s * (1.0 - _ROUNDING):
         raise ArgumentError(
@@ -233,15 +234,15 @@ def candidate_periods(
     if machine is not None and machine.emission.block_period_s is not None:
         return [machine.emission.block_period_s]
     if machine is not None:
-        tick_s, least_s = machine.controller.interpolation_period_s, machine.controller.block_time_s
+        interpolation_s, least_s = machine.controller.interpolation_period_s, machine.controller.block_time_s
     else:
         least_s = _FINEST_SHARE / max(band.mode.frequency_hz for band in bands)
-        tick_s = _ASSUMED_TICK_S * max(1, math.ceil(least_s / _ASSUMED_TICK_S))
-    first = max(1, math.ceil(least_s / tick_s - _WHOLE))
-    last = max(first + _PERIODS_COMPARED - 1, math.floor(_LONGEST_BLOCK_PERIOD_S / tick_s + _WHOLE))
+        interpolation_s = _ASSUMED_PERIOD_S * max(1, math.ceil(least_s / _ASSUMED_PERIOD_S))
+    first = max(1, math.ceil(least_s / interpolation_s - _WHOLE))
+    last = max(first + _PERIODS_COMPARED - 1, math.floor(_LONGEST_BLOCK_PERIOD_S / interpolation_s + _WHOLE))
     every: list[tuple[float, float]] = []  # duration and negative period: of equal durations the longer period first
     for multiple in range(first, last + 1):
-        period_s = multiple * tick_s
+        period_s = multiple * interpolation_s
         # Shapers longer than the worst of the best so far are not searched.
         longest_s = max_duration_s
         if len(every) >= _PERIODS_COMPARED:
@@ -251,20 +252,20 @@ def candidate_periods(
         if found is not None:
             every = sorted([*every, (round(found.shaper.duration_s, 9), -period_s)])
     if not every:
-        return [multiple * tick_s for multiple in range(first, first + _PERIODS_COMPARED)]
+        return [multiple * interpolation_s for multiple in range(first, first + _PERIODS_COMPARED)]
     taken = max(-period for duration, period in every if duration <= (1.0 + SAME) * every[0][0])
     others = [-period for _, period in every if -period != taken]
     return sorted([taken, *others[: _PERIODS_COMPARED - 1]])
 
 
-_STROKES_S = (0.25, 0.4, 0.7)  # moves at the feed: the phase of ripple and a mode's vibration depends on the length
+_MOVES_S = (0.25, 0.4, 0.7)  # durations of moves at the feed: how ripple and vibration add up depends on the length
 
 
 @dataclass(frozen=True)
 class Grid:
     """Grid of a conversion: block period and shaper."""
 
-    block_period_s: float  # T_B
+    block_period_s: float  # duration of a block, s
     shaper: _core.Shaper  # the design, times on the block grid
     fir: _core.Fir  # as a filter in whole block periods
     # shapers along an axis, used instead where its position is known; None: no mode varies with position
@@ -282,7 +283,7 @@ class Grid:
 
     @property
     def duration_s(self) -> float:
-        """Time of the last tap of the longest shaper, s."""
+        """Time of the last impulse of the longest shaper, s."""
         if self.axis_firs:
             return max(fir.duration_samples for fir in self.axis_firs) * self.block_period_s
         return max(shaper.duration_s for shaper in self.shapers)
@@ -300,10 +301,10 @@ def choose_grid(
 ) -> Grid:
     """Choose block period and shaper for all modes of a machine, and shapers that follow moving modes.
 
-    With `shaping.family` = "auto" the shortest shaper without negative impulses with at most
-    `shaping.vibration_limit` residual ratio within the modes' bands; exact without a band. With
-    a named family its shortest one. An override-tolerant program (`Machine.bears_override`) gets the
-    period that suits other feed overrides, see `best_for_overrides`.
+    With `shaping.family` = "auto" it is the shortest shaper without negative impulses that keeps the residual ratio
+    within `shaping.vibration_limit` over the modes' bands, and at zero for modes without a band. With a named family
+    it is the shortest one of that family. An override-tolerant program (`Machine.bears_override`) gets the period
+    that suits other feed overrides, see `best_for_overrides`.
 
     Args:
         machine: modes and controller.
@@ -315,8 +316,8 @@ def choose_grid(
 
     Raises:
         DesignError: no shaper exists within `shaping.max_duration_s`.
-        ArgumentError: the machine has no mode, its modes vary over several axes, or the period does not fit the
-            controller.
+        ArgumentError: the machine has no mode, its modes vary over several axes or do not suit `shaping.family` or
+            `shaping.per_axis`, or the period does not fit the controller.
     """
     machine = Machine.of(machine)
     if not any(axis.modes for axis in machine.axes.as_tuple()):
@@ -435,8 +436,8 @@ def override_vibration_um(
     speed = feed_mm_per_s * math.sqrt(moves.sum())
     fir = shaper_fir(shaper, block_period_s)
     worst_mm = 0.0
-    for stroke_s in _STROKES_S:
-        path = _core.Path([_core.Segment.line(np.zeros(3), moves * feed_mm_per_s * stroke_s, speed)])
+    for move_s in _MOVES_S:
+        path = _core.Path([_core.Segment.line(np.zeros(3), moves * feed_mm_per_s * move_s, speed)])
         samples = fir.apply(_core.interpolate(path, _core.plan_speed(path, model.limits()), block_period_s))
         lengths = np.linalg.norm(np.diff(samples, axis=0), axis=1)
         blocks = _core.Path(

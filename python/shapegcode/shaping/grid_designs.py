@@ -45,9 +45,8 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
 
     The number of periods is the smallest for which the conditions (sum 1, each mode's complex residual zero)
     have a non-negative solution. Among the solutions of that duration the one with the least second central
-    moment, the contour cost, is chosen, about the mean of its own taps. Modes with the same
-    conditions on this grid (equal ones, or aliases of one another) count once. The optimiser's taps are
-    re-solved in full precision and checked.
+    moment, the contour cost, is chosen. Modes with the same conditions on this grid (equal ones, or aliases of one
+    another) count once. The taps of the optimiser are re-solved in full precision and checked.
 
     Args:
         modes: Modes to cancel, at least one; one above the grid's Nyquist frequency is fine.
@@ -135,8 +134,8 @@ class _GridSearch:
         self._pool = CutPool.around(conditions.bands)
 
     def shortest(self, most: int) -> Shaper | None:
-        """The shortest shaper of at most that many periods, or None."""
-        # A guess: half a cycle for each zero, a whole one for each limit without a zero in it.
+        """The shortest shaper of at most `most` periods, or None."""
+        # A guess: half a cycle for each zero; without zeros, a cycle for each band.
         cycles_s = sum(0.5 * zero.multiplicity / zero.mode.frequency_hz for zero in self._conditions.zeros)
         cycles_s = cycles_s or sum(1.0 / band.mode.frequency_hz for band in self._conditions.bands)
         start = max(1, math.ceil(cycles_s / self._period_s))
@@ -168,7 +167,7 @@ class _GridSearch:
         return None
 
     def _candidates(self, problem: TapProblem) -> Iterator[FloatArray]:
-        """Taps of that many periods, the best first."""
+        """Yield taps that solve a problem, the best first."""
         feasible = self._feasible(problem)
         if feasible is None:
             return
@@ -199,7 +198,7 @@ def exact_conditions(
 ) -> tuple[FloatArray, FloatArray]:
     """Matrix and right-hand side of the equality conditions on the taps at 0, 1 ... `last` periods.
 
-    The modes' rows (each mode's residual sum, which decay keeps at most 1) are replaced by an orthonormal
+    The rows of the modes (residual of each mode, scaled so that no entry exceeds 1) are replaced by an orthonormal
     basis of their span: near-equal modes then cost no precision, and equal ones no row. Without modes the sum
     is the only condition. Zeros are simple, or of these multiplicities.
     """

@@ -19,11 +19,11 @@ from shapegcode.shaping.result import Recommendation, times_name
 _CURVES = 6
 _LEAST_RATIO = 1.02
 _RATIO_STEP = 0.02
-_BRANCH_SWINGS = 1.0  # cycles of the slower mode: longer minimal shapers are of no interest
+_BRANCH_CYCLES = 1.0  # cycles of the slower mode: longer minimal shapers are of no interest
 _FREQUENCIES = 601
 _PERIODS_IN_DURATION = 2.0
 _SAMPLES_OF_A_STEP = 3000
-_SWINGS_SHOWN = 3.0  # cycles of the slowest mode after the longest shaper
+_CYCLES_SHOWN = 3.0  # cycles of the slowest mode after the longest shaper
 Shapers = Recommendation | Shaper | Mapping[str, Shaper]
 
 
@@ -80,7 +80,7 @@ def _shapers_and_bands(
 
 
 def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
-    """What does less vibration cost? Worst residual and contour cost over duration.
+    """Plot worst residual and contour cost over duration: what less vibration costs.
 
     Designs on the Pareto front are filled, the recommended one is ringed.
 
@@ -134,8 +134,8 @@ def plot_sensitivity(
 
     Args:
         result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, or shapers by name.
-        modes: to mark, for shapers: as `choose_shaper` takes them; empty: undamped, up to two periods per shaper
-            duration.
+        modes: modes to mark if shapers are given, as for `choose_shaper`; empty: the curves are undamped, up to 2.5
+            cycles within the longest shaper.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -209,7 +209,7 @@ def plot_steps(result: Shapers, ax: Axes | None = None, *, modes: Sequence[float
 
     Args:
         result: a comparison (one curve for each of `selected`), a shaper, or shapers by name.
-        modes: modes that respond, for shapers, at least one: as `choose_shaper` takes them.
+        modes: modes that respond if shapers are given, at least one, as for `choose_shaper`.
         ax: axes to divide; None: a new figure.
 
     Returns:
@@ -223,7 +223,7 @@ def plot_steps(result: Shapers, ax: Axes | None = None, *, modes: Sequence[float
         raise ArgumentError("modes: 0 given: a step is drawn with the modes that follow it, at least one")
     nominal = [band.mode for band in bands]
     slowest_s = 1.0 / min(band.mode.frequency_hz for band in bands)
-    until_s = max(shaper.duration_s for shaper in shapers.values()) + _SWINGS_SHOWN * slowest_s
+    until_s = max(shaper.duration_s for shaper in shapers.values()) + _CYCLES_SHOWN * slowest_s
     period_s = until_s / _SAMPLES_OF_A_STEP
     unit, scale = _time_unit(until_s)
     panels = plot.column(
@@ -297,7 +297,7 @@ def _branches(result: Recommendation) -> MinimalBranches | None:
     lowest = max(_LEAST_RATIO, 0.6 * ratio)
     ratios = np.arange(lowest, max(1.4 * ratio, lowest + 0.2), _RATIO_STEP)
     # Limited by the search at the largest ratio, and by the number of curves that can be distinguished.
-    longest_s = min(result.max_duration_s, _BRANCH_SWINGS / slow.frequency_hz, 99.0 / (ratios[-1] * slow.frequency_hz))
+    longest_s = min(result.max_duration_s, _BRANCH_CYCLES / slow.frequency_hz, 99.0 / (ratios[-1] * slow.frequency_hz))
     branches = minimal_branches(slow, fast.damping_ratio, ratios.tolist(), longest_s)
     return branches if np.isfinite(branches.times_s).any() else None
 

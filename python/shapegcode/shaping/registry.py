@@ -202,7 +202,7 @@ def _polished(times_s: FloatArray, amplitudes: FloatArray, modes: Sequence[_core
 
 
 def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bool = False) -> Solve:
-    """A polynomial kernel with zeros at these multiples of each mode.
+    """A polynomial kernel with zeros at these multiples of each mode's frequency.
 
     Source: D. Butyugin's smoothers of the printer firmware Kalico; derivation on a grid: this project.
     """

@@ -50,8 +50,8 @@ def _order(each: Design, objective: str) -> tuple[float, ...]:
 def pareto_front(designs: Sequence[Design]) -> list[bool]:
     """For each design: True if no other one is at least as good in every figure and better in one.
 
-    Compared are duration, worst residual, magnitude of the contour cost and sum of the taps' magnitudes, each to nine
-    digits, a residual below 1e-9 as zero. A design on a grid is also valid at continuous times, not the
+    The figures are duration, worst residual, magnitude of the contour cost and sum of the impulses' magnitudes, each to
+    nine digits; a residual below 1e-9 counts as zero. A design on a grid is also valid at continuous times, not the
     reverse, so designs on grids are compared only with each other.
     """
     if not designs:
@@ -136,7 +136,7 @@ def _left(ratio: float) -> str:
 
 
 _MARK, _GRID_MARK = "=>", "->"
-_PARETO_OF_A_FAMILY = 3  # additional rows to the preferred one
+_PARETO_OF_A_FAMILY = 3  # rows in addition to the preferred one
 _SPEED_MM_PER_S, _RADIUS_MM = 200.0, 20.0  # for which the contour cost is shown
 
 

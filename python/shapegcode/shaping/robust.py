@@ -181,7 +181,7 @@ class Task:
         zeros_at_nominal: bool = False,
         mirrored: bool = False,
     ) -> Task:
-        """Create a task from checked values."""
+        """Check the values, and create the task."""
         check_modes_and_times(bands, period_s=period_s)
         if not (math.isfinite(max_abs_sum) and max_abs_sum >= 1.0):
             raise ArgumentError(f"max_abs_sum is {max_abs_sum}: must be finite and at least 1, the sum of the impulses")
@@ -273,7 +273,7 @@ def best_within(task: Task, last: int) -> RobustDesign | None:
 
 
 def _below(task: Task, last: int, limit: float) -> Bounds | None:
-    # symmetric taps stay symmetric with a zero at each end, so compare with one period more
+    # Symmetric taps with a zero added at each end are symmetric, but two periods longer: so one less is tried too.
     for periods in (last, last - 1) if task.mirrored and last else (last,):
         bounds = task.problem(periods).least_worst(limit)
         if bounds is not None and bounds.upper <= limit:
@@ -284,9 +284,9 @@ def _below(task: Task, last: int, limit: float) -> Bounds | None:
 def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, precision: float = 0.0) -> int | None:
     """Smallest number of periods that stays below the limit, or None if it exceeds `most`.
 
-    Further zero taps keep a design valid, so growing and then bisection finds it. The start is half a period of
-    each mode, the duration of ZV, or `too_few`, which is known not to suffice. With a relative `precision`
-    the result suffices, but may exceed the smallest by that much.
+    Further zero taps keep a design valid, so growing and then bisection finds it. The search starts at the duration
+    of the convolved ZV, and above `too_few`, which is known not to suffice. With a relative `precision` the result
+    suffices, but may exceed the smallest by that much.
     """
     start = max(1.0, sum(0.5 / band.mode.frequency_hz for band in task.bands) / task.period_s, _GROWTH * too_few)
     return smallest_enough(

@@ -18,7 +18,7 @@ from shapegcode.shaping.bands import check_times, whole_periods
 from shapegcode.shaping.cutting_planes import LinearProgram
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, refined, shortest_non_negative
 
-_LOOKS = 16  # positions between two nodes at which the residual is checked
+_LOOKS = 16  # steps from node to node; the residual is checked between them
 _SUPPORT = 1e-9  # smaller amplitudes are no taps
 _LONGER = 1.3  # factor by which a common mean delay may lengthen shapers
 _SAME_MEAN = 1e-9  # periods
@@ -64,7 +64,7 @@ class ShaperTrack:
 
     @property
     def duration_s(self) -> float:
-        """Time of the last tap of the longest shaper, s."""
+        """Time of the last impulse of the longest shaper, s."""
         return max(node.shaper.duration_s for node in self.nodes)
 
     @cached_property

@@ -211,10 +211,10 @@ def csv_file(path: str | Path) -> Iterator[WriteMotion]:
 
 @contextlib.contextmanager
 def npz_file(path: str | Path) -> Iterator[WriteMotion]:
-    """A NumPy archive of `Chunk.columns`, `kind` and its names; needs twice its size in its folder meanwhile."""
+    """Open a NumPy archive for `Chunk.columns`, `kind` and its names; needs twice its size in its folder until done."""
     target = Path(path).resolve()
     with named_errors(path), contextlib.ExitStack() as files, replaced_file(path) as stream:
-        # In the file's folder, which has space; not in that of a device.
+        # Temporary files are in the folder of the archive, which has space, unless the path is that of a device.
         npz = _Npz(target.parent if target.is_file() or not target.exists() else None, files)
         yield npz.write
         npz.finish(stream)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _COMMAND, _RESPONSE = plot.COLOURS[1], plot.COLOURS[0]
 _MOVES_MM = 1e-9
-_DENSE = 0.2  # ratio to the panel's height
+_DENSE = 0.2  # median width of a dense band, relative to the range of its curve
 # Label of the axis, factor from the curve's own unit, and curves: number, colour, name.
 _Row = tuple[str, float, tuple[tuple[int, str, str], ...]]
 _ROWS: tuple[_Row, ...] = (

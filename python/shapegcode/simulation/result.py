@@ -34,7 +34,7 @@ class RegionRun:
     was_rapid: bool  # shaped blocks in place of a rapid
     time_s: float  # until the set-points rest
     residual_vibration_um: Xyz[float]  # largest |response - command| of each axis after the set-points rest
-    # time from then until it stays within the band; None: not within the limit, or no band
+    # time from then until |response - command| stays within the band; None: not within the limit, or no band
     settling_time_s: Xyz[float | None]
     period_s: float = field(metadata=hidden())  # time between two samples
     path: _core.Path = field(metadata=hidden())  # path against which it is measured
@@ -56,15 +56,12 @@ class RegionRun:
 
 @dataclass(frozen=True)
 class ShapedFigures:
-    """Figures of the shaped regions of a program, with the worse rule of block timing, as in `convert`.
-
-    Without shaped rapids.
-    """
+    """Figures of the shaped regions, without shaped rapids, with the worse rule of block timing, as in `convert`."""
 
     regions: int  # number of regions
     cutting_time_s: float  # until the set-points rest
     residual_vibration_um: Xyz[float]  # largest |response - command| of each axis after the set-points rest
-    peak_vibration_um: Xyz[float]  # before that
+    peak_vibration_um: Xyz[float]  # the same while the set-points move
     contour_error_um: Tracks[ContourError]  # against the path named in the simulation
 
 
@@ -137,8 +134,9 @@ class Simulation(Result):
         cycle_time_s: whole program: regions, rapids with in-position wait, dwells, drilling cycles.
         cutting_time_s: regions only, until the set-points rest.
         residual_vibration_um: largest |response - command| of each axis once the set-points rest.
-        peak_vibration_um: largest before that.
-        settling_time_s: time from then until it stays within the band; None: not within the limit, or no band.
+        peak_vibration_um: the same while the set-points move.
+        settling_time_s: time after the set-points rest until |response - command| stays in the band; None: longer than
+            the limit, or no band.
         settling_band_um: band from the machine file (`tolerance.residual_floor_um`); 0: none.
         settling_limit_s: how long the motion after a stop is observed.
         contour_error_um: against the path of `measured_against`.

@@ -24,7 +24,7 @@ from shapegcode.simulation.motion import MotionRecorder, csv_file, npz_file
 from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation
 from shapegcode.verdict.judge import judge_program
 
-# Observed time after a stop for settling. A drive is integrated all that time.
+# Time for which settling is observed after a stop; short for a drive, which is integrated all that time.
 _SHORTEST_REST_S, _LONGEST_REST_S, _DRIVE_REST_S = 0.5, 10.0, 0.5
 
 
@@ -88,7 +88,7 @@ def simulate(
         as_shaped = region.shaped if shaped is None else shaped
         path = nominal.get(region.first_line)
         by_shaped, offset = as_shaped or emitted, model.offset(region)
-        replay = partial(_play, region.path, path, model, plant, by_shaped, offset, band_um, limit_s)
+        replay = partial(_simulate_region, region.path, path, model, plant, by_shaped, offset, band_um, limit_s)
         figures = [replay(record_samples)]
         if as_shaped:
             figures += [replay(0, block_end=rule) for rule in model.block_rules if rule != model.own_rule]
@@ -208,7 +208,7 @@ def _largest(simulated: Sequence[_core.SimulationFigures]) -> dict[str, Any]:
     }
 
 
-def _play(
+def _simulate_region(
     blocks: _core.Path,
     path: _core.Path | None,
     model: MachineModel,

@@ -29,7 +29,7 @@ from shapegcode.studies.study import check_ends, check_probability, within
 USUAL_DRAWS = 256  # Default number of machines per combination
 USUAL_CONVERSIONS = 300  # Default maximum of conversions
 
-_FRESH = 4  # times as many new samples confirm a choice: the best of many may be best by chance
+_FRESH = 4  # new samples that confirm a choice, per sample before: the best of many may be best by chance
 _UNLIKELY_S = 1e6  # cost of a candidate with too low a probability, above any cycle time
 _NO_TEXT_S = 1e9
 
@@ -62,14 +62,14 @@ def optimize(
         most: maximum number of conversions.
         seed: equal seeds give equal results.
         shape_all: see `convert`.
-        on_progress: called with the finished ratio of the conversions.
+        on_progress: called with the finished fraction of the conversions.
 
     Returns:
         The settings, and the converted combinations.
 
     Raises:
-        ArgumentError: a probability outside 0 to 1, nothing to vary or to choose, or varying a value that only the
-            converter reads.
+        ArgumentError: a probability outside 0 to 1, nothing to vary or to choose, or varying a value that is `known`
+            to the converter.
         MachineError: an unknown key, or a sampled value that is invalid in a machine file.
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.
@@ -107,7 +107,7 @@ def optimize(
 
 
 def _check_values(machine: Machine, choices: Choices) -> None:
-    """Check each value by itself; invalid combinations are left out of the candidates."""
+    """Refuse a key with only invalid values; other invalid combinations are candidates without a program."""
     for key, values in choices.items():
         problems = []
         for value in values:
@@ -124,7 +124,7 @@ class _Choosing:
         self, program: Program | str, machine: Machine, choices: Choices,
         rows: Sequence[tuple[Mapping[str, object], ...]], probability: float, shape_all: bool,
     ) -> None:  # fmt: skip
-        # The price is lifted, since the shortest time is searched for.
+        # No limit on the price: the shortest time is searched for.
         self._program, self._machine, self._choices, self._rows = program, machine.with_values(ANY_PRICE), choices, rows
         self._probability, self._shape_all = probability, shape_all
         self._replays: dict[Ranks, Replay] = {}

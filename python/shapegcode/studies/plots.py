@@ -1,4 +1,4 @@
-"""The pictures of ``shapegcode study``: influence of each value (tornado), measures over the first one (bands).
+"""The pictures of ``shapegcode study``: influence of each value (tornado), measures over the most influential (bands).
 
 The picture of ``shapegcode optimize``: time and probability of the combinations.
 """
@@ -92,7 +92,7 @@ def plot_choices(found: Optimum, ax: Axes | None = None) -> Axes:
 
 
 def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
-    """Plot a measure over the most important value: median, and the band that contains 90 % of the samples.
+    """Plot measures over the most influential value: median, and the band that contains 90 % of the samples.
 
     Args:
         study: the study.

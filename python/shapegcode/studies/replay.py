@@ -85,7 +85,7 @@ class Replay:
             _SimulatedPart(region, emitted.core.cutting_path(first, last), _core.ContourTracker(region.path), limit)
             for region, (_, first, last), limit in zip(regions, parts, limits, strict=True)
         ]
-        # Time in addition to the computed one, such as for blocks without a header.
+        # Part of that cycle time which the model does not compute for the emitted program.
         self._beyond_s = time_s - MachineModel(machine).cycle_time_s(emitted.core)
 
     @classmethod
@@ -130,7 +130,7 @@ class Replay:
     def simulate(
         self, machine: Machine, wanted: Collection[str], *, override: float = _FULL, times: bool = True
     ) -> dict[str, float]:
-        """Simulate the program on a machine; measures by name."""
+        """Simulate the program on a machine; return the measures by name."""
         model = MachineModel(machine)
         found = dict.fromkeys(wanted, 0.0)
         for part in self._parts:

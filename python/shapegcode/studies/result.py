@@ -43,12 +43,12 @@ class Quantity:
     name: str  # name of the measure, with its unit
     nominal: float  # value on the machine of the file
     mean: float  # mean of all samples
-    p5: float  # 5 % quantile; likewise the others
-    p25: float  # likewise
+    p5: float  # 5 % quantile
+    p25: float  # 25 % quantile
     p50: float  # the median
-    p75: float  # likewise
-    p95: float  # likewise
-    p99: float  # likewise
+    p75: float  # 75 % quantile
+    p95: float  # 95 % quantile
+    p99: float  # 99 % quantile
     largest: float  # maximum of all samples
 
     @property
@@ -68,8 +68,8 @@ class ParameterInfluence:
     high_at: str  # value at the largest ratio
     first: float | None = None  # first-order Sobol index of the ratio; None: not requested
     total: float | None = None  # total Sobol index
-    first_error: float | None = None  # half of the 95 % interval of the first, by resampling
-    total_error: float | None = None  # likewise
+    first_error: float | None = None  # half width of the 95 % interval of `first`, by resampling
+    total_error: float | None = None  # the same for `total`
 
 
 def _with_error(value: float | None, error: float | None) -> str:
@@ -118,14 +118,14 @@ class MachineStudy(Result):
         n: number of simulated samples.
         conversions: number of programs converted for them.
         varied: the varied values.
-        within: ratio of samples that stay within every limit.
+        within: ratio of all samples that stay within every limit; those without an emitted program do not.
         within_interval: 95 % interval of the estimated probability; meaningless for a grid.
         at_least: the required probability.
         quantities: measures over all samples.
         parameter_sensitivity: values by influence on the verdict, most influential first.
         curves: measures over each value, for pictures.
         refused: samples without an emitted program.
-        warnings: caution, before you run.
+        warnings: samples without a program, and what was not measured.
         limits_um: smallest limit of each measure that has one.
         draws: values by key and measures by name, one row per sample.
     """
@@ -333,10 +333,10 @@ class Optimum(Result):
         probability: required probability of staying within tolerance.
         draws: machines on which a candidate is simulated; four times as many new ones confirm it.
         best: the best candidate; None: none has the required probability.
-        as_it_is: with the settings of the machine file; None: no emitted program.
+        as_it_is: candidate with the settings of the machine file; None: no emitted program.
         candidates: all converted ones, shortest first.
         combinations: number of possible combinations.
-        warnings: caution, before you run.
+        warnings: always empty.
         machine_words: the machine as argument of -m.
     """
 
@@ -364,7 +364,7 @@ class Optimum(Result):
 
     @property
     def answer(self) -> str:
-        """Settings, cycle time and probability of a good part."""
+        """Best settings, their cycle time, and the probability of staying within tolerance."""
         if self.best is None or self.best.time_s is None:
             asked = f"{self.probability * 100:g} % of the machines"
             return f"none of {len(self.candidates)} choices stays within tolerance on {asked}"

@@ -70,7 +70,7 @@ def study(
         at_least: required probability of staying within tolerance.
         shape_all: see `convert`.
         scheduler: Dask's address, or a `Cluster`; "local": one on this computer; None: threads of this process.
-        on_progress: called with the stage and its finished ratio.
+        on_progress: called with the stage and the finished fraction of the samples.
 
     Returns:
         Quantiles, probability, influences; `to_xarray()` has every sample.
@@ -99,7 +99,7 @@ def study(
 
 
 def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> None:
-    """Before any conversion, make the machines with the lowest and the highest value of each key."""
+    """Check the machines with the lowest and the highest, or each listed, value of each key before any conversion."""
     for each, column in zip(varied, columns, strict=True):
         if isinstance(each.distribution, Listed):
             ends = {toml(value): index for index, value in enumerate(column)}.values()
@@ -273,7 +273,7 @@ def interval_of(good: int, count: int) -> tuple[float, float]:
 
 
 def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple[results.BinQuantiles, ...]:
-    """Quantiles of a measure over a varied value: in ten bins of equally many samples, or at each listed value."""
+    """Quantiles of a measure over a varied value: in up to ten bins of equally many samples, or at each listed one."""
     if isinstance(each.distribution, Listed):
         groups = [
             (rank, str(choice), [index for index, value in enumerate(column) if value == choice])

@@ -48,12 +48,12 @@ def _as_table(value: object) -> object:
         return {"one_of": value}
     if not isinstance(value, dict):
         raise ValueError(f"must be a list or a table: {_GIVE}")
-    if unknown := sorted(value.keys() - DrawnValue.model_fields):
+    if unknown := sorted(value.keys() - SampledValue.model_fields):
         raise ValueError(f"{', '.join(unknown)}: no such key here: {_GIVE}")
     return value
 
 
-class DrawnValue(InlineTable):
+class SampledValue(InlineTable):
     """Distribution of a value."""
 
     model_config = ConfigDict(
@@ -74,7 +74,7 @@ class DrawnValue(InlineTable):
     known: Bool | None = key("the program is converted for each value", default=None)
 
     @model_validator(mode="after")
-    def _one_kind(self) -> DrawnValue:
+    def _one_kind(self) -> SampledValue:
         try:
             self.distribution()
         except ArgumentError as wrong:
@@ -96,7 +96,7 @@ class DrawnValue(InlineTable):
         raise ArgumentError(_GIVE)
 
 
-_LEAVES = frozenset(DrawnValue.model_fields)
+_LEAVES = frozenset(SampledValue.model_fields)
 
 
 def _flat(given: Mapping[str, object], above: tuple[str, ...] = ()) -> Iterator[tuple[str, object]]:
@@ -126,7 +126,7 @@ def _is_value(parts: Sequence[str]) -> bool:
     return table is None
 
 
-Values = Annotated[dict[str, Annotated[DrawnValue, BeforeValidator(_as_table)]], Field(min_length=1)]
+Values = Annotated[dict[str, Annotated[SampledValue, BeforeValidator(_as_table)]], Field(min_length=1)]
 Lists = Annotated[dict[str, Annotated[tuple[Any, ...], Field(min_length=1)]], Field(min_length=1)]
 Measure = Annotated[Text, Field(json_schema_extra={"enum": list(MEASURES)})]
 
@@ -184,7 +184,7 @@ def study_schema(title: str) -> dict[str, Any]:
     found = toml_schema(StudyFile, title)
     choices: dict[str, Any] = {"type": "array", "minItems": 1}
     schemas: dict[str, dict[str, Any]] = {
-        "vary": {"anyOf": [choices, {"$ref": "#/$defs/DrawnValue"}]},
+        "vary": {"anyOf": [choices, {"$ref": "#/$defs/SampledValue"}]},
         "choose": choices,
     }
     for table, value in schemas.items():
@@ -217,7 +217,7 @@ def load_study(path: str | Path) -> StudyFile:
                     raise StudyFileError(str(path), (twice,))
                 flat[name] = entry
             data[table] = flat
-    # In quotes, as in messages, so that their lines are found.
+    # Put dotted keys in quotes, as in messages, so that their lines are found.
     quoted = _DOTTED.sub(r'\1"\2"\3', text)
     found = validated(StudyFile, data, str(path), quoted, StudyFileError)
     beside = Path(path).parent

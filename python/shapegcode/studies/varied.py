@@ -32,12 +32,12 @@ class Distribution:
 
     words: str  # as shown
     quantile: Callable[[Unit], Unit] = field(compare=False)  # inverse distribution function
-    # the program is converted for each value; False: it is converted for the value of the machine file, and only
-    # the simulated machine has the other one; None: False if a machine may differ from its file
+    # True: the program is converted for each value; False: it is converted for the value of the machine file, and only
+    # the simulated machine has the sampled one; None: False for values that the simulation reads
     known: bool | None = None
 
     def at(self, shares: Unit) -> list[object]:
-        """Quantiles at these ratios."""
+        """Quantiles at these probabilities."""
         return list(map(float, self.quantile(shares)))
 
 
@@ -48,7 +48,7 @@ class Listed(Distribution):
     values: tuple[object, ...] = ()
 
     def at(self, shares: Unit) -> list[object]:
-        """Quantiles at these ratios."""
+        """Quantiles at these probabilities."""
         count = len(self.values)
         return [self.values[min(int(share * count), count - 1)] for share in shares]
 
@@ -79,7 +79,7 @@ def normal(
         The distribution.
 
     Raises:
-        ArgumentError: not one of the two spreads, or one that is not above 0.
+        ArgumentError: both or none of *sd* and *percent*, one that is not above 0, or a percentage of a mean of 0.
     """
     mean = _number("mean", mean)
     spread = _spread(sd, percent, abs(mean))
@@ -177,10 +177,10 @@ _SIMULATED = re.compile(
     r"|controller\.(in_position|rapid)\w*(\.[xyz])?"
     r"|shaping\.part_mass_kg|times\..+"
 )
-_SWINGS = re.compile(r"axes\.[xyz]\.(modes|rigid|drive)\b.*|shaping\.part_mass_kg")
-# The table with it may be missing in the file; `with_values` decides.
+_VIBRATING = re.compile(r"axes\.[xyz]\.(modes|rigid|drive)\b.*|shaping\.part_mass_kg")
+# Keys of tables that the file may lack; `with_values` checks them.
 _OPTIONAL = re.compile(r"axes\.[xyz]\.(modes|drive)(\.|$)")
-_TICK = "controller.interpolation_period_s"
+_PERIOD_KEY = "controller.interpolation_period_s"
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ class Varied:
     @property
     def changes_times(self) -> bool:
         """True if it may change the time of a program."""
-        return not _SWINGS.fullmatch(self.key)
+        return not _VIBRATING.fullmatch(self.key)
 
 
 def check_keys(name: str, given: object) -> None:
@@ -235,7 +235,9 @@ def sampled_machine(machine: Machine, values: Mapping[str, object], source: str)
     if not values:
         return machine
     # A control with another period executes the same blocks; only the converter requires a multiple of it.
-    freed = {"emission.block_period_s": None} if _TICK in values and "emission.block_period_s" not in values else {}
+    freed = (
+        {"emission.block_period_s": None} if _PERIOD_KEY in values and "emission.block_period_s" not in values else {}
+    )
     return machine.with_values({**freed, **values}, source=source)
 
 
@@ -267,7 +269,7 @@ def _sequence(dimensions: int, n: int, sampling: str, seed: int) -> FloatArray:
 
     if sampling == "lhs":
         return np.asarray(qmc.LatinHypercube(dimensions, rng=np.random.default_rng(seed)).random(n))
-    # The start of a sequence of a power of two, as SciPy requires.
+    # The first n points of a sequence of a power of two, as SciPy requires.
     power = math.ceil(math.log2(n)) if n > 1 else 0
     return np.asarray(qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(power))[:n]
 

@@ -55,7 +55,7 @@ class CuttingLaw:
 class CutTool:
     """The end mill of a test cut."""
 
-    diameter_mm: _Positive  # measured when turning
+    diameter_mm: _Positive  # measured on the rotating tool
     flutes: Annotated[int, Field(gt=0)]  # their number
     helix_deg: _Finite  # right-hand helix
     runout_mm: tuple[_Finite, ...] = ()  # radial runout of each flute; empty: unknown
@@ -71,7 +71,7 @@ class CutTool:
 class MeasuringPass:
     """One pass with recorded force."""
 
-    name: str  # its characteristic
+    name: str  # what distinguishes it, such as its feed
     start_mm: _Finite  # X of the tool's axis at its start, in the air
     end_mm: _Finite  # X at its end, in the air
     # ascending X of the edge's corner points, from one end of the stock to the other
@@ -128,7 +128,7 @@ class Deepest:
 
 
 @dataclass(frozen=True)
-class DeeperStretch:
+class DeeperSection:
     """Range where passes are over 1 µm deeper than in the corner, as the tool milling the edge is round."""
 
     from_mm: float  # X at its start
@@ -146,7 +146,7 @@ class CornerDetails:
     interval_mm: float  # length of a block with a feed of its own
     corner_begins_at_mm: float  # X where the corner begins
     radial_depth_mm: Deepest  # largest radial depth
-    deeper_than_corner: DeeperStretch | None  # where it is deeper than in the corner; None: nowhere
+    deeper_than_corner: DeeperSection | None  # where it is deeper than in the corner; None: nowhere
 
 
 @dataclass(frozen=True)
@@ -265,7 +265,7 @@ def unrolled_edge(
             f"the radial depth reaches {depth.max():.3f} mm, with a tool radius of {radius_mm:g} mm: such a corner "
             "cannot be unrolled on a straight line"
         )
-    # With the axis at s, the tool's front leaves the edge as high above the wall as the depth.
+    # With the axis at s, the tool's front leaves the edge at a height above the wall that equals the depth.
     x = s_mm + at_mm + np.sqrt(radius_mm**2 - (radius_mm - depth) ** 2)
     back = np.flatnonzero(np.diff(x) <= 0.0)
     if back.size:
@@ -311,7 +311,7 @@ def on_increments(line: Edge, step_mm: float) -> Edge:
 
 
 def reduced(line: Edge, chord_mm: float = _CHORD_MM) -> Edge:
-    """Fewest points of a line within a distance of all its points (Douglas and Peucker)."""
+    """Reduce a line to few points, all its points within a distance of the result (Douglas and Peucker)."""
     x, y = line.x_mm, line.height_mm
     keep = np.zeros(len(x), dtype=bool)
     keep[[0, -1]] = True

@@ -30,7 +30,7 @@ from shapegcode.testcut.forces import ForceLaw, engagement, straight_engagement
 from shapegcode.testcut.result import CutDesign
 
 _Sizes = tuple[float, float, float]  # allowance, rough and finish radius of a corner
-_Block = tuple[float | None, float]  # upper end of a feed in X (None: the end of the pass), feed in mm/min
+_Block = tuple[float | None, float]  # X up to which a feed applies (None: the end of the pass), feed in mm/min
 
 _MIN_AIR_MM, _AIR_REVS = 5.0, 20.0
 _MAX_DEPTH_RATIO = 0.95  # largest radial depth, relative to the radius
@@ -197,7 +197,7 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     given._check_feeds([feed for _, feed in blocks])
     excess = met - np.interp(x, s + straight, depth)
     more = np.flatnonzero(excess > _FEW_UM)
-    deeper = cuts.DeeperStretch(float(x[more[0]]), float(x[more[-1]]), float(excess.max())) if more.size else None
+    deeper = cuts.DeeperSection(float(x[more[0]]), float(x[more[-1]]), float(excess.max())) if more.size else None
     deepest = cuts.Deepest(float(met.max()), float(x[int(np.argmax(met))]))
     about = CornerDetails(*sizes, interval, straight, deepest, deeper)
     modified = [(begin, given.feed_mm_per_min), *blocks, constant]
@@ -369,8 +369,8 @@ class _Writer:
         self.design, self.cut, self.controller = design, design.cut, design.machine.controller
         self.decimals = max(1, round(-math.log10(self.controller.least_increment_mm)))
         self.radius = self.cut.tool.radius_mm
-        self.side = 1.0 if self.cut.up else -1.0  # side of the material along Y, within the raw edge
-        # Distance of each wall within the raw edge.
+        self.side = 1.0 if self.cut.up else -1.0  # sign of Y in the material, from the raw edge
+        # Distance of each finished wall from the raw edge.
         self.walls = list(accumulate(round(max(each.edge_height_mm) + _SKIM_MM, 3) for each in self.cut.passes))
 
     def head(self) -> Iterator[str]:

@@ -73,7 +73,7 @@ def fit_test_cut(
 
 
 _BINS_PER_PASS, _MIN_TURNS, _ROUNDS = 60, 4, 2
-_ONE_FILE = np.zeros(0, dtype=np.intp)  # its number is set where files are joined
+_ONE_FILE = np.zeros(0, dtype=np.intp)  # placeholder: groups are numbered when files are joined
 _PLACE = 0.25  # standard error of the tool's position found from entry and exit, in feeds per revolution
 _PER_MINUTE = 60.0
 
@@ -125,7 +125,7 @@ def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
 def _reduced(
     cut: TestCut, measured: Mapping[int, ForceRecord], law: CuttingLaw
 ) -> tuple[list[MeanForces], list[result.TaperPass], list[result.LeftOut], list[str]]:
-    """Reduce the records to mean forces, as recorded, or over revolutions in full engagement without chatter."""
+    """Reduce records to mean forces: means as recorded, or over revolutions in full engagement without chatter."""
     rows: list[MeanForces] = []
     passes: list[result.TaperPass] = []
     left_out: list[result.LeftOut] = []
@@ -185,7 +185,7 @@ def _of_revolutions(cut: TestCut, measuring: MeasuringPass, found: Revolutions) 
     if kept.size < _MIN_TURNS:
         raise ArgumentError(f"{found.record.file}: {kept.size} revolutions in full engagement: too few")
     many = max(1, kept.size // _BINS_PER_PASS)
-    # A bin has only neighbours: none spans an ignored part.
+    # A bin contains consecutive revolutions only: none spans an ignored part.
     runs = np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1)
     bins = np.vstack([run[: len(run) // many * many].reshape(-1, many) for run in runs])
     x = found.x_mm[bins].mean(axis=1)

@@ -38,7 +38,7 @@ def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: FloatArray, *, up:
     radius = tool.radius_mm
     edge_x, edge_y = np.array(measuring.edge_x_mm), np.array(measuring.edge_height_mm)
     x = np.asarray(x_mm, dtype=np.float64)
-    # Distance of a point of the tool's front ahead of the axis.
+    # Distances ahead of the axis between which the tool's front is in the material.
     begin = np.clip(edge_x[0] - x, 0.0, radius)
     end = _crossing(x, begin, edge_x, edge_y, radius)
     end = np.maximum(np.minimum(end, edge_x[-1] - x), begin)
@@ -63,7 +63,7 @@ def _crossing(x: FloatArray, begin: FloatArray, edge_x: FloatArray, edge_y: Floa
             break
         k = piece[active]
         m = slopes[k]
-        # The edge over the distance u ahead of the axis: height c + m u; the tool's front: u^2 + (y - R)^2 = R^2.
+        # At the distance u ahead of the axis the edge has the height R + c + m u; the front: u^2 + (y - R)^2 = R^2.
         c = edge_y[k] + m * (x[active] - edge_x[k]) - radius
         inner = (m * c) ** 2 - (1.0 + m * m) * (c * c - radius * radius)
         u = (-m * c + np.sqrt(np.maximum(inner, 0.0))) / (1.0 + m * m)
@@ -127,7 +127,7 @@ class ForceLaw:
 def mean_chip_mm(
     tool: CutTool, spindle_rev_per_min: float, axial_depth_mm: float, met: Engagement, feed_mm_per_min: FloatArray
 ) -> FloatArray:
-    """Mean chip thickness at each engagement, mm: force for exponent 1 of the law divided by that for exponent 0."""
+    """Mean chip thickness at each engagement, mm: torque for exponent 1 of the law divided by that for 0."""
     laws = (ForceLaw(tool, CuttingLaw(1.0, exponent), spindle_rev_per_min, axial_depth_mm) for exponent in (0.0, 1.0))
     once, twice = (law.forces(met, feed_mm_per_min).mean_torque_nm for law in laws)
     return np.asarray(np.divide(twice, once, out=np.zeros_like(once), where=once > 0.0))
@@ -442,7 +442,7 @@ def neighbour_correlation(scaled: FloatArray, group: npt.NDArray[np.intp], outli
         return 0.0
     product = float(np.mean(scaled[1:][pairs] * scaled[:-1][pairs]))
     square = float(np.mean(scaled[~outlier] ** 2))
-    # By chance it reaches twice this.
+    # A correlation up to this may be chance.
     chance = 2.0 / math.sqrt(2.0 * pairs.sum())
     found = product / max(square, 1e-300)
     return min(found, _LARGEST_CORRELATION) if found > chance else 0.0

@@ -109,12 +109,12 @@ _PER_MINUTE = 60.0
 MIN_SAMPLES = 6.0  # least samples per revolution of a record; fewer: a table of means
 _MIN_AIR_REVS, _GUARD_REVS = 5, 2
 _FEW_PER_TOOTH, _IN_STEP = 16.0, 0.01
-_TELL_SPEED, _TELL_FEED = 0.002, 0.005
+_REPORTED_SPEED, _REPORTED_FEED = 0.002, 0.005
 _ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04  # least force in a cut, relative to the noise in air, and to the largest force
 _SPEED_RANGE, _MIN_FOR_SPEED = 0.05, 20.0
 _CLEAR_LINE = 8.0  # height of a clear line, relative to the median of the spectrum around it
 _MAX_SHIFT_MM, _SHIFT_STEPS = 1.0, 81
-#: Allowed relative difference of the cut's length: at another override; with stated position or feeds.
+#: Allowed relative difference of the cut's length: at constant feed (another override), and otherwise.
 _OTHER_FEED, _OTHER_LENGTH = 0.6, 0.03
 
 
@@ -150,7 +150,7 @@ def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, f
     begin, end = _contact(record, turn / period)
     speed, sure = _spindle_speed(record.force_n[begin:end], period, cut.spindle_rev_per_min, cut.tool.flutes)
     notes = []
-    if sure and abs(speed / cut.spindle_rev_per_min - 1.0) > _TELL_SPEED:
+    if sure and abs(speed / cut.spindle_rev_per_min - 1.0) > _REPORTED_SPEED:
         notes.append(f"the spindle turned at {speed:.1f} rev/min instead of the commanded {cut.spindle_rev_per_min:g}")
     samples = _PER_MINUTE / speed / period
     per_tooth = samples / cut.tool.flutes
@@ -171,7 +171,7 @@ def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, f
 
 
 def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[FloatArray, FloatArray]:
-    """Time of each sample, and the travel since the first one at the commanded feeds (or as measured)."""
+    """Time of each sample, and the travel since the first one: as measured, else at the first commanded feed."""
     if record.position_mm is not None:
         x = record.position_mm
         if record.time_s is not None:
@@ -187,7 +187,7 @@ def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) 
 
 
 def _spindle_speed(force_n: FloatArray, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
-    """Spindle speed from the spectral lines at spindle and tooth frequency and their harmonics."""
+    """Spindle speed from spectral lines at spindle and tooth frequency and their harmonics; whether one is clear."""
     count = len(force_n)
     turns = count * period_s * commanded / _PER_MINUTE
     if turns < _MIN_FOR_SPEED:
@@ -287,7 +287,7 @@ def _positions(
     share = (x - wanted[0]) / wanted_length
     x = x + ends[0] * (1.0 - share) + ends[1] * share
     rate = float(np.polyfit(time, x, 1)[0]) * _PER_MINUTE
-    if abs(rate / measuring.feed_mm_per_min - 1.0) > _TELL_FEED:
+    if abs(rate / measuring.feed_mm_per_min - 1.0) > _REPORTED_FEED:
         notes.append(f"the feed was {rate:.1f} mm/min instead of the commanded {measuring.feed_mm_per_min:g}")
     return np.asarray(x)
 
@@ -319,7 +319,7 @@ def _vertex(three: FloatArray) -> float:
 # --- means over whole revolutions -------------------------------------------------------------------------------------
 
 _MIN_REVOLUTIONS = 20
-_CHATTER, _MIN_CHATTER = 8.0, 0.02  # limit of chatter in median deviations; least deviation, relative to the median
+_CHATTER, _MIN_CHATTER = 8.0, 0.02  # limit of chatter in standard deviations; least deviation, relative to the median
 _CHATTER_ROUNDS = 12
 
 
@@ -354,7 +354,7 @@ def revolutions(record: PlacedRecord) -> Revolutions:
     uneven = np.sqrt(np.maximum(means[:, 3] - np.sum(means[:, :2] ** 2, axis=1), 0.0))
     full = np.flatnonzero(fully_engaged(cut, measuring, middle))[_GUARD_REVS:-_GUARD_REVS]
     chatter = np.zeros(len(middle), dtype=bool)
-    chatter[full] = _swings(middle[full], uneven[full], means[full, 2])
+    chatter[full] = _chatters(middle[full], uneven[full], means[full, 2])
     feed = measuring.feed_mm_per_min
     if measuring.constant_feed:
         feed = float(np.polyfit(record.time_s[inside], x[inside], 1)[0]) * _PER_MINUTE
@@ -362,7 +362,7 @@ def revolutions(record: PlacedRecord) -> Revolutions:
     return Revolutions(record, middle, means[:, :2], torque, means[:, 2], peaks, chatter, feed)
 
 
-def _swings(x: FloatArray, uneven: FloatArray, resultant: FloatArray) -> npt.NDArray[np.bool_]:
+def _chatters(x: FloatArray, uneven: FloatArray, resultant: FloatArray) -> npt.NDArray[np.bool_]:
     """Mask where the force oscillates more within a revolution, relative to its mean, than in the rest of the pass."""
     if len(uneven) < _MIN_REVOLUTIONS:
         return np.zeros(len(uneven), dtype=bool)

@@ -296,11 +296,11 @@ class FollowedPass:
 
     number: int  # of the pass, from 1
     interval_mm: float  # length of its blocks
-    deviation: float  # largest |measured - commanded| force at the end of a block, relative to commanded
+    deviation: float  # largest |measured - expected| mean force in the second half of a block, relative to expected
     at_mm: float  # X of the end of that block
     noise: float  # relative standard deviation of such a mean at constant feed
     lag_s: float  # best-fitting time constant
-    ok: bool  # followed: the deviation is within 5 % and twice the noise
+    ok: bool  # followed: the deviation is within 5 % plus twice the noise
     time_s: FloatArray = field(metadata=hidden())  # (m,) of the record
     # (m,) mean over a revolution, scaled to the expected one on the straight part
     force_n: FloatArray = field(metadata=hidden())
@@ -315,7 +315,7 @@ class IntervalResult(Result):
     Attributes:
         program: program of the test cut.
         machine: name of the machine.
-        interval_mm: shortest interval from which all measured ones are followed; None: none.
+        interval_mm: shortest interval that is followed, as are all longer ones measured; None: none.
         lag_interval_mm: travel for 90 % of a step with the median lag, at the largest feed.
         passes: measured passes, by interval.
         warnings: further remarks.

@@ -1,4 +1,4 @@
-"""Cycle time of a program on a machine and its parts: in closed form, and by full interpolation.
+"""Cycle time of a program on a machine, and its parts, in closed form and by full interpolation.
 
 The closed form is by Lee, Ro, Song and Oh, 2022 (paper 004) for acceleration after interpolation; with look-ahead it
 is the planner's. Full interpolation checks it.
@@ -44,7 +44,7 @@ def cycle_time(
     with the slower rule of block timing, as in `convert`.
 
     For moves of an axis with unknown position (before its first absolute word, after M06, G28, G53)
-    only the known part counts.
+    only the known part counts, and `times.unknown_move_s`.
 
     Args:
         program: the program, or its file.
@@ -186,8 +186,8 @@ _DEVIATIONS = 1.96  # standard deviations of a 95 % interval
 _KIND = "kind of look-ahead"
 CUTS, BETWEEN, RUNS = "scatter, cuts of a tool", "scatter between cuts", "repeated runs"
 
-# Contents of a program that determines a parameter, by a word of its name; the first match.
-_TELLS = {
+# What a program must contain to determine a parameter, by words of the parameter's name; the first match counts.
+_REMEDIES = {
     _KIND: "a program unlike those logged, with corners of many angles and moves of many lengths",
     "block is read": "a program with many moves below {move:.2g} mm",
     "acceleration is built up": "a program with many moves below {move:.2g} mm",
@@ -231,7 +231,9 @@ class TimeInterval:
     def narrowed_by(self) -> str:
         """What a program must contain so that its log narrows the interval; no log narrows the scatter between runs."""
         name = next((part.name for part in self.parts() if part.name not in (BETWEEN, RUNS)), CUTS)
-        text = next((text for word, text in _TELLS.items() if word in name), f"a program in which {name} occurs alone")
+        text = next(
+            (text for word, text in _REMEDIES.items() if word in name), f"a program in which {name} occurs alone"
+        )
         return text.format(move=self.mean_move_mm)
 
     def after_logging(self, other: TimeInterval) -> float:

@@ -28,7 +28,7 @@ def plots_of(time: CycleTime) -> dict[str, Plot]:
 def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
     """Plot the time by parts: one bar per tool, and one for each of the longest regions.
 
-    Of many tools the longest ones are drawn.
+    Of many tools, only those with the longest times are drawn.
 
     Args:
         time: the cycle time.
@@ -60,7 +60,7 @@ def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
 
 
 def _bars(panel: Axes, names: Sequence[str], rows: Sequence[Mapping[str, float]], parts: Sequence[str]) -> None:
-    """Draw one horizontal bar per row, divided into parts, longest row first, labelled with its duration."""
+    """Draw one horizontal bar per row, the first at the top, divided into parts and labelled with its duration."""
     positions = range(len(names))
     ends = [0.0] * len(names)
     for part in parts:

@@ -163,7 +163,7 @@ class CycleTime(TimeParts, Result):
 
     @property
     def ok(self) -> bool:
-        """Closed form and full interpolation differ by no more than `AGREEMENT_PERCENT`, or only one was requested."""
+        """True if closed form and full interpolation differ by at most `AGREEMENT_PERCENT`, or without the latter."""
         difference = self.difference_percent
         return difference is None or abs(difference) <= AGREEMENT_PERCENT
 

@@ -55,7 +55,7 @@ class GridTaps:
     """A shaper on the grid of the blocks."""
 
     delays: tuple[int, ...]  # in whole block periods
-    taps: tuple[float, ...]  # one for each delay
+    taps: tuple[float, ...]  # amplitude of the impulse at each delay
 
 
 @dataclass(frozen=True)
@@ -152,8 +152,8 @@ def worst_counted(cases: Sequence[CaseVerdict]) -> CaseVerdict | None:
 class FeedExcess:
     """Largest ratio of the emitted speed to the programmed feed at the same position of the path.
 
-    The speed is that of the set-points along their own path, averaged over one, four or sixteen shortest blocks; two
-    increments are subtracted, by which rounding may lengthen them. Positions are matched by path length, not by time.
+    The speed is that of the set-points along their own path, averaged over one, four or sixteen times the control's
+    block time; two increments, the effect of rounding, are subtracted. Positions are matched by path length, not time.
     """
 
     ratio: float  # speed over programmed feed; 1: as programmed
@@ -221,8 +221,8 @@ class ProgramFigures:
     slowed_blocks: int  # emitted blocks whose speed step of an axis exceeds the corner limit of the look-ahead
     # largest ratio of emitted speed to programmed feed; null if nothing was shaped
     feed_excess: FeedExcess | None
-    # the simulated operating conditions; those that do not count include only the shaped
-    # cuts
+    # the simulated operating conditions; other overrides and shifted modes that do not count are simulated for
+    # shaped cuts only
     cases: tuple[CaseVerdict, ...]
     worst_case: CaseVerdict | None  # the deciding one; null without cuts
     regions: tuple[RegionVerdict, ...]  # the shaped cuts, in the order of the program
@@ -331,7 +331,7 @@ class LimitCheck:
 
 
 def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]]]]:
-    """Key of every mode with an uncertainty, with name and relative frequency shift of each of its conditions."""
+    """Key of every mode with an uncertainty, with name and shift (-1 or +1) of each of its conditions."""
     found = []
     for axis, table in zip("XYZ", machine.axes.as_tuple(), strict=True):
         for number, mode in enumerate(table.modes, start=1):
@@ -419,7 +419,7 @@ def region_misses(
 
 
 _NUMBER = re.compile(r"(\d) (%|ms\b|s\b|mm\b|Hz\b|µm\b)")
-_SWINGS_UM = 0.005  # an axis below this everywhere has no column
+_MIN_VIBRATION_UM = 0.005  # an axis below this everywhere has no column
 
 
 def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table:
@@ -429,7 +429,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         *(
             Column(axis.upper(), value=f"residual_um.{axis}", digits=2)
             for axis in "xyz"
-            if any(case.residual_um[axis] >= _SWINGS_UM for case in cases)
+            if any(case.residual_um[axis] >= _MIN_VIBRATION_UM for case in cases)
         ),
         Column("command", value=lambda case: _known(case.contour_error_um.command, 1)),
         Column("table", value=lambda case: _known(case.contour_error_um.response, 1)),
@@ -472,14 +472,14 @@ def _style(case: CaseVerdict, worst: bool) -> str:
     return "dim" if not case.counts else f"bold {colour}".strip() if worst else colour
 
 
-# A simulated operating condition: its figures; time by which all blocks are longer than at 100 %, before
-# filters, if only the end was simulated, else 0.
+# Figures of a simulated operating condition, and, if only the end was simulated, the time by which all blocks
+# together are longer than at 100 %, before filters; else 0.
 SimulatedCase = tuple[_core.SimulationFigures, float]
 
 
 @dataclass(frozen=True)
 class CaseSimulation:
-    """Simulates one emitted region; every method is a separate task."""
+    """Simulates one emitted region; `nominal`, `planned` and `others` may run in parallel."""
 
     blocks: _core.Path  # emitted blocks
     path: _core.Path  # programmed path
@@ -491,7 +491,7 @@ class CaseSimulation:
     increment_mm: float  # least increment of the program
 
     def nominal(self, rule: _core.BlockEnd) -> _core.SimulationFigures:
-        """Simulate the blocks at 100 %; with the control's own block timing also an underrun at the worst position."""
+        """Simulate the blocks at 100 %; with the control's own block timing also underruns at the fastest blocks."""
         own = rule == self.model.own_rule
         return self.model.simulate_emitted(
             self.blocks, self.path, rule, offset=self.offset,

@@ -53,7 +53,7 @@ class RegionFigures:
     """Simulations of one cut: as programmed, and as emitted in every operating condition of the verdict."""
 
     original: _core.SimulationFigures  # the programmed path with the controller's own motion
-    # shaped blocks with both rules of block end (ceil, carry); one entry for a cut left unchanged
+    # shaped blocks with each rule of block timing; one entry for a cut left unchanged
     emitted: tuple[_core.SimulationFigures, ...]
     # one entry per operating condition; None: not simulated for a cut left unchanged
     cases: tuple[CaseFigures | None, ...]
@@ -75,7 +75,7 @@ class RegionFigures:
 
     @property
     def gain_um(self) -> float:
-        """Gain of shaping: the larger reduction of the two figures, emitted with the worse rule."""
+        """Gain of shaping: the larger reduction of residual vibration and contour error, with the worse rule."""
         after = np.max([_figures_um(run) for run in self.emitted], axis=0)
         return max(0.0, float(np.max(np.asarray(_figures_um(self.original)) - after)))
 
@@ -86,7 +86,7 @@ def _figures_um(simulated: _core.SimulationFigures) -> tuple[float, float]:
 
 
 def most_to_gain_um(original: _core.SimulationFigures) -> float:
-    """Upper bound of the gain of shaping: the figures of the original."""
+    """Upper bound of the gain of shaping: the larger figure of the original."""
     return max(_figures_um(original))
 
 
@@ -95,7 +95,7 @@ class PendingSimulations:
     """The running simulations of one emitted region."""
 
     simulation: CaseSimulation  # the simulation with these tasks
-    nominal: Sequence[Future[_core.SimulationFigures]]  # with both rules of block end
+    nominal: Sequence[Future[_core.SimulationFigures]]  # with each rule of block timing
     planned: Future[_core.SimulationFigures | None]  # with the look-ahead left on
     others: Sequence[Future[dict[str, SimulatedCase]]]  # the other cases, in groups
     slowed: Future[int]  # blocks that the look-ahead limits would slow
@@ -106,7 +106,7 @@ class Judge:
 
     def __init__(self, model: MachineModel, cases: Sequence[Case] | None = None) -> None:
         self._machine, self._model = model.machine, model
-        # Cases in the order of `RegionFigures.cases`; block rules: the controller's own, and in the order of `emitted`.
+        # As in `RegionFigures.cases`; rules of block timing: the control's own, and those of `RegionFigures.emitted`.
         self.cases = stated_cases(model.machine) if cases is None else list(cases)
         self.own_rule, self.rules = model.own_rule, model.block_rules
         # Target of the contour tolerance.
@@ -120,7 +120,7 @@ class Judge:
         pool: Executor,
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
-        """Simulate every emitted region and its original: `begin` and `figures`."""
+        """Simulate every emitted region, and add the figures of its original: `begin` and `figures`."""
         trackers = [_core.ContourTracker(place.region.path) for place in placed]
         return self.figures(self.begin(emitted, placed, trackers, pool), originals, on_step)
 

@@ -61,7 +61,7 @@ struct Arma {
 
 /// Modes of discrete poles, ascending in frequency: omega = |ln lambda|/period, zeta = -Re(ln lambda)/|ln lambda|
 /// (paper 003, eq. 5-6). Only stable complex pairs are kept: real poles (including those at the Nyquist frequency) and
-/// poles on or outside the unit circle are no modes. Throws Error(argument) on the period.
+/// poles on or outside the unit circle are no modes. Throws Error(argument) on a period <= 0.
 [[nodiscard]] NaturalModes poles_to_modes(std::span<const std::complex<double>> poles, double period_s);
 
 /// Poles of models with n = 1 ... n_max modes for a stabilisation chart; entry n-1 holds 2n poles of the samples'
@@ -70,8 +70,8 @@ struct Arma {
 /// A subspace method (ESPRIT; Roy, Kailath 1989): all orders follow from the eigenvectors of one covariance matrix of
 /// the free decay. For impacts the decay is the correlation of response with force, at lags beyond the length of the
 /// force pulse: impacts are weighted by their force, and noise uncorrelated with the force cancels. The covariance uses
-/// delays of one or more samples each, such that the highest frequency with content is sampled at least twice. With
-/// more than one, a mode not visible in the spectrum (60 dB below the strongest) may appear aliased.
+/// delays of one or more samples each, such that the highest frequency with content is sampled at least twice per
+/// cycle. With more than one, a mode not visible in the spectrum (60 dB below the strongest) may appear aliased.
 ///
 /// Throws Error(argument) on signals that arma_driven or arma_decay refuses, n_max outside 1 ... 50, or records too
 /// short for n_max (8 n_max + 8 samples needed).

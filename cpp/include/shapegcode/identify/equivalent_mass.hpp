@@ -24,8 +24,8 @@ struct OscillatorMotion {
 
 /// Step-by-step integration of m x'' + c x' + k x = force (N) by the Wilson theta method: acceleration linear over
 /// theta periods. The first sample's state is `displacement_m` and `velocity_m_per_s` with the acceleration that
-/// balances the forces. Unconditionally stable from theta = 1.37 on; it lengthens the oscillation and damps it a
-/// little.
+/// balances the forces. Unconditionally stable from theta = 1.37 on; it lengthens the period of oscillation and adds
+/// a little damping.
 ///
 /// Throws Error(argument) on an empty force or one that is not finite, a mass, stiffness or period that is not above 0,
 /// damping below 0 or theta below 1. Source: paper 003, section 2.2; K.-J. Bathe, Finite Element Procedures, 9.2.
@@ -69,7 +69,7 @@ struct EquivalentMass {
 /// paper 003, section 2.2; the closed form: this project.
 [[nodiscard]] EquivalentMass equivalent_mass_closed_form(const MassProblem& problem);
 
-/// The same by halving the range of masses until the RMS agree: paper 003's steps 1 to 7, kept as a check. Also throws
+/// The same by halving the range of masses until the RMS agree: paper 003, steps 1 to 7, as a check. Also throws
 /// on a range or tolerance that is not positive. A range without solution ends at one of its ends, not converged.
 [[nodiscard]] EquivalentMass equivalent_mass_bisection(const MassProblem& problem, const MassSearch& search);
 

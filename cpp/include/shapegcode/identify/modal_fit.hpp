@@ -15,7 +15,7 @@ namespace shapegcode {
 /// Course of the force between its samples.
 enum class ForceHold : std::uint8_t {
   linear,        ///< straight from sample to sample
-  band_limited,  ///< as after an anti-aliasing filter: sinc interpolation, accurate up to .45 of the sampling rate
+  band_limited,  ///< as after an anti-aliasing filter: sinc interpolation, accurate up to 0.45 of the sampling rate
   impulse,  ///< impulses at the samples, each just before the response is sampled: force times period is the momentum
 };
 
@@ -56,7 +56,7 @@ struct FitQuality {
 struct ModalFit {
   std::vector<double> omega_rad_s;    ///< undamped natural frequencies
   std::vector<double> damping_ratio;  ///< no unit
-  std::vector<double> inverse_mass;   ///< residues 1/m in 1/kg, negative where the mode's signs differ
+  std::vector<double> inverse_mass;   ///< residues 1/m in 1/kg, negative: opposite mode signs at impact and sensor
   Eigen::MatrixXd covariance;         ///< (3n, 3n) of omega, zeta, 1/m of the first mode, then of the second, ...
   double mass_line = 0.0;             ///< 1/kg, 0 without it
   double compliance = 0.0;            ///< m/N, 0 without it

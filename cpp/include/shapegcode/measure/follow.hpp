@@ -30,9 +30,9 @@ class PathFollower {
 
 /// Decimates curves over time: selects rows such that every curve, drawn straight between them, stays within its
 /// tolerance at every omitted row (Douglas and Peucker 1973, with distance along the value). First and last row are
-/// kept, and at least one of 512. `times`: (n), rising; `values`: (n, curves); `tolerances`: one for each curve, above
-/// 0. O(n). Throws Error(argument) on other shapes, times that do not rise, a tolerance that is not above 0, or a value
-/// that is not finite.
+/// selected, and at least one of 512. `times`: (n), rising; `values`: (n, curves); `tolerances`: one for each curve,
+/// above 0. O(n). Throws Error(argument) on other shapes, times that do not rise, a tolerance that is not above 0, or a
+/// value that is not finite.
 [[nodiscard]] std::vector<std::size_t> thin_curves(const Eigen::Ref<const Eigen::VectorXd>& times,
                                                    const Eigen::Ref<const Eigen::MatrixXd>& values,
                                                    const Eigen::Ref<const Eigen::VectorXd>& tolerances);

@@ -226,7 +226,7 @@ struct SideFigures {
 /// What was measured in one section.
 struct SectionFigures {
   PathSection section;
-  double time_s = 0.0;                ///< while the foot of the command is in the section
+  double time_s = 0.0;                ///< in which the command moves with its foot in the section
   Vector3 peak_mm = Vector3::Zero();  ///< largest |response - command| while the command moves
   std::optional<RestVibration> rest;  ///< the worst stop of the command in it (largest residual)
   DeviationStats command;             ///< signed, from the path; RMS while the command moves
@@ -244,7 +244,7 @@ struct SectionFigures {
   std::optional<ArcFigures> right_wall_arc;
   WallFigures left;  ///< deviation from the wall cut by the programmed path, positive to the left
   WallFigures right;
-  WallFigures width;                        ///< left less right wall, with the tool's diameter
+  WallFigures width;                        ///< left less right wall, plus the tool's diameter
   std::optional<Roughness> left_roughness;  ///< of the longest section of wall without a gap
   std::optional<Roughness> right_roughness;
 };

@@ -191,8 +191,7 @@ class MillingForce {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Figures of a whole track, a row per sample: mean_x_n, mean_y_n, mean_resultant_n, peak_resultant_n, peak_torque_nm,
-/// mean_torque_nm, mean_power_w, peak_chip_mm, peak_deflection_um; forces in the frame of the tool.
+/// Columns of the figures of a whole track; forces in the frame of the tool.
 enum class ForceColumn : std::uint8_t {
   mean_x_n,
   mean_y_n,
@@ -206,8 +205,9 @@ enum class ForceColumn : std::uint8_t {
 };
 inline constexpr int force_columns = 9;
 
-/// `feed_mm_per_min`: along the path, one per sample; its horizontal component makes the chip. Throws as
-/// MillingForce::figures, and on another number of feeds. The deflection of the tip is 0 without a beam.
+/// Figures of a whole track, one row per sample, with the columns of ForceColumn. `feed_mm_per_min`: along the path,
+/// one per sample; its horizontal component makes the chip. Throws as MillingForce::figures, and on another number of
+/// feeds. The deflection of the tip is 0 without a beam.
 [[nodiscard]] Eigen::MatrixXd figures_of(MillingForce& force, const EngagementTrack& track,
                                          std::span<const double> feed_mm_per_min, const ToolBeam* beam = nullptr);
 

@@ -107,7 +107,7 @@ class Material {
 /// Sampling of the engagement along a path.
 struct SweepOptions {
   double step_mm = 0.0;  ///< largest distance between samples; 0: a fortieth of the tool's diameter
-  /// A width of cut below this is no contact: a second pass along a finished wall.
+  /// Contacts less deep or less wide than this are ignored, as on a second pass along a finished wall.
   double touch_mm = 0.002;
   std::function<void(double s_mm)> progress;  ///< called from time to time with the distance travelled; may throw
 };

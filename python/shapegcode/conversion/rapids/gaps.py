@@ -32,7 +32,7 @@ NO_CUT = "no cut follows"
 OFF_GRID = "its end lies between two increments, and the program changes between G20 and G21"
 BLOCK_SKIP = "the modal state depends on the block-skip switch"
 
-# After these no settled table is needed: the operator or the tool changer comes first.
+# M codes after which the table need not have settled: stops, tool change, end of the program.
 _ENDING_CODES = {0, 1, 2, 6, 30}
 _BLOCK = re.compile(r"(?:[A-Z][+-]?[0-9]*\.?[0-9]*)+")
 _WORD = re.compile(r"([A-Z])([+-]?[0-9]*\.?[0-9]*)")
@@ -66,7 +66,7 @@ class Gap:
     """The steps between two cuts, in order."""
 
     steps: tuple[Rapid | float, ...]  # rapids, and durations of other steps, s
-    cut_follows: bool  # a cut follows, so the vibration must have settled at its end
+    cut_follows: bool  # a cut follows: the vibration must have settled at the end of the gap
 
     @property
     def rapids(self) -> list[Rapid]:
@@ -192,7 +192,7 @@ class _Reader:
         return ""
 
     def _feed_mm_per_s(self, travel_mm: FloatArray, units: int) -> float:
-        """Largest feed along a travel, whole in F: each axis within its limit, the total within the largest."""
+        """Largest feed along a travel, whole in F: each axis within its limit, the path within the largest of them."""
         share = np.abs(travel_mm) / np.linalg.norm(travel_mm)
         moved = share > 0.0
         along = float((self._largest_mm_per_s[moved] / share[moved]).min())
@@ -201,7 +201,7 @@ class _Reader:
 
 
 def _words(source: str) -> list[tuple[str, str]] | None:
-    """Words of a block that has only a number, axis words and codes permitted for a rapid; else None."""
+    """Words of a block with nothing but an N word, axis words and codes permitted for a rapid; else None."""
     block = _COMMENT.sub("", source).upper()
     block = "".join(block.split())
     if not _BLOCK.fullmatch(block):
@@ -227,7 +227,7 @@ NO_GAIN = "no time gained"
 
 @dataclass
 class Choice:
-    """A rapid that may be replaced, with its data."""
+    """A rapid that may be replaced, and its replacement."""
 
     rapid: Rapid
     region: _core.Region
@@ -297,8 +297,8 @@ class OpenGap:
                 kept[reason] += 1
 
     def drop_useless(self, kept: Counter[str]) -> None:
-        """Leave every rapid unchanged whose replacement does not start the next cut sooner; earlier ones first."""
-        # All together first: of two rapids with equal settling times, replacing one alone gains nothing.
+        """Leave every rapid unchanged whose replacement does not start the next cut sooner; tried in program order."""
+        # Start with all replaced: of two rapids with equal settling times, replacing one alone gains nothing.
         flags = [bool(choice.text) for choice in self.choices]
         ready_s = self._ready_s(flags)
         for k in range(len(flags)):
@@ -315,7 +315,7 @@ class OpenGap:
         self.drop(NO_GAIN, kept, lambda _choice: not next(chosen))
 
 
-_LONGEST_WAIT_S = 30.0  # a longer vibration counts as settled then
+_LONGEST_WAIT_S = 30.0  # after this time a vibration counts as settled
 _LAG_MEMORY = 20.0  # time constants of the servo loop after which earlier motion is ignored
 
 
@@ -390,7 +390,7 @@ class RapidPlant:
         return self._machine_model.simulate_rapid(rapid.start_mm, rapid.end_mm, self._options(rapid.region))
 
     def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:
-        """Simulate a replacement with the slower rule of block timing; `stops_s`: dwells before it."""
+        """Simulate a replacement with each rule of block timing; the later to settle. `stops_s`: dwells before it."""
         period = self.model.period_s
         offset = self._machine_model.offset(region)
         runs = []

@@ -33,7 +33,7 @@ NOTHING_SHAPED = "no cut of the program is shaped"
 OUT_OF_TOLERANCE = "misses its tolerance as shaped blocks"
 BUDGET = "budget"
 
-_STOP, _STOP_S = "G04P1", 0.001  # the motion before has stopped, as before a G00
+_STOP, _STOP_S = "G04P1", 0.001  # a stop before the replacement, as before a G00
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class _RapidShaper:
 
 
 def _without_contour(model: MachineModel) -> MachineModel:
-    """The machine for moves in the air, without contour correction and limit."""
+    """The machine without contour compensation, and without limits of contour error and feed excess."""
     machine = model.machine
     # A straight move has no corners: the ramps of the look-ahead suffice.
     shaping = machine.shaping.model_copy(update={"contour": "off", "planner": "look-ahead"})

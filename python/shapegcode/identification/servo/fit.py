@@ -66,23 +66,23 @@ def counted(values: Sequence[FloatArray], use: Masks) -> FloatArray:
     return np.concatenate([each[keep] for each, keep in zip(values, use, strict=True)])
 
 
-def delayed(way: FloatArray, samples: float) -> FloatArray:
+def delayed(motion: FloatArray, samples: float) -> FloatArray:
     """A command delayed by a number of samples: interpolated linearly, at constant speed before its first sample."""
-    at = np.arange(len(way)) - samples
-    found: FloatArray = np.interp(at, np.arange(len(way)), way)
-    return np.where(at < 0.0, way[0] + at * (way[1] - way[0]), found)
+    at = np.arange(len(motion)) - samples
+    found: FloatArray = np.interp(at, np.arange(len(motion)), motion)
+    return np.where(at < 0.0, motion[0] + at * (motion[1] - motion[0]), found)
 
 
 # --- servo lag --------------------------------------------------------------------------------------------------------
 
 
-def lag_way(way: FloatArray, gain_per_s: float, period_s: float, late: float = 0.0) -> FloatArray:
+def lagged_motion(motion: FloatArray, gain_per_s: float, period_s: float, late: float = 0.0) -> FloatArray:
     """Error of a first-order lag without feed-forward (f = 0), exact for set-points joined by straight lines."""
     kept = math.exp(-gain_per_s * period_s)
     share = (1.0 - kept) / (gain_per_s * period_s)  # for a ramp over one period
-    first = way[1] - way[0]
+    first = motion[1] - motion[0]
     steady = share * first / (1.0 - kept)
-    steps = np.diff(way, prepend=way[0] - first)
+    steps = np.diff(motion, prepend=motion[0] - first)
     error = np.asarray(lfilter([share], [1.0, -kept], steps, zi=[kept * steady])[0], dtype=np.float64)
     whole = math.ceil(late)
     part = whole - late
@@ -90,8 +90,8 @@ def lag_way(way: FloatArray, gain_per_s: float, period_s: float, late: float = 0
         return error
     # Between samples the previous error decays and that of the line segment is added.
     inside = math.exp(-gain_per_s * period_s * part)
-    before = np.concatenate([np.full(whole, steady), error[: max(len(way) - whole, 0)]])[: len(way)]
-    step = np.concatenate([np.full(whole, first), np.diff(way)])[: len(way)]
+    before = np.concatenate([np.full(whole, steady), error[: max(len(motion) - whole, 0)]])[: len(motion)]
+    step = np.concatenate([np.full(whole, first), np.diff(motion)])[: len(motion)]
     return inside * before + step * (1.0 - inside) / (gain_per_s * period_s)
 
 
@@ -101,8 +101,8 @@ def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) 
     scale = max(rms(counted(trace.lag, use)) ** 2, 1e-18)
 
     def solve(dead_s: float, gain: float) -> tuple[float, LoopFit]:
-        late = [way - delayed(way, dead_s / period_s) for way in trace.command]
-        lags = [lag_way(way, gain, period_s, dead_s / period_s) for way in trace.command]
+        late = [motion - delayed(motion, dead_s / period_s) for motion in trace.command]
+        lags = [lagged_motion(motion, gain, period_s, dead_s / period_s) for motion in trace.command]
         left = counted([e - gone for e, gone in zip(trace.lag, late, strict=True)], use)
         basis = counted(lags, use)
         mean_left, mean_basis = left.mean(), basis.mean()
@@ -125,7 +125,7 @@ def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) 
         around = gains[max(rank - 1, 0)], gains[min(rank + 1, len(gains) - 1)]
         found = minimize_scalar(lambda gain: square(np.array([gain])), bounds=around, method="bounded")
         return solve(0.0, math.exp(min(max(float(found.x), low), high)))[1]
-    speed = counted([np.gradient(way, period_s) for way in trace.command], use)
+    speed = counted([np.gradient(motion, period_s) for motion in trace.command], use)
     power = float(speed @ speed)
     lag = min(max(float(speed @ counted(trace.lag, use)) / power, 0.0), _LONGEST_DEAD_S) if power > 0.0 else 0.0
     starts = [(1e3 * share * lag, math.log(gain)) for share in (0.6, 0.9, 0.99) for gain in (20.0, 60.0)]
@@ -146,11 +146,11 @@ def lag_estimates(
 
     def model(values: FloatArray) -> FloatArray:
         late = values[0] / period_s
-        ways = [
-            way - delayed(way, late) + values[2] * lag_way(way, values[1], period_s, late) + values[3]
-            for way in trace.command
+        motions = [
+            motion - delayed(motion, late) + values[2] * lagged_motion(motion, values[1], period_s, late) + values[3]
+            for motion in trace.command
         ]
-        return counted(ways, use)
+        return counted(motions, use)
 
     values = np.array([fit.dead_s, fit.gain_per_s, fit.rest, fit.offset])
     steps = np.array([1e-6, 1e-3 * fit.gain_per_s, 1e-4, 1e-6])
@@ -205,7 +205,7 @@ def _correlated_samples(left: FloatArray) -> float:
 
 _RUN_UP_S, _MM = 0.4, 1e-3
 _STIFFNESS_N_PER_M, _DAMPING_N_S_PER_M = 4e6, 400.0  # for 1 kg: 640 Hz, far above the speed loop
-# Dead time in ms; position gain, bandwidth in Hz, integral time, Coulomb friction as logarithms.
+# Dead time in ms, ln of position gain, lag ratio 1 − f, ln of bandwidth in Hz, of integral time, of friction.
 _LOW = (0.0, math.log(2.0), 0.0, math.log(5.0), math.log(1e-3), math.log(1e-7))
 _HIGH = (30.0, math.log(500.0), 1.0, math.log(400.0), math.log(1.0), math.log(1e3))
 _SCALE = (1.0, 0.3, 0.02, 0.5, 0.5, 1.0)
@@ -214,12 +214,12 @@ _STARTS = ((150.0, 0.02), (40.0, 0.005))  # bandwidth, integral time
 
 def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, tell: Callable[[], None]) -> DriveFit:
     """Fit the drive, started at the best servo lag."""
-    top_speed = max(float(np.abs(np.diff(way)).max()) for way in trace.command) / period_s
-    acceleration = max(float(np.quantile(np.abs(np.diff(way, 2)), 0.99)) for way in trace.command) / period_s**2
+    top_speed = max(float(np.abs(np.diff(motion)).max()) for motion in trace.command) / period_s
+    acceleration = max(float(np.quantile(np.abs(np.diff(motion, 2)), 0.99)) for motion in trace.command) / period_s**2
 
     def simulated(values: FloatArray) -> tuple[list[FloatArray], FloatArray]:
-        ways = _drive_ways(trace, values, period_s, top_speed)
-        return ways, counted([y - x for y, x in zip(ways, trace.actual, strict=True)], use)
+        motions = _drive_motions(trace, values, period_s, top_speed)
+        return motions, counted([y - x for y, x in zip(motions, trace.actual, strict=True)], use)
 
     def residual(values: FloatArray) -> FloatArray:
         left = simulated(values)[1]
@@ -235,9 +235,9 @@ def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, te
         tried.append(least_squares(residual, begin, bounds=ends, x_scale=_SCALE, diff_step=steps, max_nfev=20))
         tell()
     best = np.asarray(min(tried, key=lambda each: float(each.cost)).x)
-    ways, left = simulated(best)
+    motions, left = simulated(best)
     offset = float(left.mean())
-    error = tuple(way - y + offset for way, y in zip(trace.command, ways, strict=True))
+    error = tuple(motion - y + offset for motion, y in zip(trace.command, motions, strict=True))
     dead_ms, gain, rest, bandwidth, integral, coulomb = best.tolist()
     return DriveFit(
         dead_ms * 1e-3, math.exp(gain), rest, offset, error,
@@ -245,7 +245,7 @@ def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, te
     )  # fmt: skip
 
 
-def _drive_ways(trace: ServoTrace, values: FloatArray, period_s: float, top_speed: float) -> list[FloatArray]:
+def _drive_motions(trace: ServoTrace, values: FloatArray, period_s: float, top_speed: float) -> list[FloatArray]:
     """Position of the drive in each section; before the section its first speed is assumed."""
     dead_ms, gain, rest, bandwidth, integral, coulomb = values
     friction, smoothing = math.exp(coulomb), _SIGN_RATIO * top_speed * _MM
@@ -260,8 +260,8 @@ def _drive_ways(trace: ServoTrace, values: FloatArray, period_s: float, top_spee
         ),
     )  # fmt: skip
     found, count = [], round(_RUN_UP_S / period_s)
-    for way in trace.command:
-        late = delayed(way, dead_ms * 1e-3 / period_s)
+    for motion in trace.command:
+        late = delayed(motion, dead_ms * 1e-3 / period_s)
         run_up = late[0] + np.arange(-count, 0) * (late[1] - late[0])
         drive = _core.FeedDrive(parameters, period_s)
         drive.reset(run_up[0])
@@ -287,7 +287,7 @@ def torque_friction(
     if trace.torque is None:
         return ()
     torque = trace.torque
-    late = [delayed(np.gradient(way, period_s), lag_s / period_s) for way in trace.command]
+    late = [delayed(np.gradient(motion, period_s), lag_s / period_s) for motion in trace.command]
     sign = _SIGN_RATIO * max(float(np.abs(v).max()) for v in late)
     columns = [np.column_stack([np.tanh(v / sign), np.gradient(v, period_s), v, np.ones_like(v)]) for v in late]
 
@@ -333,7 +333,7 @@ def fit_servo(
 ) -> ServoFit:
     """Identify the position loop of each axis from a log of commands and actual positions.
 
-    Three models are fitted to each half of the changes of speed and validated on the other half: the servo
+    Up to three models are fitted to each half of the changes of speed and validated on the other half: the servo
     lag of the machine file (gain, feed-forward), the same with a dead time, and a drive with friction and a dead
     time. Their input is the command alone, never the actual positions of the validation half.
 
@@ -420,9 +420,9 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
 
 def _unlike(trace: ServoTrace) -> str:
     """Why the actual position does not follow the command; empty if it does."""
-    way = [r - r.mean() for r in trace.command]
-    power = sum(float(r @ r) for r in way)
-    slope = sum(float(r @ (x - x.mean())) for r, x in zip(way, trace.actual, strict=True)) / power
+    motion = [r - r.mean() for r in trace.command]
+    power = sum(float(r @ r) for r in motion)
+    slope = sum(float(r @ (x - x.mean())) for r, x in zip(motion, trace.actual, strict=True)) / power
     if _SLOPE[0] <= slope <= _SLOPE[1]:
         return ""
     return f"the actual position moves {slope:.3g} times as far as the command: not the same unit, sign or axis"
@@ -510,9 +510,9 @@ def _machine_axes(record: ServoRecord, axes: str | Mapping[str, str] | None) -> 
         return {} if turning else found
     if isinstance(axes, str):
         pairs = [each.partition("=") for each in axes.split(",")]
-        axes = {letter.strip().lower(): name.strip() for letter, _, name in pairs}
         if any(not equals for _, equals, _ in pairs):
-            raise ArgumentError(f"--axes {','.join(axes)}: must be for example X=1,Y=6,Z=2")
+            raise ArgumentError(f"--axes {axes}: must be for example X=1,Y=6,Z=2")
+        axes = {letter.strip().lower(): name.strip() for letter, _, name in pairs}
     found = {}
     labels = [each.name.lower() for each in record.axes]
     words = [(label, *label.replace("(", "").replace(")", "").split()) for label in labels]

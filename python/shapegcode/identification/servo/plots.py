@@ -25,7 +25,7 @@ def plot_servo(found: ServoFit, ax: Axes | None = None) -> Axes:
         ax: where to draw; None: a new figure.
 
     Returns:
-        The first of the axes drawn into.
+        The first panel.
     """
     shown = [axis for axis in found.axes if axis.models and axis.curves is not None]
     title, size_inch = f"Deviation of each axis: {Path(found.source).name}", (9.0, 0.8 + 1.3 * len(shown))

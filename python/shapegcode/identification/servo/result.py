@@ -59,11 +59,11 @@ class ServoAxis:
     Attributes:
         name: as in the file.
         unit: "mm" or "deg".
-        travel: total commanded travel, mm or degrees.
+        travel: largest range of the commanded positions in a section, mm or degrees.
         top_speed: highest commanded speed, per second.
         lag_rms: root mean square of command minus actual position.
         deviation_rms: RMS of the control's contour deviation; null if not recorded.
-        models: models compared with the record; none if the axis kept its speed.
+        models: models compared with the record; none if they cannot be fitted, see `note`.
         parameters: of the dead time and servo lag, then of the drive and of the torque.
         note: undetermined or unexplained behaviour.
         curves: data to plot.
@@ -142,7 +142,7 @@ class ServoFit(Result):
 
     @property
     def answer(self) -> str:
-        """Ratio of the following error that the model explains, for the axis with the largest one."""
+        """Following error of each axis with a model, and the residual of its best model."""
         fitted = [axis for axis in self.axes if axis.models]
         if not fitted:
             return f"{self.source}: no axis changes its speed: only the lag at constant speed can be found"

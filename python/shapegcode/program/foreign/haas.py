@@ -27,7 +27,7 @@ _REFUSED: Mapping[str, str] = {
     "arcs", "96": "constant surface speed", "150": "general pocket milling",
 }  # fmt: skip
 _CYCLES = frozenset(("73", "74", "81", "82", "83", "84", "85", "86", "89"))
-_CALL_BASE = 90_000_000  # O numbers of the subprograms that M97 calls, by their N number
+_CALL_BASE = 90_000_000  # O number of a subprogram that M97 calls: this plus its N number
 
 _NOT_THE_SAME = re.compile(
     r"[;GMFP](?:(?<=;)|(?<=G)[ \t]*(?:0*4(?![\d.])"
@@ -58,7 +58,7 @@ _MACRO = re.compile(r"[ \t]*(?:N[ \t]*\d+[ \t]*)?(?:#|IF|WHILE|END|GOTO|DPRNT|PO
 
 
 def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
-    """The program as one for FANUC: words with another meaning on a Haas are replaced, everything else is unchanged."""
+    """Translate a Haas program into FANUC's words: only words with another meaning on a Haas are replaced."""
     notes: dict[str, Note] = {}
     lines, called = _lines(source, file, notes)
     numbers = [*range(1, max(len(lines), 1) + 1)]
@@ -70,7 +70,7 @@ def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None =
 
 
 def called_haas_text(source: str, file: str) -> str:
-    """A program of another file that one for a Haas calls, in FANUC's words, line by line."""
+    """Translate a program in another file, called by a Haas program, into FANUC's words, line by line."""
     lines, called = _lines(source, file, {})
     if called:
         line = min(called.values())
@@ -149,7 +149,7 @@ def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
     if (unread := _UNREAD_M97.search(words)) is not None:
         raise ValueError(f"{unread[0]} takes an N number directly after it (M97 P1000): it is not read otherwise")
     if _M98.search(words) is not None and re.search(r"L[ \t]*[\d#\[]", words, re.IGNORECASE) is None:
-        # Five digits are a program's number, not FANUC's repetitions and four digits.
+        # Five digits are a program number on a Haas; FANUC would read repetitions and a number of four digits.
         words = _PROGRAM.sub(lambda match: f"{match[0]}L1", words)
     words = _with_dwell(words, codes, note)
     if "52" in codes or "92" in codes:
@@ -187,7 +187,7 @@ def _refuse(codes: list[str], code: str) -> None:
 
 
 def _with_dwell(words: str, codes: list[str], note: Callable[[str, str], None]) -> str:
-    """P of a dwell: seconds with a point, milliseconds without."""
+    """Convert P of a dwell, which is in seconds with a decimal point and in milliseconds without one."""
     others = {"10", "54.1", "65", "154"} & {*codes} or re.search(r"M[ \t]*0*(?:19|9[789])(?!\d)", words, re.IGNORECASE)
     match = _P.search(words)
     if match is None or (others and "4" not in codes):
@@ -212,7 +212,7 @@ def _with_dwell(words: str, codes: list[str], note: Callable[[str, str], None]) 
 
 
 def _with_subprograms(lines: list[str], called: Mapping[int, int], file: str) -> tuple[list[str], list[int]]:
-    """The lines, then each part that M97 calls as a separate program: from its N number to M99."""
+    """Append each part that M97 calls, from its N number to M99, as a program; return lines and their source lines."""
     end = "\r\n" if lines[0].endswith("\r\n") else "\n"
     plain = [_COMMENT.sub("", line) for line in lines]
     begins = {int(match[1]): index for index, line in reversed([*enumerate(plain)]) if (match := _N.match(line))}

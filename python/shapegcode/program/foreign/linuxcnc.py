@@ -96,7 +96,7 @@ class ToolTable:
 
 
 def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | None:
-    """The tool table that `input.tool_table` (or an INI file there) states, else `tool.tbl` of the folder; or None."""
+    """Read the tool table of `input.tool_table` (or an INI file there), else `tool.tbl` in the folder; None: none."""
     if not stated:
         beside = folder / "tool.tbl" if folder is not None else None
         return read_tool_table(beside, unit) if beside is not None and beside.is_file() else None

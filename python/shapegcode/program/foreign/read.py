@@ -156,7 +156,7 @@ _SIGNS: tuple[tuple[InputDialect, tuple[bytes, ...], re.Pattern[bytes], str], ..
     ("siemens", (b"TRANS", b"AROT"), re.compile(rb"(?<![A-Z_])(?:A?TRANS|AROT)(?![A-Z_])"), "frame"),
     ("siemens", (b"G700", b"G710"), re.compile(rb"G7[01]0(?![\d.])"), "inch or mm"),
 )
-"""Words that no FANUC control knows, with short texts: every program with the word contains one of these."""
+"""Words that no FANUC control knows, each with byte strings of which a program with the word contains at least one."""
 
 _Sign = tuple[InputDialect, re.Pattern[bytes], str]
 _OF_FANUC: tuple[_Sign, ...] = (
@@ -215,7 +215,7 @@ def _first_signs(code: bytes, signs: Iterable[_Sign]) -> dict[InputDialect, Reco
 
 
 def doubtful_word(text: bytes) -> tuple[int, str] | None:
-    """The first dwell or arc of a program that FANUC allows, and that usually has another meaning on LinuxCNC.
+    """Find the first dwell or arc that FANUC allows and LinuxCNC usually reads otherwise: its line, and a warning.
 
     A dwell of P1 to P9 is very short in milliseconds; P of an arc is the number of turns on LinuxCNC.
     """

@@ -86,7 +86,7 @@ def _problems(page: Page) -> str:
 
 
 def save(page: Page, path: str | Path, script: Script = "inline") -> list[str]:
-    """Write the file of a page; on failure the former file is kept."""
+    """Write the file of a page, and return the files written; on failure a former file is unchanged."""
     text = to_html(page, script)
     wrote = []
     if script == "beside" and page.scene is not None:
@@ -341,7 +341,7 @@ def _linked(text: str, column: Column, row: object) -> str:
 
 
 def _scrolled(table: str) -> str:
-    """Make a table scrollable if it is too wide, also by keys."""
+    """Make a table scrollable, also from the keyboard, if it is too wide."""
     return f'<div class="scrolled" tabindex="0" role="group" aria-label="Table">{table}</div>'
 
 
@@ -406,7 +406,7 @@ def _cut_picker(picker: model.CutPicker, key: str) -> str:
         f'<button type="button" data-tick="{name}">{text}</button> '
         for name, text in (("all", "Tick all"), ("none", "Tick none"), ("first", "Reset"))
     )
-    # On paper only the shaped ones are listed.
+    # On paper only the shaped cuts are listed.
     kind = "cut-picker" if any(row.is_shaped for row in picker.rows) else "cut-picker unprinted"
     return (
         f'<div class="{kind}" data-of="{escape(key)}-cuts"><div class="needs-script on-screen">'

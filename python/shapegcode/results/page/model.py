@@ -1,6 +1,6 @@
-"""Content of the page of a result, as data, and the page of any result; `html` converts it to one file.
+"""Content of the page of a result, as data; `html` converts it to one file.
 
-The module `page` in a result's folder makes its page; numbers come from the fields of the JSON, or from the scene.
+The module `page` in a result's folder, if any, makes the sections of its page. Numbers are from the JSON or the scene.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Script = Literal["inline", "beside"]  # script of a page: in its file, or in a file of the same folder
 
 Light = Literal["green", "calm", "amber", "red"]
-"""Run it; nothing to do; do something first; do not run it."""
+"""Green: run it; calm: nothing to do; amber: do something first; red: do not run it."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Figure:
     before: float | None  # figure of the original; None: none
     after: float  # figure of the result, or the only one
     digits: int = 1  # decimals
-    limit: float | None = None  # limit of `after`; None: not judged
+    limit: float | None = None  # limit of `after`; None: no limit
     key_before: str = ""  # its position in the JSON: names and indices joined by dots; empty: none
     key_after: str = ""
     factor: float = 1.0  # ratio of the number shown to the one in the JSON
@@ -46,7 +46,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Figures:
-    """Figures as cards: the few main ones."""
+    """The few main figures, shown as cards."""
 
     rows: tuple[Figure, ...]
 
@@ -138,7 +138,7 @@ class CutRow:
     time_s: Pair[float | None]  # until the set-points rest, likewise
     bytes: Pair[int | None]  # size of its program text, likewise
     outcome: str  # "shaped", or why not
-    is_shaped: bool  # it is shaped in the emitted program: these are printed
+    is_shaped: bool  # it is shaped in the emitted program; only such rows are printed
     selected: bool  # ticked when the page opens
     can_be_shaped: bool = True  # False: it has no check box
 
@@ -149,8 +149,8 @@ class CutTotals:
 
     time_s: float  # cycle time of the original program
     bytes: int  # size of the original program
-    residual_limit_um: float | None = None  # limit of the maximum residual vibration; None: not judged
-    contour_limit_um: float | None = None  # limit of the maximum contour error; None: not judged
+    residual_limit_um: float | None = None  # limit of the maximum residual vibration; None: no limit
+    contour_limit_um: float | None = None  # limit of the maximum contour error; None: no limit
 
 
 @dataclass(frozen=True)
@@ -307,7 +307,7 @@ def page_of(
 
 
 def _named(scene: Scene | None, provenance: Provenance) -> Scene | None:
-    """Add the name of the output file to the scene, which was unknown when it was made."""
+    """Add the name of the output file, which was unknown when the scene was made."""
     output = provenance.file("output")
     if scene is None or output is None or len(scene.variants) < 2:
         return scene

@@ -75,7 +75,7 @@ class SceneSpectrum:
     axis: str  # "x", "y" or "z"
     variant: str  # key of its variant
     frequency_hz: FloatArray  # (m,)
-    amplitude: FloatArray  # (m,), m/s² per line
+    amplitude: FloatArray  # spectral density, (m,), m/s²/√Hz
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,10 +149,10 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 PIXELS_WIDE, PIXELS_HIGH = 1600, 200
-"""Pixels of the screen for the decimation: path and time across, a curve from minimum to maximum."""
+"""Pixels assumed for the decimation: the width for the path, the height for a curve from minimum to maximum."""
 
 _HALF_PIXEL = 0.5
-_STEP = 0.5  # ratio of the tolerance, for each of two passes
+_STEP = 0.5  # fraction of the tolerance for each of two passes
 _COARSER = 1.5
 _PATH_LAST = 20.0
 _SHARE_OF_STARTS = 0.5
@@ -190,7 +190,7 @@ class Thinner:
         self, sample: IntArray, labels: IntArray, command_mm: FloatArray, deviation_um: FloatArray,
         curves: Mapping[str, FloatArray], starts: npt.NDArray[np.intp],
     ) -> None:  # fmt: skip
-        """Further samples."""
+        """Decimate samples and add them."""
         self._names = list(curves)
         values = np.column_stack([command_mm, deviation_um, *curves.values()])
         low, high = values.min(axis=0), values.max(axis=0)
@@ -198,7 +198,7 @@ class Thinner:
         self._high = high if self._high is None else np.maximum(self._high, high)
         started = np.zeros(len(sample), dtype=bool)
         started[starts] = True
-        # Tolerances from the ranges so far, which only grow: finer than at the end.
+        # The ranges only grow, so tolerances from the ranges so far are finer than those at the end.
         rows = self._chosen(sample, values, started, _STEP)
         self._pieces.append((sample[rows], labels[rows], values[rows], started[rows]))
         self.samples += len(sample)
@@ -210,12 +210,12 @@ class Thinner:
 
     def _tolerances(self, factor: float) -> FloatArray:
         assert self._low is not None and self._high is not None
-        # The path is drawn large: its tolerance grows only if its own points are too many.
+        # The path is drawn large: its tolerance grows only after that of the curves has grown twentyfold.
         path = np.full(3, self._scales["path"] * _path_factor(factor))
         span = np.maximum(self._high - self._low, 1e-12)
         floors = np.array([self._scales.get(name, 0.0) for name in self._names])
         curves = np.maximum(span[6:], floors) * _HALF_PIXEL / PIXELS_HIGH
-        # The three components of the deviation together are as accurate as its magnitude.
+        # The three components of the deviation have one tolerance, from the largest of their ranges.
         deviation = np.full(3, max(float(span[3:6].max()), self._scales["deviation"])) * _HALF_PIXEL / PIXELS_HIGH
         tolerances: FloatArray = np.concatenate([path, deviation * factor, curves * factor])
         return tolerances

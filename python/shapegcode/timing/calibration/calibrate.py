@@ -116,7 +116,7 @@ def calibrate_cycle_time(
 
 
 class _Meter:
-    """Progress: the number of fits started, and the steps of the current one."""
+    """Progress: the number of completed fits, and the steps of the current one."""
 
     def __init__(self, on_progress: Callable[[float], None], fits: int) -> None:
         self._on_progress, self._fits, self._done, self._steps = on_progress, fits, 0, 0
@@ -154,7 +154,7 @@ def _observed(file: RunsFile, machine: Machine) -> list[logs.ObservedRun]:
 def _folds(runs: Sequence[logs.ObservedRun]) -> list[list[logs.ObservedRun]]:
     """Cross-validation groups: the runs of a program; with a single program (weaker) every other run.
 
-    None if there is only one group.
+    Empty if there is only one group.
     """
     by_program: dict[int, list[logs.ObservedRun]] = defaultdict(list)
     for run in runs:
@@ -382,8 +382,8 @@ def _held(holds: list[_Hold], begin_s: float, end_s: float) -> float:
 # --- the numbers of the machine file ----------------------------------------------------------------------------------
 
 _USUAL = 0.75  # fraction of the time
-_MAX_WAY_S = 10.0  # limit of times.unknown_move_s
-_KNOWN = 4.0  # an interval this wide on both sides determines nothing
+_MAX_MOVE_S = 10.0  # limit of times.unknown_move_s
+_KNOWN = 4.0  # ratio to the value: an interval that reaches it on either side determines nothing
 
 
 def _feed_override(run: logs.ObservedRun) -> float:
@@ -397,7 +397,7 @@ def learned_machine(
     rivals: Sequence[tuple[_Calibration, float]],
     scatters: tuple[float, float],
 ) -> tuple[Machine, dict[str, str], list[result.CalibratedParameter], list[str]]:
-    """The machine with the calibrated parameters, and the parameters that the logs do not determine."""
+    """The calibrated machine, its remarks, the parameters, and descriptions of those that the logs do not determine."""
     motion, functions, machine = learned.motion, learned.functions, learned.machine
     source = f"logs of {len(runs)} runs"
     values = motion.file_values() | _function_values(functions, runs)
@@ -431,7 +431,7 @@ def learned_machine(
         rows += open_times.open_row(f"kind of look-ahead ({other.motion.family.name})", values, its_values, weight)
     values["times.open"] = rows
     for key in values:
-        if key != "times.open":  # not at each value of its rows, as times.scatter states it
+        if key != "times.open":  # times.scatter already states the origin of its rows
             remarks.setdefault(key, f"measured ({source})")
     fitted = machine.with_values(values, source=f"{machine.name} with calibrated parameters")
     return fitted.with_remarks(machine.all_remarks() | remarks), remarks, numbers, undetermined
@@ -500,7 +500,7 @@ def _had(machine: Machine, key: str) -> float | None:
 def _function_values(functions: fitting.FunctionFit, runs: Sequence[logs.ObservedRun]) -> dict[str, object]:
     values = functions.values
     codes = {code: round(value, 3) for code, value in fitting.m_codes(values).items() if round(value, 3) >= 0.005}
-    way_xy, way_z = (min(round(values.get(name, 0.0), 3), _MAX_WAY_S) for name in ("move xy", "move z"))
+    move_xy, move_z = (min(round(values.get(name, 0.0), 3), _MAX_MOVE_S) for name in ("move xy", "move z"))
     feed = _usual(map(_feed_override, runs), runs)
     rapid = _usual((run.rapid_override for run in runs), runs)
     found: dict[str, object] = {
@@ -508,7 +508,7 @@ def _function_values(functions: fitting.FunctionFit, runs: Sequence[logs.Observe
         "times.tool_change_s": round(values.get("tool change", 0.0), 3),
         "times.last_tool_in_spindle": functions.last_tool_in_spindle,
         "times.m_function_s": 0.0,
-        "times.unknown_move_s": {"x": way_xy, "y": way_xy, "z": way_z},
+        "times.unknown_move_s": {"x": move_xy, "y": move_xy, "z": move_z},
         "times.feed_override_percent": round(100.0 * feed, 2),
         "times.rapid_override_percent": round(100.0 * rapid, 2),
         "times.m_codes": {"code": list(codes), "s": list(codes.values())} if codes else None,

@@ -1,4 +1,4 @@
-"""Fits times of cuts and rapids (kinds of look-ahead, misfit to logs, search, intervals) and times in between."""
+"""Fits the times of cuts and rapids (kinds of look-ahead, misfit, search, intervals), and the times between cuts."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ class MotionFit:
 # The duration of a part is therefore known to one or two readings, whatever its length; the model's error
 # grows with the length.
 
-#: (length of the windows in s, error in s beyond which its weight is constant, weight).
+#: (length of the windows in s, limit of the error in s, weight).
 _SCALES = ((1.0, 0.25, 1.0), (6.0, 0.5, 0.7), (30.0, 1.0, 0.5))
 _SECTION = (2.0, 0.5)  # whole sections: limit of the error in s per half minute, weight
 _MIN_READINGS = 10
@@ -275,7 +275,7 @@ def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
 
 _STEP = 0.3  # step of the first simplex, in the logarithm
 _WINDOW_S = 6.0
-_PLACES, _SEARCHED, _VALLEYS, _STEPS = 400, 1.0, 5, 500
+_POINTS, _SEARCHED, _VALLEYS, _STEPS = 400, 1.0, 5, 500
 # Prior of parameters that runs do not determine, around a usual machine: cost of a deviation in misfit.
 _TYPICAL_SPREAD = 1.0  # in the logarithm
 _SEEN_SPREAD = 0.15  # of a parameter that logs show
@@ -330,7 +330,7 @@ def fit_motion(
 
     # The misfit has several minima: start at the best of many points, and restart at the end.
     generator = np.random.default_rng(1)
-    points, valleys, restarts = (_PLACES, _VALLEYS, 2) if thorough else (_PLACES // 2, _VALLEYS // 2, 1)
+    points, valleys, restarts = (_POINTS, _VALLEYS, 2) if thorough else (_POINTS // 2, _VALLEYS // 2, 1)
     spread = generator.normal(0.0, _SEARCHED, (points, len(parameters))) * (reach / _TYPICAL_SPREAD)
     tried = [typical, *(np.clip(typical + each, low, high) for each in spread)]
     ranked = sorted(((cost(point), index) for index, point in enumerate(tried)), key=lambda each: each[0])
@@ -416,7 +416,7 @@ def _windows(section: SeenSection) -> IntArray:
 # that always occur together is a choice: the one with the smallest values is used.
 
 _READING_S = 0.1  # scatter of the time between two readings
-_OUTLIER = 3.0  # limit in units of it: larger deviations have less weight
+_OUTLIER = 3.0  # in units of _READING_S: larger deviations have less weight
 _RIDGE = 0.02  # weight of the ridge towards 0, relative to a reading's scatter
 _USUAL_S, _USUAL_KRPM = 2.0, 5.0  # standard deviation over usual machines: of a time, and of a spindle's first speed
 _MAX_S = 60.0
@@ -436,7 +436,7 @@ class FunctionFit:
     low: dict[str, float]  # lower ends of the 95 % intervals by name
     high: dict[str, float]
     covariance: FloatArray  # (n, n) in the order of the values
-    last_tool_in_spindle: bool  # at a restart the last tool of the program is in the spindle
+    last_tool_in_spindle: bool  # when the program is started again, its last tool is in the spindle
     scatter_s: float  # RMS deviation of the time between two cuts
 
 
@@ -445,7 +445,7 @@ class _Span:
     """A part of a run from one reading to another, with functions between."""
 
     run: ObservedRun
-    begin: int  # line; 0: the start key
+    begin: int  # line; 0: cycle start
     end: int
     seconds: float
 
@@ -485,7 +485,7 @@ def fit_functions(runs: Sequence[ObservedRun], motion: MotionFit, machine: Machi
     """Fit the times between cuts by least squares, robust against operator actions."""
     spans = [span for run in runs for span in _spans(run)]
     names = _names(runs)
-    # Only where a program ends with its first tool the tool in the spindle matters.
+    # The tool in the spindle at the start matters only if a program ends with its first tool.
     used = ([tool for tool in run.timed.tools.tolist() if tool >= 0] for run in runs)
     kept = (False, True) if any(tools and tools[0] == tools[-1] for tools in used) else (False,)
     fits = [_fit(spans, names, motion, machine, each) for each in kept]

@@ -173,7 +173,7 @@ def held_longest(signal: Signal, end_s: float | None) -> float:
 
 
 def feed_unit(entry: RunEntry, log: RunLog, timed: TimedProgram) -> float:
-    """The unit of the logged feed: as stated, else the one in which steady cuts run as programmed."""
+    """Unit of the logged feed, mm/s: as stated, else that in which steady cuts run as programmed; NaN: unknown."""
     if log.feed is None or len(log.feed) < _MIN_READINGS:
         return math.nan
     line = lines_at(log.feed, log, timed)
@@ -216,8 +216,8 @@ def cut_sections_of(
     if log.feed is not None and math.isfinite(unit):
         line = lines_at(log.feed, log, timed)
         ratio = log.feed.value * unit / timed.feed_mm_per_s[line]
-        # Displayed feeds are multiples of a step, the largest usual one that fits all: if it is coarse for the
-        # feed, the reading is useless.
+        # Displayed feeds are multiples of a step, assumed to be the largest usual one that fits all of them. Readings
+        # are used only if the step is fine enough for the programmed feed.
         shown = ((step, log.feed.value / step) for step in _STEPS)
         step = next((each for each, parts in shown if np.all(np.abs(parts - np.round(parts)) < 1e-3)), 0.0)
         fine = timed.feed_mm_per_s[line] * _FEED_BIN > step * unit
@@ -286,7 +286,7 @@ def observe(entry: RunEntry, log: RunLog, timed: TimedProgram, machine: Machine)
     if entry.rapid_override_percent is not None:
         rapid_override = entry.rapid_override_percent / 100.0
     elif log.rapid_override is not None and len(log.rapid_override):
-        # The override may change briefly, mostly at the start: use its longest value.
+        # The override may change briefly, mostly at the start: use the value that lasted longest.
         rapid_override = held_longest(log.rapid_override, log.duration_s) or math.nan
     run = ObservedRun(timed, log, entry, time_s, line, cut_sections, rapid_override, unit, tuple(notes))
     starts = timed.starts(fanuc_model(machine))  # by the machine's own limits, before calibration
@@ -418,7 +418,7 @@ def _shown_feeds(run: ObservedRun) -> tuple[IntArray, FloatArray]:
 
 
 def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
-    """Largest centripetal acceleration from the feeds shown in arcs, mm/s²: v²/r where v is below the feed."""
+    """Limit of centripetal acceleration by the logged feeds in arcs, mm/s²: v²/r where v is below F; NaN: unknown."""
     found: list[FloatArray] = []
     for run in runs:
         line, speed = _shown_feeds(run)

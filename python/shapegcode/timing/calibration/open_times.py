@@ -23,8 +23,8 @@ from shapegcode.timing.calibration.observed import ObservedRun
 _Row = dict[str, object]  # of times.open
 
 _NO_STEP = 2e-3  # in a logarithm or s: smaller changes are omitted
-_ALONE, _SMALL = 0.1, 0.2  # largest step of others that is negligible; largest for which times are linear
-_MIN_PART = 0.05  # least fraction of a step that keeps all times at 0 or above
+_ALONE, _SMALL = 0.1, 0.2  # largest negligible step of other parameters; largest step for which times are linear
+_MIN_PART = 0.05  # least fraction of a step that is used; times below 0 are then set to 0
 _KIND_SPREAD = 0.1  # a kind worse by this ratio in cross-validation has exp(-1/2) times the weight
 MIN_WEIGHT = 0.02  # least weight of a kind of look-ahead with a row
 _BLOCK_TIME = "controller.look_ahead_block_time_s"
@@ -103,7 +103,7 @@ def _possible(value: FloatArray, step: FloatArray) -> float:
 
 
 def open_row(name: str, base: Mapping[str, object], other: Mapping[str, object], weight: float = 1.0) -> list[_Row]:
-    """A row with the keys that differ from the machine file; none if none differs."""
+    """List with one row of the values that differ from `base`; empty if none differs."""
     # Keys missing in the other kind are not used by it.
     values = [f"{key} = {toml(value)}" for key, value in other.items() if value is not None and value != base.get(key)]
     return [{"name": name, "values": values, "weight": float(f"{weight:.4g}")}] if values else []

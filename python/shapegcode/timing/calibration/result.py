@@ -65,7 +65,7 @@ class CycleTimePart:
 
     Attributes:
         name: "T3", "cuts", "between cuts".
-        measured_s: time in the log.
+        measured_s: time in the log, without holds.
         predicted_s: time of the calibrated model.
     """
 
@@ -88,7 +88,7 @@ class CalibrationRun(OldNames):
         log: file.
         use: "fit" or "test".
         measured_s: from start to completion, by the log; null: not both are in the log.
-        held_s: part of it in holds, without a programmed stop.
+        held_s: part of it in stops that are not programmed (holds).
         predicted_s: time of the calibrated model at the overrides of this run.
         low_s: lower end of the 95 % interval.
         high_s: upper end.
