@@ -89,8 +89,9 @@ Raises:
 
 void register_motion(py::module_& module) {
   py::enum_<AccelerationLaw>(module, "AccelerationLaw", "Law of a change of speed.")
-      .value("constant_time", AccelerationLaw::constant_time)
-      .value("jerk_limited", AccelerationLaw::jerk_limited);
+      .value("constant_time", AccelerationLaw::constant_time,
+             "A ramp lasts the time constant whatever the speed step, if the path is long enough.")
+      .value("jerk_limited", AccelerationLaw::jerk_limited, "The acceleration of the axes, smoothed by the jerk time.");
 
   py::class_<MotionLimits>(module, "MotionLimits", "Limits of the look-ahead; infinity switches a limit off.")
       .def(py::init<>())

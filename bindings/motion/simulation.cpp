@@ -19,8 +19,8 @@ py::array recorded(const Samples& samples) { return take(Eigen::MatrixXd(samples
 
 void register_simulation(py::module_& module) {
   py::enum_<BlockEnd>(module, "BlockEnd", "When a block's successor starts.")
-      .value("ceil", BlockEnd::ceil)
-      .value("carry", BlockEnd::carry);
+      .value("ceil", BlockEnd::ceil, "At the next interpolation period (paper 004).")
+      .value("carry", BlockEnd::carry, "At once: the remainder of a period is carried over.");
 
   py::class_<DeviationStats>(module, "DeviationStats", "Statistics of a signed deviation.")
       .def_readonly("max_abs_mm", &DeviationStats::max_abs_mm, "Largest magnitude, mm.")

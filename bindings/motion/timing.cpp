@@ -76,21 +76,25 @@ void define_parts(py::class_<T, Extra...>& type, auto parts) {
 
 void define_model(py::module_& module) {
   py::enum_<MotionKind>(module, "MotionKind", "Where the controller accelerates a cutting move.")
-      .value("look_ahead", MotionKind::look_ahead)
-      .value("after_interpolation", MotionKind::after_interpolation);
+      .value("look_ahead", MotionKind::look_ahead, "Before interpolation: the speed is planned along the path.")
+      .value("after_interpolation", MotionKind::after_interpolation,
+             "After it: each axis is filtered, and cutting blocks overlap (paper 004).");
   py::enum_<FilterShape>(module, "FilterShape", "Shape of the acceleration after interpolation.")
-      .value("linear", FilterShape::linear)
-      .value("exponential", FilterShape::exponential);
+      .value("linear", FilterShape::linear,
+             "Moving average of the time constant; with a bell time a second one after it.")
+      .value("exponential", FilterShape::exponential, "Geometric weights of the time constant.");
   py::enum_<RapidPath>(module, "RapidPath", "Path of a rapid (1401#1).")
-      .value("linear", RapidPath::linear)
-      .value("non_linear", RapidPath::non_linear);
+      .value("linear", RapidPath::linear, "Straight: the slowest axis determines the tangential rate.")
+      .value("non_linear", RapidPath::non_linear, "Every axis at its own rate.");
   py::enum_<InPosition>(module, "InPosition", "How the wait for in-position is determined.")
-      .value("measured", InPosition::measured)
-      .value("servo_lag", InPosition::servo_lag);
+      .value("measured", InPosition::measured,
+             "A constant per axis; the largest of the axes that moved (paper 004, section 2.3).")
+      .value("servo_lag", InPosition::servo_lag,
+             "Until the position error of a first-order servo loop is within the width (1825, 1826).");
   py::enum_<ShapedRegions>(module, "ShapedRegions", "Which cuts of a program run as shaped blocks.")
       .value("marked", ShapedRegions::marked, "Regions marked in the program.")
-      .value("all", ShapedRegions::all)
-      .value("none", ShapedRegions::none);
+      .value("all", ShapedRegions::all, "Every cut.")
+      .value("none", ShapedRegions::none, "No cut.");
 
   py::class_<FanucModel>(module, "FanucModel",
                          "Parameters of a control that determine cycle time and deviation by acceleration.")

@@ -687,9 +687,9 @@ class AccelerationLaw:
     
     Members:
     
-      constant_time
+      constant_time : A ramp lasts the time constant whatever the speed step, if the path is long enough.
     
-      jerk_limited
+      jerk_limited : The acceleration of the axes, smoothed by the jerk time.
     """
     __members__: typing.ClassVar[dict[str, AccelerationLaw]]
     constant_time: typing.ClassVar[AccelerationLaw]
@@ -4307,9 +4307,9 @@ class BlockEnd:
     
     Members:
     
-      ceil
+      ceil : At the next interpolation period (paper 004).
     
-      carry
+      carry : At once: the remainder of a period is carried over.
     """
     __members__: typing.ClassVar[dict[str, BlockEnd]]
     carry: typing.ClassVar[BlockEnd]
@@ -5211,9 +5211,9 @@ class MotionKind:
     
     Members:
     
-      look_ahead
+      look_ahead : Before interpolation: the speed is planned along the path.
     
-      after_interpolation
+      after_interpolation : After it: each axis is filtered, and cutting blocks overlap (paper 004).
     """
     __members__: typing.ClassVar[dict[str, MotionKind]]
     after_interpolation: typing.ClassVar[MotionKind]
@@ -5258,9 +5258,9 @@ class FilterShape:
     
     Members:
     
-      linear
+      linear : Moving average of the time constant; with a bell time a second one after it.
     
-      exponential
+      exponential : Geometric weights of the time constant.
     """
     __members__: typing.ClassVar[dict[str, FilterShape]]
     exponential: typing.ClassVar[FilterShape]
@@ -5305,9 +5305,9 @@ class RapidPath:
     
     Members:
     
-      linear
+      linear : Straight: the slowest axis determines the tangential rate.
     
-      non_linear
+      non_linear : Every axis at its own rate.
     """
     __members__: typing.ClassVar[dict[str, RapidPath]]
     linear: typing.ClassVar[RapidPath]
@@ -5352,9 +5352,9 @@ class InPosition:
     
     Members:
     
-      measured
+      measured : A constant per axis; the largest of the axes that moved (paper 004, section 2.3).
     
-      servo_lag
+      servo_lag : Until the position error of a first-order servo loop is within the width (1825, 1826).
     """
     __members__: typing.ClassVar[dict[str, InPosition]]
     measured: typing.ClassVar[InPosition]
@@ -5401,9 +5401,9 @@ class ShapedRegions:
     
       marked : Regions marked in the program.
     
-      all
+      all : Every cut.
     
-      none
+      none : No cut.
     """
     __members__: typing.ClassVar[dict[str, ShapedRegions]]
     all: typing.ClassVar[ShapedRegions]

@@ -210,7 +210,7 @@ def _machine(machine: Machine) -> model.Section:
         Column("origin", value=lambda row: "assumed" if row.assumed else row.origin, text=True),
         Column("meaning", text=True),
     )
-    how = f"{unmeasured} of these values were not measured on this machine: assumed, inherited, or default."
+    how = f"{unmeasured} of these values were not measured on this machine: assumed or inherited."
     table = Table("", columns, values, row_style=lambda row: "" if row.unmeasured else "bold")
     return model.Section("machine", "Machine data used", (table,), how=how, folded=True, printed=False)
 

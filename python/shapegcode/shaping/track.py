@@ -123,22 +123,21 @@ def design_track(
         positions = sorted([*positions, *middles])
 
 
-def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s: float | None = None) -> Shaper | None:
+def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s: float) -> Shaper | None:
     """Non-negative shaper with a given mean delay and zero residual at every mode, of least second central moment."""
     found = taps_of_mean(modes, period_s, periods, mean_s)
     return None if found is None or found[0][0] != 0 else found[2]
 
 
 def taps_of_mean(
-    modes: Sequence[Mode], period_s: float, periods: int, mean_s: float | None = None
+    modes: Sequence[Mode], period_s: float, periods: int, mean_s: float
 ) -> tuple[NDArray[np.intp], FloatArray, Shaper] | None:
     """Delays in periods, taps and shaper of `shaper_of_mean`; the first delay may be above zero, not the shaper's."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
-    cost = steps / periods
-    if mean_s is not None:
-        matrix, right = np.vstack([matrix, cost]), np.append(right, mean_s / period_s / periods)
-        cost = steps**2 / periods**2
+    matrix = np.vstack([matrix, steps / periods])
+    right = np.append(right, mean_s / period_s / periods)
+    cost = steps**2 / periods**2
     taps = _vertices(matrix, right, cost)[0]
     if taps is None:
         return None

@@ -30,7 +30,7 @@ MEASURES: Mapping[str, str] = {
     "residual_y_um": "residual vibration Y",
     "residual_z_um": "residual vibration Z",
     "peak_um": "vibration in motion, worst axis",
-    "contour_um": "judged contour error",
+    "contour_um": "contour error that the tolerance limits",
     "command_um": "contour error of the command",
     "response_um": "contour error of the machine table",
     "cutting_time_s": "time of the shaped cuts",
