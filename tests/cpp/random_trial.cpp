@@ -213,6 +213,7 @@ Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<vo
                       (idle && (Eigen::Map<const Vector3>(point.data()) - end).norm() <= 1e-9 * (1.0 + end.norm()));
   }
   outcome.worst = ratios.worst();
+  outcome.late_plans = control.state().late_plans;
   return outcome;
 }
 

@@ -52,6 +52,7 @@ struct Outcome {
   std::array<double, 3>
       worst{};  ///< largest speed, acceleration and jerk of any axis (finite differences), over its limit
   double longest_segment_s = 0.0;  ///< time in one segment after the operator has left
+  std::uint64_t late_plans = 0;
   std::size_t steps = 0;
   std::size_t turns = 0;
   std::size_t holds = 0;

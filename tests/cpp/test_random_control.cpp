@@ -20,6 +20,7 @@ void keeps_its_limits(std::uint32_t seed, const Trial& trial, std::size_t max_st
   CHECK(outcome.worst[2] <= 1.001);
   CHECK(outcome.ended);
   CHECK(outcome.arrived);
+  CHECK(outcome.late_plans == 0);  // steps wait for plans
   CHECK(outcome.longest_segment_s <= 10.0);
 }
 

@@ -342,7 +342,7 @@ class MotionController::Implementation {
     is_paused_.store(is_paused, std::memory_order_relaxed);
     if (plans_in_step_ && sections.wants_more()) plan();
     const PlannedPoint& point = sections.step(is_stopping() || is_beside_, travel_);
-    if (sections.was_late()) ++state_.late_plans;
+    if (sections.was_late() && !planner_.has_failed()) ++state_.late_plans;
     if (sections.was_refused()) {
       ++state_.travel_stops;
       hold_.store(true, std::memory_order_relaxed);

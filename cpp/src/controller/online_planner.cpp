@@ -107,6 +107,7 @@ void OnlinePlanner::restart(std::uint64_t first, const AxisValues& position) noe
   has_motion_ = false;
   settle_ = 0;
   failed_ = 0;
+  has_failed_.store(false, std::memory_order_relaxed);
   first_ = planned_ = fixed_ = pushed_before_ = first;
   ratios_ = {};
   running_.store(first, std::memory_order_release);
@@ -336,6 +337,7 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const F
   }
   has_motion_ = false;
   failed_ = last_number_ + 1;
+  has_failed_.store(true, std::memory_order_relaxed);
   retry_ = start_ + shortest_section;
   return false;
 }
@@ -542,6 +544,7 @@ void OnlinePlanner::publish(Section& section) noexcept {
   last_number_ = sections_.next_number();
   start_ = section.count;
   section.serial = ++published_;
+  has_failed_.store(false, std::memory_order_relaxed);
   sections_.publish();
 }
 

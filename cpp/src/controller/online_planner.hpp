@@ -46,6 +46,8 @@ class OnlinePlanner {
   [[nodiscard]] const Sections& sections() const noexcept { return sections_; }
   /// The segment that is being run; of those before it as many are needed as RoundedPath looks back.
   [[nodiscard]] std::uint64_t running() const noexcept { return running_.load(std::memory_order_acquire); }
+  /// No motion within the limits was found behind the last section: its stop is run, although plans are in time.
+  [[nodiscard]] bool has_failed() const noexcept { return has_failed_.load(std::memory_order_relaxed); }
 
  private:
   void follow_reader() noexcept;
@@ -100,6 +102,7 @@ class OnlinePlanner {
   double ahead_mm_ = 0.0;         // how far that is
   double longest_stop_mm_ = 0.0;  // of the segments that are planned
   alignas(cache_line) std::atomic<std::uint64_t> running_{0};
+  std::atomic<bool> has_failed_{false};
 };
 
 }  // namespace shapegcode

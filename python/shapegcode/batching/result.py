@@ -220,7 +220,7 @@ class Batch(Result):
         return tuple(Figure(name, "runs", None, count, 0, None, "", f"counts.{name}") for name, count in shown.items())
 
     def tables(self) -> list[Table]:
-        """Runs with problems, and good runs by gain; the first twenty of each, on an index of pages two thousand."""
+        """Runs with problems, and good runs by gain; the first twenty of each; 2000 on an index of pages."""
         worst, counts, shown = list(_RED), self.counts, _LISTED if self.html else _SHOWN
         others, fine = (row for row in self.rows if row.ended != "ok"), (row for row in self.rows if row.ended == "ok")
         bad = heapq.nsmallest(shown, others, key=lambda row: worst.index(row.ended))

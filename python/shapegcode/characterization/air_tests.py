@@ -192,7 +192,7 @@ class _Maker:
         return Part("rapid", axis, count, self._signed(axis, increments), self.rapid[axis])
 
     def rate_is_reached(self, axis: str) -> bool:
-        """Whether rapids over the box reach their rate; otherwise each only bounds a time, so more are run."""
+        """Whether rapids over the box reach their rate; otherwise rapids of more lengths are run."""
         return abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / _PER_MINUTE
 
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:

@@ -151,7 +151,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
 
 
 def _shaper_s(program: Program, machine: Machine) -> float:
-    """Shaper duration in the header of a shaped program, s, at least the block time; rates hardly change faster."""
+    """Window of the busiest rate: shaper duration in the header of a shaped program, s, at least the block time."""
     least_s = machine.controller.block_time_s
     try:
         return max(float(program.stamp.shaper_ms) * 1e-3, least_s) if program.stamp else least_s

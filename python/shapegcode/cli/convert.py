@@ -140,7 +140,7 @@ CONVERT = Interface(
         *options.override_options(MACHINE_KEYS),
         ("--shape-all", None, bool,
          "shape every cut whose time stays within --max-time-increase and --max-cut-time-increase, even if it gains "
-         "less than shaping.least_gain_um, gets worse, or is within tolerance already; by default such cuts are left "
+         "less than shaping.least_gain_um, gets worse, or the program is within tolerance; by default such cuts stay "
          "unchanged"),
         ("--only", "A-B,...", line_ranges, "shape nothing but the cuts in these lines of IN, for example 12-80,95-240"),
         ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines of IN unchanged", ()),

@@ -109,10 +109,10 @@ IDENTIFY = arguments.Interface(
     "Finds vibration modes from impact tests or frequency responses (natural frequency, damping ratio; equivalent "
     "mass, damping and stiffness), from the decay after a rapid stop, or from a record made during a sweep "
     "(frequency and damping ratio), each with its 95 % interval. A mode that the data do not support is refused. "
-    "Exit code 0: all modes that exceed the noise are supported; 1: some are not; 2: none is, or bad input.",
+    "Exit code 0: all modes above the noise are supported; 1: not all, or doubtful; 2: none, or bad input.",
     (
         ("files", "FILE", {"nargs": "*"},
-         "CSV, UFF (dataset 58), WAV, .frf, .mat, auto servo tuning (XML), capture of command and encoder; several "
+         "CSV, UFF (dataset 58), WAV, .frf, .mat, SINUMERIK tuning (XML), capture of command and encoder; several "
           "files of the same point are fitted together"),
         ("--sweep", "PROGRAM", None, "program that ran during the record (shapegcode sweep), on the control of -m"),
         ("--axis", None, ("x", "y", "z"),
@@ -126,13 +126,13 @@ IDENTIFY = arguments.Interface(
         *options.MACHINE_OR_NONE,
         ("--modes", "N", arguments.count, "number of modes (default: by information criterion)"),
         ("--max-modes --most-modes", "N", {"dest": "max_modes", "type": arguments.count},
-         "largest number of modes (default: 40 if the fit is over frequency, 8 if it is over time)"),
+         "largest number of modes (default: over frequency 40, over time 8, sweep without force 4)"),
         ("--force", None, bool, "write modes with --update even if the verdict is 'do not use'"),
         ("--frequencies", "LOW:HIGH", arguments.frequency_band, "find modes between these frequencies, Hz"),
         ("--decay --ignore-force", None, {"dest": "ignore_force", "action": "store_true"},
          "treat the record as a free decay: ignore a force channel"),
         ("--stops", None, bool,
-         "the record is of an ordinary run: use every stop in it after which the machine rests"),
+         "record of an ordinary run: use its 20 strongest stops after which the machine rests"),
         ("--start", "TIME", arguments.start_time,
          "start of the decay in the file, for example 250ms (default: found automatically)"),
         *_OF_FILES,

@@ -71,7 +71,7 @@ def convert(
         only: shape nothing but the cuts in these lines of the original, each first and last; None: all.
         leave: leave the cuts in these lines unchanged.
         shape_all: shape every cut whose time stays within the table ``[price]``, even if it gains less than
-            `shaping.least_gain_um`, gets worse, or is within tolerance already. False: such cuts are left unchanged.
+            `shaping.least_gain_um`, gets worse, or the program is within tolerance. False: such cuts stay unchanged.
         tolerance_curve: compute the cycle time at other contour tolerances.
         on_progress: called with stage, number of finished parts and number of parts.
 

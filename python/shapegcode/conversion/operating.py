@@ -41,9 +41,14 @@ class ControlNote:
 
 
 def at_the_control(
-    emitted: Program, written: Written, figures: ProgramFigures, model: MachineModel, block_period_s: float
+    program: Program,
+    emitted: Program,
+    written: Written,
+    figures: ProgramFigures,
+    model: MachineModel,
+    block_period_s: float,
 ) -> tuple[ControlNote, ...]:
-    """Cautions for the operator of an emitted program."""
+    """Cautions for the operator of an emitted program; *program* is the original."""
     placed, loads = written.placed, written.loads
     if not placed:
         return ()
@@ -66,7 +71,7 @@ def at_the_control(
         ControlNote(override.topic, "; ".join([override.sentence, *elsewhere])),
         ControlNote(FEED_HOLD.topic, FEED_HOLD.sentence),
         ControlNote(SINGLE_BLOCK.topic, f"{SINGLE_BLOCK.sentence}; {_single_block(emitted, placed, figures, model)}"),
-        ControlNote(RESTART.topic, "; ".join([RESTART.sentence, *_restarts(emitted, written, machine)])),
+        ControlNote(RESTART.topic, "; ".join([RESTART.sentence, *_restarts(program, emitted, written, machine)])),
         ControlNote(FIRST_RUN.topic, FIRST_RUN.sentence),
     )
 
@@ -107,7 +112,7 @@ def _line(loads: Mapping[int, TransferLoad], machine: Machine) -> str:
     if line > 0:
         enough = "enough" if baud <= line else "buffer underrun (--baud fits the program to the line)"
         here = f", the line of this machine has {line}: {enough}"
-    return f"needs {baud:.0f} baud, in the cut with the most blocks per second{here}"
+    return f"needs {baud:.0f} baud, in the busiest part of the program{here}"
 
 
 def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_period_s: float) -> str:
@@ -163,7 +168,7 @@ def _duration(time_s: float) -> str:
     return f"{time_s:.1f} s" if time_s < 10.0 else f"{time_s:.0f} s"
 
 
-def _restarts(emitted: Program, written: Written, machine: Machine) -> Iterator[str]:
+def _restarts(program: Program, emitted: Program, written: Written, machine: Machine) -> Iterator[str]:
     emission, placed, restarts = machine.emission, written.placed, written.restarts
     if (own := dialect_of(emission.dialect)) is not None:
         yield f"{own.control}: {own.facts['restart'].text}"
@@ -187,7 +192,7 @@ def _restarts(emitted: Program, written: Written, machine: Machine) -> Iterator[
             f"(emission.restart_stops): {cost_s:.1f} s more, and a dwell mark where the tool stops in the cut"
         )
     long = [
-        (place.original_lines, each)
+        (program.source_lines(*place.original_lines), each)
         for place, each in zip(placed, restarts, strict=True)
         if each.longest_s > emission.restart_interval_s
     ]
@@ -196,8 +201,7 @@ def _restarts(emitted: Program, written: Written, machine: Machine) -> Iterator[
         why = each.reason or "the command does not come nearly to rest there"
         remedy = "" if each.reason or emission.restart_stops else "; emission.restart_stops = true adds a stop"
         yield (
-            f"no restart point for {_duration(each.longest_s)} in the cut of lines {first} to {last}{more}: "
-            f"{why}{remedy}"
+            f"no restart point for {_duration(each.longest_s)} in original lines {first} to {last}{more}: {why}{remedy}"
         )
 
 

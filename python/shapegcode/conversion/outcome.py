@@ -129,7 +129,9 @@ def result_of(plan: ConversionPlan, shaped: Shaped, verdict: ProgramVerdict) -> 
         least_gain_um=machine.shaping.least_gain_um,
         parameter_sensitivity=sensitivity,
         unverified_parameters_tested=tried,
-        at_the_control=at_the_control(shaped.emitted, written, verdict.figures, plan.model, plan.grid.block_period_s),
+        at_the_control=at_the_control(
+            program, shaped.emitted, written, verdict.figures, plan.model, plan.grid.block_period_s
+        ),
         restart_points=restart_points(program, zip(written.placed, written.restarts, tools, strict=True)),
         emitted=emitted,
         placed=tuple(written.placed),

@@ -111,7 +111,7 @@ def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[mo
     if conversion.tolerance_curve is not None:
         sentence = conversion.tolerance_curve.sentence
         how = f"{sentence}. " if sentence else ""
-        how += "The time at the requested tolerance was simulated; the others are estimates. Limits: table [price]."
+        how += "The time at the requested tolerance was simulated, others estimated; [price] limits the increase."
         yield model.Section("price", "Tolerance against time", (curve_table(conversion.tolerance_curve),), how=how)
 
 

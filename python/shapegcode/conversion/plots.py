@@ -67,5 +67,9 @@ def _simulated(conversion: Conversion) -> SimulatedRegion:
         "emitted": model.simulate_emitted(blocks, path, record_samples=RECORD_SAMPLES, offset=offset),
     }
     return SimulatedRegion.of_runs(
-        runs, path, model.period_s, lines=place.original_lines, regions=len(conversion.regions)
+        runs,
+        path,
+        model.period_s,
+        lines=handle.original.source_lines(*place.original_lines),
+        regions=len(conversion.regions),
     )

@@ -106,7 +106,7 @@ class Conversion(ProgramFigures, Result):
         reason: reason of the recommendation.
         cuts: every cut, shaped or left unchanged, with its gain and its price.
         tolerance_curve: what other contour tolerances cost in time; null: not computed, or nothing can be shaped.
-        proof: that nothing but the shaped cuts changed; null: nothing was shaped, or rapids were without a header.
+        proof: that only the shaped cuts changed; null: nothing was shaped, or rapids were shaped without a header.
         advice: a smaller filter of the control that makes shaping unnecessary; null: none.
         cycle_time_s: whole program: cuts, rapids with in-position wait, dwells, drilling cycles.
         cutting_time_s: the cuts alone, until the set-points rest.
@@ -399,7 +399,7 @@ class Conversion(ProgramFigures, Result):
 
     def _sizes(self) -> list[BeforeAfter]:
         rows = [
-            BeforeAfter("blocks", "", self.blocks.read, self.blocks.emitted, 0),
+            BeforeAfter("blocks (read, shaped)", "", self.blocks.read, self.blocks.emitted, 0),
             BeforeAfter("size of the program", "bytes", self.bytes_read, self.bytes_emitted, 0),
             BeforeAfter("block period", "ms", None, self.block_period_s * 1e3, 3),
         ]

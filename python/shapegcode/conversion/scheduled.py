@@ -53,7 +53,7 @@ class ScheduledConversion(Conversion):
     """A program with scheduled feeds, shaped; `original` is the program with these feeds, not yet shaped.
 
     Attributes:
-        feed_schedule: the feeds; as emitted, the loads are those of the shaped program.
+        feed_schedule: the schedule; its `emitted` loads are the shaped program's.
     """
 
     feed_schedule: FeedSchedule

@@ -85,7 +85,7 @@ class TransferLoad:
     """Memory, data rate and block rate that a shaped region needs."""
 
     extra_bytes: int  # size of its text minus that of the original
-    baud: float  # required line speed in its section with the most blocks per second, bit/s
+    baud: float  # required line speed in its section with most characters per second, bit/s
     blocks_per_second: float  # in its busiest section
 
 

@@ -60,8 +60,8 @@ def identify(
     Args:
         source: a file (CSV, UFF, WAV, MATLAB), several files, records or frequency responses; of one point and axis.
             With `response`: the instants of its samples in s, shape (n,), evenly spaced.
-        response: what a sensor measured at these instants, shape (n,), in the unit of `quantity`. Read options are
-            taken here too.
+        response: what a sensor measured at these instants, shape (n,), in the unit of `quantity`. Or else the
+            `options`.
         force: of the hammer at these instants in N, shape (n,); None: a free decay.
         options: information missing in the files.
         quantity: of `response`: "acceleration" in m/s², "velocity" in m/s or "displacement" in m.

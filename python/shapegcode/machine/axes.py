@@ -161,7 +161,7 @@ class Direction(InlineTable):
 
 
 class AxisMode(TomlTable):
-    """One vibration mode of an axis, excited by the motion of that axis."""
+    """One vibration mode, listed under one axis."""
 
     frequency_hz: _Hertz = key("natural frequency; from a tap test, or from the decay after a rapid stop")
     damping_ratio: _Ratio = key("damping ratio (1 = critically damped)")

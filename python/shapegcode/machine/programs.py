@@ -352,10 +352,10 @@ class Shaping(TomlTable):
         default="response",
     )
     planner: Literal["auto", "look-ahead", "optimal"] = key(
-        'how the motion of a cut is planned before it is shaped. "look-ahead": as by a FANUC control\'s look-ahead, '
-        'with its law of acceleration and its corner rule; "optimal": as fast as feed, acceleration and jerk of the '
-        "axes allow, corners and short moves rounded within tolerance.contour_um (needs axes.*.max_jerk_mm_s3); "
-        '"auto": "look-ahead" where controller.kind is "fanuc", else "optimal"',
+        'how a cut is planned before it is shaped. "look-ahead": as by a FANUC control\'s look-ahead, with its law of '
+        'acceleration and corner rule; "optimal": as fast as feed, acceleration and jerk of the axes allow, corners '
+        'and short moves rounded within tolerance.contour_um; "auto": "look-ahead" where controller.kind is "fanuc" '
+        '(there "optimal" needs axes.*.max_jerk_mm_s3), else "optimal"',
         default="auto",
     )
     jerk_time_s: Annotated[Positive, Field(ge=0.001, le=1)] = key(

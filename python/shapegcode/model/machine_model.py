@@ -281,7 +281,7 @@ class MachineModel:
 
     @cached_property
     def bounds_deviations(self) -> bool:
-        """True if deviations at other overrides are cheap to bound: no filter, constant modes, no material side."""
+        """True if override deviations are cheap to bound: no drive, filter, planner, moving mode, material side."""
         moves = modes.moving_axis(self.machine) is not None
         plain = self.machine.verdict.plant == "modal" and not self.shaped.filters and not moves
         return plain and not self.always_plans and self.machine.input.material_side is None
