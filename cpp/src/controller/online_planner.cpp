@@ -40,8 +40,14 @@ constexpr double short_share = 0.4;
 struct Trial {
   double speed, stop_share;
 };
-constexpr std::array<Trial, 6> trials{
-    {{no_limit, 1.0}, {no_limit, 0.99}, {no_limit, 0.9}, {0.9, 1.0}, {0.6, 1.0}, {0.0, 1.0}}};
+constexpr std::array<Trial, 8> trials{{{no_limit, 1.0},
+                                       {no_limit, 0.99},
+                                       {no_limit, 0.9},
+                                       {no_limit, 0.7},
+                                       {no_limit, 0.4},
+                                       {0.9, 1.0},
+                                       {0.6, 1.0},
+                                       {0.0, 1.0}}};
 constexpr int attempts_at_rest = 12;
 // Plans that are made at once, with less each time where limits would be passed.
 constexpr int plans = 4;
@@ -354,7 +360,8 @@ PathMotion OnlinePlanner::begin_plan(Section& section, const PathPoint& from, co
   bool is_kept = keeps_ahead(section, begin, pushed, true);
   for (int n = 1; n < plans && !is_kept; ++n) {
     begin = make();
-    is_kept = keeps_ahead(section, begin, pushed, true);
+    // Not behind the last plan, which is followed: it would enter a rounding that has become a stop.
+    is_kept = keeps_ahead(section, begin, pushed, n + 1 < plans);
   }
   // Where the window does not slow the motion down: braking through valleys, if it is as far after as many periods.
   if (!is_kept || is_short()) return begin;

@@ -1,6 +1,6 @@
 """The header of an emitted program: written by the converter, read by all commands that get such a program.
 
-Its cautions, each a sentence and a comment, are also used in reports, pages, test cuts and characterization tests.
+Its cautions, each a sentence and a comment, are also used in reports, pages and test cuts.
 
 (SHAPEGCODE 0.1.0 MACHINE VX500)
 (VERDICT WITHIN TOLERANCE       )    or (BETTER - TOLERANCE NOT MET     )

@@ -251,7 +251,7 @@ class Recommendation(Result):
         return f"shapegcode convert part.nc -m {self.machine} {options}"
 
     def notes(self) -> list[str]:
-        """Reason of the recommendation; the best design for blocks if another one; the best of each grid."""
+        """Reason of the recommendation; best design for blocks, if it is another; best of each grid."""
         lines = [f"{_MARK} {'recommended' if self.ok else 'best available'}: {self.reason}"]
         index = self.recommended_on_grid
         if index is not None and index != self.recommended:

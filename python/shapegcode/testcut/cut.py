@@ -138,7 +138,7 @@ class DeeperSection:
 
 @dataclass(frozen=True)
 class CornerDetails:
-    """Parameters of an unrolled corner."""
+    """Parameters of a corner test."""
 
     allowance_mm: float  # radial depth on the walls
     rough_radius_mm: float  # of the rough corner

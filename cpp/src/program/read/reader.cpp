@@ -454,7 +454,7 @@ void Reader::finish() {
     program_.warnings.push_back({last, "the program does not end with M30, M02 or M99", 0, 0, ""});
   } else if (!framed_) {
     program_.warnings.push_back(
-        {1, "the program has no '%' lines; a control that reads it over a line or from a tape needs them", 0, 0, ""});
+        {1, "the program has no '%' lines; a control that reads it from a serial line or tape needs them", 0, 0, ""});
   }
   program_.probed.resize(options_.probe_lines.size(), interpreter_.state());
 }
