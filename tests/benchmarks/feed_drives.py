@@ -106,7 +106,7 @@ def feed_drive_tables(samples: int, repetitions: int) -> tuple[list[Row], list[l
 
 
 def _evaluations(parameters: _core.FeedDriveParameters, axis: Vector, restart: bool) -> tuple[float, Vector]:
-    """Evaluations of the equations for each set-point, and the responses; a copy has no history and starts anew."""
+    """Evaluations of the equations for each set-point, and the responses; a copy has no history and starts again."""
     drive = _core.FeedDrive(parameters, _PERIOD_S)
     evaluations, responses = 0, []
     for setpoint in axis:

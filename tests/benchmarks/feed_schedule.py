@@ -162,7 +162,7 @@ def _shares(result: FeedSchedule, limit: float) -> dict[str, float]:
 
 
 def _finer(written: Program, machine: Machine, tool: Tool, stock: Stock) -> dict[str, Any]:
-    """The written program swept anew through a grid of half the width; its stations are its own."""
+    """The written program swept again through a grid of half the width; its stations are its own."""
     swept = survey(written, machine, tool, stock, resolution_mm=0.005 * tool.tool.diameter_mm)
     peaks = [float(_peaks(part, machine).max()) for part in swept.regions]
     return {"finer_peak_n": max(peaks)}

@@ -10,7 +10,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 
 
 def built(name: str) -> Path:
-    """One of them, built anew where a source changed.
+    """One of them, built again where a source changed.
 
     Raises:
         RuntimeError: CMake or the compiler failed, with what they said.

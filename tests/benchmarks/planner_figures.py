@@ -4,7 +4,7 @@
 
 Every program is converted with `shaping.planner` "look-ahead" and "optimal", both for the machine's tolerance, and with
 "optimal" once more for the contour error that "look-ahead" reached, so that times stand beside equal contours. All cuts
-are shaped at any price. The emitted texts are verified and played by the tests' own interpreter, player and plant.
+are shaped at any price. The emitted texts are verified and simulated by the tests' own interpreter, player and plant.
 """
 
 from __future__ import annotations
@@ -87,9 +87,9 @@ def texts(names: list[str]) -> list[tuple[str, str, dict[str, Any]]]:
 
 
 def differences(judged: Judged, jerk_mm_s3: float) -> tuple[float, float]:
-    """Largest second and third differences of the played set-points over the limits, block by block."""
+    """Largest second and third differences of the simulated set-points over the limits, block by block."""
     block_s = TICKS * TICK_S
-    acceleration = jerk = math.nan  # of cuts that are too long to be played
+    acceleration = jerk = math.nan  # of cuts that are too long to be simulated
     for _, blocks, entry in judged.regions():
         if entry["time_s"]["emitted"] > PLAYED_S:
             continue

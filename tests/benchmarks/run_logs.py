@@ -2,7 +2,7 @@
 
 python tests/benchmarks/run_logs.py [--lines 10000000]
 
-The day is written anew into a temporary folder: runs of 100 s with the items of NIST's logs (line number, feed,
+The day is written again into a temporary folder: runs of 100 s with the items of NIST's logs (line number, feed,
 spindle, runtime, tool, name of the program), a minute between them.
 """
 

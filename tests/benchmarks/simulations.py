@@ -74,7 +74,7 @@ def main() -> int:
         least(f"emitted text simulated, {rule.name}", emitted_played)
     least("the same, the table alone", lambda: model.simulate_emitted(
         blocks, path, offset=offset, tracker=tracker, command_contour=False))  # fmt: skip
-    least("emitted text, planned anew", lambda: model.simulate_planned(blocks, path, offset=offset, tracker=tracker))
+    least("emitted text, planned again", lambda: model.simulate_planned(blocks, path, offset=offset, tracker=tracker))
     least("time of the blocks", lambda: _core.simulated_duration_s(blocks, model.period_s, model.own_rule, 0.8))
     return 0
 

@@ -460,7 +460,7 @@ TEST_CASE("a gap that is accepted is no jump, however short the period") {
   }
 }
 
-TEST_CASE("a motion that strays from its plan in a sharp corner is planned anew from where it rests") {
+TEST_CASE("a motion that strays from its plan in a sharp corner is planned again from where it rests") {
   ControllerSettings settings = limited();
   settings.plans_in_step = true;
   settings.limits.max_feed_mm_per_s.setConstant(450.77);

@@ -49,7 +49,7 @@ def strokes(count: int, x_mm: float = 30.0, depth_mm: float = 400.0) -> list[Arr
 def played_residuals_um(
     runs: Sequence[Array], shape: Filter, modes: _core.Mode = MODE, table: _core.ModeTable = TABLE
 ) -> Array:
-    """Residual vibration of X after each stop, µm: every stroke shaped, written as blocks, played through the plant."""
+    """Residual vibration of X after each stop, µm: every move shaped, written as blocks, simulated."""
     command = [shape(run) for run in runs]
     options = _core.SimulationOptions()
     options.period_s = TICK_S

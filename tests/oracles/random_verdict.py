@@ -1,6 +1,6 @@
 """A drawn program, converted by the package and judged by what shares nothing with it: every figure beside the report.
 
-The original and the emitted text are read by the judge's interpreter, the emitted one is played by its player and
+The original and the emitted text are read by the judge's interpreter, the emitted one is simulated by its player and
 plant. What differs is listed; nothing is decided by the package.
 """
 

@@ -92,7 +92,7 @@ def test_errors_of_contour_are_those_of_a_shaped_path() -> None:
 
 
 def test_the_page_has_these_figures() -> None:
-    """Durations and bands of the table, designed anew and swept."""
+    """Durations and bands of the table, designed again and swept."""
     page = (ROOT / "docs" / "evidence" / "comparison.md").read_text(encoding="utf-8")
     found = re.findall(r"^\| (?:`(robust|mirrored)`, same band) +\| −([\d.]+) / \+([\d.]+) % +\| ([\d.]+) ", page, re.M)
     assert len(found) == 5

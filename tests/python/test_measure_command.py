@@ -106,7 +106,7 @@ def test_deviations_along_z_are_above_and_below(folder: Path) -> None:
     last = json.loads((folder / "z.json").read_text())["programs"][0]["sections"][2]
     contour = last["contour_error_um"]["response"]
     assert (contour["left"], contour["right"]) == (0.0, 0.0)
-    # On a level line the deviation is what Z swings.
+    # On a level line the deviation is what Z oscillates.
     assert contour["max"] == pytest.approx(max(contour["above"], contour["below"]))
     assert contour["max"] == pytest.approx(last["peak_vibration_um"]["z"], rel=0.05)
     assert last["peak_vibration_um"]["z"] > 1.0

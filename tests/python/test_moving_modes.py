@@ -326,7 +326,7 @@ def test_a_zig_zag_along_z_leaves_next_to_nothing_at_its_stops() -> None:
 
 
 def test_the_verdict_sees_the_mode_that_moves() -> None:
-    """A stop at Z 400 swings at 41 Hz: the simulation of a machine with a table says what one with 41 Hz says."""
+    """A stop at Z 400 oscillates at 41 Hz: the simulation of a machine with a table says what one with 41 Hz says."""
     machine, slow = machine_with(OVER_Z), machine_with(OVER_Z, nominal=41.0)
     plain = Machine.from_toml(slow.to_toml().replace("frequency_over =", "# frequency_over =", 1))
     path = _core.Path([_core.Segment.line([0.0, 0.0, 100.0], [30.0, 0.0, 100.0], 100.0)])

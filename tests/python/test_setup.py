@@ -316,7 +316,7 @@ def test_show_ranks_what_nobody_measured_on_a_program(tmp_path: Path) -> None:
 
 
 def test_without_any_mode_the_axis_to_tap_first_is_named(tmp_path: Path) -> None:
-    """Nothing can be shaped yet; a usual mode swings as it does in the simulation of a machine that has it."""
+    """Nothing can be shaped yet; a usual mode oscillates as it does in the simulation of a machine that has it."""
     answered(tmp_path, 'name = "A"\nrapid_mm_per_min = 24000\nmodes = { z = "rigid" }\n')
     (tmp_path / "part.nc").write_text(PART)
     done = run(tmp_path, "machine", "show", "m.toml", "--for", "part.nc", "--json", "s.json")

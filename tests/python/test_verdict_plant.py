@@ -50,7 +50,7 @@ def test_the_verdict_holds_the_lag(machine: sg.Machine, tmp_path: Path) -> None:
     lag_um = 1e3 * 100.0**2 * (1.0 - 0.9**2) / (2.0 * 30.0**2 * 20.0)
     original = drive.contour_error_um.response.original.max
     assert original == pytest.approx(modal.contour_error_um.response.original.max + lag_um, rel=0.6)
-    # What swings after the stop is cancelled behind the drive as well, though it was designed without it.
+    # What oscillates after the stop is cancelled behind the drive as well, though it was designed without it.
     assert drive.residual_vibration_um.emitted.x <= max(0.6 * drive.residual_vibration_um.original.x, 1.0)
     shaped = tmp_path / "shaped.nc"
     shaped.write_bytes(drive.text)

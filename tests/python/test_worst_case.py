@@ -213,7 +213,7 @@ def test_a_starved_block_is_as_bad_as_the_worst_of_all_places(time_constant_tick
         swing = 1e3 * np.abs(moved - command)[rests].max(axis=0)
         worst = np.maximum(worst, np.maximum(swing, residual_um(points, judged.modes, TICK, still_mm=1e-9)))
     assert worst[0] > 100.0
-    # A stop rings by the speed at which it happens. What still swings from before adds a little, up or down, so that a
+    # A stop rings by the speed at which it happens. What is left from before adds a little, up or down, so that a
     # place with slightly less speed may be the worst: hence a lower bound for the few places that are tried.
     for axis, theirs in zip("xy", worst, strict=False):
         assert 0.98 * theirs <= case["residual_um"][axis] <= 1.005 * theirs, (axis, worst)

@@ -1,7 +1,7 @@
 """Random programs by seed: what a mill is asked to do, over decades of feed, length and radius.
 
 Every program is valid. Coordinates are whole least increments, so that each word is exact; a move lasts some
-milliseconds to half a second at its feed, so that hundreds of programs can be played.
+milliseconds to half a second at its feed, so that hundreds of programs can be simulated.
 """
 
 from __future__ import annotations

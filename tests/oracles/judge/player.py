@@ -22,7 +22,7 @@ def starts(moves: Sequence[Move]) -> Vector:
     """Start position of every move, shape (n, 3), chained from the first one by the displacements.
 
     An axis that is unknown at the first move counts from 0 until a move starts from a known position; so
-    programs in G91 from an unknown origin can be played. Raises ValueError where a displacement is unknown.
+    programs in G91 from an unknown origin can be simulated. Raises ValueError where a displacement is unknown.
     """
     out = np.zeros((len(moves), 3))
     at = np.zeros(3)
@@ -42,7 +42,7 @@ def _speeds(moves: Sequence[Move], override: float) -> list[float]:
             raise ValueError(f"line {move.line}: a rapid has no programmed feed; play cutting blocks only")
         speed = move.feed * override / _SECONDS_PER_MINUTE
         if not speed > 0.0 or math.isinf(speed):
-            raise ValueError(f"line {move.line}: feed {move.feed} mm/min times {override} cannot be played")
+            raise ValueError(f"line {move.line}: feed {move.feed} mm/min times {override} cannot be simulated")
         speeds.append(speed)
     return speeds
 

@@ -266,7 +266,7 @@ class Flow:
         p = next((int(w.value) for w in words if w.letter == "P"), None)
         if len(self.stack) == 1:
             if p is None:
-                raise Alarm(self.line, "M99 in the main program: it would begin anew for ever")
+                raise Alarm(self.line, "M99 in the main program: it would start again without end")
             self.jump(frame, p)
             return
         frame.repeats -= 1
