@@ -54,7 +54,7 @@ def program_input(metavar: str = "IN") -> tuple[Row, ...]:
     return ("input", metavar, None, "CNC program"), *MACHINE, PROGRAM
 
 
-def plots(what: str = "write pictures (PNG and SVG) of the region that vibrates most into this folder") -> Row:
+def plots(what: str = "write pictures (PNG and SVG) of the cut that vibrates most into this folder") -> Row:
     """``--plots DIR`` with the help *what*."""
     return "--plots", "DIR", None, what
 

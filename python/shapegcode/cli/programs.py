@@ -62,7 +62,7 @@ SIMULATE = Interface(
          "start in any case"),
         options.plots(
             "write pictures (PNG and SVG) into this folder: the motion in time, and path, feed and vibration of the "
-            "region that vibrates most"
+            "cut that vibrates most"
         ),
         *RESULT,
     ),
@@ -221,7 +221,7 @@ def _time(args: argparse.Namespace) -> int:
 
 TIME = Interface(
     "Predicts the cycle time of an unchanged program in closed form, and checks it by computing every set-point. "
-    "Reports cutting, rapids, in-position, dwells, acceleration, tool changes; by tool; slowest regions and blocks. "
+    "Reports cutting, rapids, in-position, dwells, acceleration, tool changes; by tool; slowest cuts and blocks. "
     "For a machine calibrated with run logs also the 95 % interval, and which log would narrow it. "
     "Exit code 0; 1: closed form and full interpolation differ by more than 0.5 %; 2: bad input.",
     (

@@ -105,7 +105,7 @@ def _tried(pair: Pair[N], cut: CutOutcome) -> Pair[N | None]:
 
 def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[model.Section]:
     if len(conversion.cuts) > 1:
-        how = "Select the cuts to shape: the sums are updated, and the command below shapes only them."
+        how = "The command below shapes ticked cuts. Gain: residual or contour falls by this at most."
         parts, many = (_picker(conversion, provenance),), len(conversion.cuts) > _SHOWN_CUTS
         yield model.Section("cuts", "Cut by cut", parts, how=how, folded=many, printed=False)
     if conversion.tolerance_curve is not None:

@@ -341,7 +341,7 @@ def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
         "sensitivity to unverified parameters: assumed values, changed one at a time",
         columns,
         rows,
-        caption=f"{tried} values changed, one at a time, in the cut closest to a limit",
+        caption=f"{tried} tested in the cut closest to a limit; small effects left out",
         row_style=lambda row: "red" if row.tested_um > row.limit_um else "",
     )
 

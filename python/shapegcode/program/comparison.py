@@ -143,7 +143,7 @@ class KindCount:
 
     @property
     def differs(self) -> bool:
-        """Whether one program has some that the other lacks."""
+        """Whether the programs differ in this kind."""
         return not self.original == self.emitted == self.unchanged
 
     @property

@@ -243,7 +243,7 @@ def _first(good: Callable[[int], bool], fewest: int, most: int, stride: int) -> 
 
 
 def _samples(mode: _core.Mode, ratios: tuple[float, ...], period_s: float, steps: int) -> FloatArray | None:
-    """The kernel's samples between its ends, `steps` periods apart; None if one is negative or a zero is missed."""
+    """Samples inside a kernel of `steps` periods; None if one is negative or a zero is missed."""
     x = 2.0 * np.arange(1, steps) / steps - 1.0
     count = 2 * len(ratios) + 1
     basis = legendre.legvander(x, count - 1) * (1.0 - x * x)[:, None]

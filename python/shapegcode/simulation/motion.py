@@ -46,7 +46,7 @@ class MotionEnvelope:
             self._merge()
 
     def _merge(self) -> None:
-        """Merge intervals in pairs; a last one without a partner goes back to the samples not yet in one."""
+        """Merge intervals in pairs; one left over becomes samples that are not yet in an interval."""
         pairs = len(self._low) // 2
         if len(self._low) % 2:
             # Its two extremes represent it until its interval is full.

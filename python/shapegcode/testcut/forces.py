@@ -34,7 +34,7 @@ class Engagement:
 
 
 def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: FloatArray, *, up: bool) -> Engagement:
-    """Engagement of a pass with the tool's axis at each X, exact for straight pieces of its edge."""
+    """Engagement in a pass at each X of the tool's axis, exact for stock edges of straight lines."""
     radius = tool.radius_mm
     edge_x, edge_y = np.array(measuring.edge_x_mm), np.array(measuring.edge_height_mm)
     x = np.asarray(x_mm, dtype=np.float64)

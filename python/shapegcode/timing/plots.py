@@ -1,4 +1,4 @@
-"""The picture of ``shapegcode time``: time by tool and by region."""
+"""The picture of ``shapegcode time``: time by tool and by cut."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def plots_of(time: CycleTime) -> dict[str, Plot]:
 
 
 def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
-    """Plot the time by parts: one bar per tool, and one for each of the longest regions.
+    """Plot the time by parts: one bar per tool, and one for each of the longest cuts.
 
     Of many tools, only those with the longest times are drawn.
 
@@ -55,7 +55,7 @@ def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
     if regions:
         names = ["lines {} to {}, {}".format(*region.lines, tool_name(region.tool)) for region in regions]
         _bars(panels[1], names, [vars(region) for region in regions], used)
-        panels[1].set_title(f"the {len(regions)} longest regions", loc="left", fontsize=10)
+        panels[1].set_title(f"the {len(regions)} longest cuts", loc="left", fontsize=10)
     return panels[0]
 
 

@@ -238,7 +238,7 @@ class CycleTime(TimeParts, Result):
         return tuple(Figure(name, "s", None, getattr(self, key), 2, key_after=key) for key, name in shown.items())
 
     def tables(self) -> list[Table]:
-        """Tables of parts, tools, the slowest regions and blocks."""
+        """Tables of parts, tools, the slowest cuts and blocks."""
         found = [self._parts_table()]
         if self.tools:
             found.append(self._tools_table())
@@ -279,7 +279,7 @@ class CycleTime(TimeParts, Result):
     def _slowest_table(self) -> Table:
         regions, blocks = self.slowest_regions(), self.slowest_blocks()
         rows: list[tuple[str, str, RegionTime | BlockTime]] = [
-            *(("{} to {}".format(*region.lines), f"region, {tool_name(region.tool)}", region) for region in regions),
+            *(("{} to {}".format(*region.lines), f"cut, {tool_name(region.tool)}", region) for region in regions),
             *((str(block.line), f"block, {block.kind.replace('_', ' ')}", block) for block in blocks),
         ]
         columns = (
@@ -293,7 +293,7 @@ class CycleTime(TimeParts, Result):
         return Table("slowest", columns, rows, sections=(len(regions),))
 
     def plots(self) -> Mapping[str, Plot]:
-        """`time`: time by tool and by region; none for a program without time."""
+        """`time`: time by tool and by cut; none for a program without time."""
         return self._drawn_beside() if self.cycle_time_s > 0.0 else {}
 
     def csv_lines(self) -> Iterator[str]:
