@@ -25,7 +25,7 @@ using tests::Outcome;
 using tests::Trial;
 
 constexpr double allowed_ratio = 1.001;
-constexpr double allowed_segment_s = 10.0;  // the longest segments take some seconds
+constexpr double allowed_segment_s = 20.0;  // the longest segments take some seconds
 constexpr std::size_t most_steps = 20'000'000;
 constexpr std::uint32_t wide_each = 20;  // these take twenty times as long
 constexpr std::array order_names{"speed", "acceleration", "jerk"};

@@ -21,7 +21,7 @@ void keeps_its_limits(std::uint32_t seed, const Trial& trial, std::size_t max_st
   CHECK(outcome.ended);
   CHECK(outcome.arrived);
   CHECK(outcome.late_plans == 0);  // steps wait for plans
-  CHECK(outcome.longest_segment_s <= 10.0);
+  CHECK(outcome.longest_segment_s <= 20.0);
 }
 
 // All of them, for each was a fault once; the first one under sanitizers.
@@ -57,7 +57,7 @@ TEST_CASE("limits are kept while a shaper follows a position") {
 }
 
 TEST_CASE("a segment behind a corner at which filters leave the tolerance is not crawled through") {
-  for (const std::uint32_t seed : some_of({842U})) keeps_its_limits(seed);
+  for (const std::uint32_t seed : some_of({842U, 1619U})) keeps_its_limits(seed);
 }
 
 TEST_CASE("a motion that begins in a rounding finds it as it was, though less is planned there") {

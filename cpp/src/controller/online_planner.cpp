@@ -262,13 +262,16 @@ void OnlinePlanner::join(Section& section) const noexcept {
   section.after = last_number_;
   section.start = start_;
   section.first_period = last_->first_period + start_;
+  // What was bound to the spindle has come to rest there long ago.
+  const bool is_bound = last_->is_bound && start_ > 0;
   for (std::size_t i = 0; i < section.before.size(); ++i) {
-    // What was bound to the spindle has come to rest there long ago.
-    const std::size_t back = last_->is_bound && start_ > 0 ? 0 : i;
+    const std::size_t back = is_bound ? 0 : i;
     section.before[i] = last_->at(static_cast<std::ptrdiff_t>(start_) - static_cast<std::ptrdiff_t>(back));
   }
+  // Nor do the filters hold anything of what came before a rest in which they have settled.
+  const bool is_settled = settled_ && periods_ahead() <= 0 && section.before[0].point.state.speed <= 0.0;
   for (std::size_t i = 0; i < section.past.size(); ++i) {
-    const std::size_t back = last_->is_bound && start_ > 0 ? 0 : i;
+    const std::size_t back = is_bound || is_settled ? 0 : i;
     section.past[i] = back < start_ ? xyz(last_->points[start_ - back - 1]) : last_->past[back - start_];
   }
 }
@@ -491,8 +494,8 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
       PlannedSegment& less = (*ring_)[i];
       if (is_faster) less.feed_share *= feed / speed;
       const double most = std::max(beyond, off_path);
-      // With the motion under way still less does not help: what is beyond them has its cause in what is fixed.
-      if (most > kept && (!is_moving || less.limit_share >= least_share)) {
+      // Still less does not help: what is beyond them has its cause in what is fixed. From rest nothing is.
+      if (most > kept && less.limit_share > (is_moving ? least_share : useful_share)) {
         less.limit_share *= std::clamp(1.0 / most, most_less, least_less);
       }
       // What is still beyond them when little is planned is run from rest to rest.
