@@ -496,7 +496,7 @@ bool OnlinePlanner::keeps(const Section& section, bool reduces) noexcept {
       const double most = std::max(beyond, off_path);
       // Still less does not help: what is beyond them has its cause in what is fixed. From rest nothing is.
       if (most > kept && less.limit_share > (is_moving ? least_share : useful_share)) {
-        less.limit_share *= std::clamp(1.0 / most, most_less, least_less);
+        less.limit_share *= std::clamp(1.0 / most, most_less, off_path > kept ? least_less : 1.0);
       }
       // What is still beyond them when little is planned is run from rest to rest.
       if (less.limit_share < least_share && !less.is_fixed && !plan_.is_covered(i)) less.stop = true;

@@ -12,8 +12,8 @@ namespace shapegcode {
 inline constexpr double planned_share = 0.9998;
 inline constexpr double kept = 1.0009;
 inline constexpr double kept_feed = 1.0009;
-/// Beyond that less is planned around there: at once at most by the first factor and at least by the second; below the
-/// first share from rest to rest, and nowhere less than the second.
+/// Beyond that less is planned around there: at once at most by the first factor and, where the filters behind leave
+/// the tolerance, at least by the second; below the first share from rest to rest, and nowhere less than the second.
 inline constexpr double most_less = 0.7;
 inline constexpr double least_less = 0.97;
 inline constexpr double least_share = 0.3;
