@@ -402,8 +402,20 @@ def random_paths(driver: Path, count: int) -> tuple[str, list[float]]:
             above = sum(group[order]["above"] for group in groups)
             lines[-1].append(f"{most['worst']:.6f} (seed {most['seed']}, {above} above {ALLOWED_RATIO})")
             worst.append(most["worst"])
-        worst += [np.inf] if lost else []
-    text = markdown(["paths with", "number", "not at their end", *(f"{order} / limit" for order in orders)], lines)
+        longest = max((group["segment_s"] for group in groups), key=lambda found: float(found["worst"]))
+        lines[-1].append(f"{longest['worst']:.1f} s (seed {longest['seed']})")
+        crawls = sum(group["segment_s"]["above"] for group in groups)
+        worst += [np.inf] if lost or crawls else []
+    text = markdown(
+        [
+            "paths with",
+            "number",
+            "not at their end",
+            *(f"{order} / limit" for order in orders),
+            "longest time in a segment",
+        ],
+        lines,
+    )
     totals = ", ".join(
         f"{sum(part[key] for part in parts)} {what}"
         for key, what in (("set_points", "set-points"), ("overrides", "overrides"), ("holds", "holds"))
