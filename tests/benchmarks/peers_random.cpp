@@ -47,40 +47,41 @@ void write_path(std::FILE* trace, const Trial& trial) {
   }
 }
 
+// The largest of many values, and how many are above what is allowed.
+struct Largest {
+  double worst = 0.0;
+  std::uint32_t seed = 0;
+  std::size_t above = 0;
+
+  void add(double value, double allowed, std::uint32_t of_seed) {
+    above += value > allowed ? 1 : 0;
+    if (value <= worst) return;
+    worst = value;
+    seed = of_seed;
+  }
+  void print(const char* name, int decimals) const {
+    std::printf(", \"%s\": {\"worst\": %.*f, \"seed\": %u, \"above\": %zu}", name, decimals, worst, seed, above);
+  }
+};
+
 // The worst of many paths.
 struct Summary {
   std::size_t paths = 0;
   std::size_t lost = 0;
-  std::array<double, 3> worst{};
-  std::array<std::uint32_t, 3> seed{};
-  std::array<std::size_t, 3> above{};
-  double longest_segment_s = 0.0;
-  std::uint32_t longest_seed = 0;
-  std::size_t crawls = 0;
+  std::array<Largest, 3> ratios;
+  Largest segment_s;
 
   void add(const Outcome& outcome, std::uint32_t of_seed) {
     ++paths;
     lost += outcome.ended && outcome.arrived ? 0 : 1;
-    crawls += outcome.longest_segment_s > allowed_segment_s ? 1 : 0;
-    if (outcome.longest_segment_s > longest_segment_s) {
-      longest_segment_s = outcome.longest_segment_s;
-      longest_seed = of_seed;
-    }
-    for (std::size_t order = 0; order < worst.size(); ++order) {
-      above[order] += outcome.worst[order] > allowed_ratio ? 1 : 0;
-      if (outcome.worst[order] <= worst[order]) continue;
-      worst[order] = outcome.worst[order];
-      seed[order] = of_seed;
-    }
+    segment_s.add(outcome.longest_segment_s, allowed_segment_s, of_seed);
+    for (std::size_t i = 0; i < ratios.size(); ++i) ratios[i].add(outcome.worst[i], allowed_ratio, of_seed);
   }
   void print(const char* name) const {
     std::printf(", \"%s\": {\"paths\": %zu, \"lost\": %zu", name, paths, lost);
-    for (std::size_t order = 0; order < worst.size(); ++order) {
-      std::printf(", \"%s\": {\"worst\": %.7f, \"seed\": %u, \"above\": %zu}", order_names[order], worst[order],
-                  seed[order], above[order]);
-    }
-    std::printf(", \"segment_s\": {\"worst\": %.3f, \"seed\": %u, \"above\": %zu}}", longest_segment_s, longest_seed,
-                crawls);
+    for (std::size_t i = 0; i < ratios.size(); ++i) ratios[i].print(order_names[i], 7);
+    segment_s.print("segment_s", 3);
+    std::printf("}");
   }
 };
 

@@ -268,7 +268,7 @@ def reader_options(machine: Machine, *, emitted: bool = False) -> _core.ReaderOp
     options = _core.ReaderOptions()
     controller, given = machine.controller, machine.input
     options.calculator_decimal_point = controller.calculator_decimal_point
-    options.absolute_arc_centres = given.arc_centre == "absolute" and not emitted
+    options.absolute_arc_centres = given.arc_centre == "absolute"
     options.least_increment_mm = controller.least_increment_mm
     options.least_increment_inch = controller.least_increment_inch
     options.arc_without_centre_is_line = given.arc_without_centre == "line"
