@@ -1,7 +1,10 @@
 """What a person sees of every command: help in groups, examples that parse, how much is said, tables that fit."""
 
 import argparse
+import os
 import shlex
+import subprocess
+import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from command import run
-from shapegcode.cli import COMMANDS, parser_of
+from shapegcode.cli import COMMANDS, ExitCode, parser_of
 from shapegcode.cli.arguments import GROUPS, examples
 from shapegcode.results.table import Column, Table
 
@@ -160,3 +163,17 @@ def test_escape_codes_are_for_terminals_that_want_colours(no_colour: str, monkey
     stream = Terminal()
     output_console(file=stream).print("answer", style="bold red")
     assert ("\x1b" in stream.getvalue()) == (not no_colour)
+
+
+@pytest.mark.parametrize("words", ["shaper --mode 46", "time {part} -m vx500", "time {part} -m vx500 --json -"])
+def test_a_closed_pipe_ends_the_command_with_its_exit_code(words: str, tmp_path: Path) -> None:
+    part = tmp_path / "part.nc"
+    part.write_text(PART)
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        command = [sys.executable, "-m", "shapegcode", *shlex.split(words.format(part=part))]
+        done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    finally:
+        os.close(writer)
+    assert (done.returncode, done.stderr) == (ExitCode.BROKEN_PIPE, "")

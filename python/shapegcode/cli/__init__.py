@@ -212,7 +212,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return _run([word for word in words if word != _DEBUG])
     except SystemExit as stop:
-        # argparse ends the process itself: 0 after --help, 2 after a wrong argument.
+        # argparse ends the process itself: 0 after --help, 2 after a wrong argument; rich with 1 after a closed pipe.
+        if isinstance(stop.__context__, BrokenPipeError):
+            return ExitCode.BROKEN_PIPE
         return stop.code if isinstance(stop.code, int) else ExitCode.BAD_INPUT
     except BrokenPipeError:
         # Python flushes standard output again at exit: redirect it to the null device.

@@ -126,7 +126,7 @@ class Spending:
         self._period_s = machine.controller.interpolation_period_s
         self._max_periods = math.floor(machine.shaping.max_duration_s / self._period_s + _ROUNDING)
         self._fixed_period = machine.emission.block_period_s is not None
-        self._keepable = [keepable(region, machine) for region in program.regions]
+        self._keepable = [keepable(region, program) for region in program.regions]
         self._unit_um = [residual_floor_um(region, machine) or 1.0 for region in program.regions]
         self._longer = False  # the block period is longer than it would be without the budget
         self._before: TextNeeds | None = None

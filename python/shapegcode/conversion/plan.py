@@ -516,7 +516,7 @@ class ConversionPlan:
 
     def is_keepable(self, index: int) -> bool:
         """True if a cut can be left unchanged."""
-        return keepable(self.program.regions[index], self.machine)
+        return keepable(self.program.regions[index], self.program)
 
     def leave(self, index: int, reason: str, gained_um: float | None) -> None:
         """Leave a cut unchanged."""

@@ -298,7 +298,7 @@ class TextWriter:
             raise self._program.region_error(region, str(error)) from error
 
     def _keep(self, region: _core.Region, reason: str) -> str:
-        if not keepable(region, self._machine):
+        if not keepable(region, self._program):
             why = f"{reason}; its arcs have absolute centres and cannot be left unchanged"
             raise self._program.region_error(region, why)
         place = self._program.place(region.first_line)

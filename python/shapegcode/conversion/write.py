@@ -103,9 +103,9 @@ def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_p
     )
 
 
-def keepable(region: _core.Region, machine: Machine) -> bool:
-    """True if a region may be left unchanged in an emitted program: not with absolute arc centres."""
-    return machine.input.arc_centre != "absolute" or region.path.largest_sweep_rad <= 0.0
+def keepable(region: _core.Region, program: Program) -> bool:
+    """True if a region of a program may be left unchanged in the emitted one: no arc with an absolute centre."""
+    return not program.has_absolute_arc_centres or region.path.largest_sweep_rad <= 0.0
 
 
 class OverBudgetError(Exception):

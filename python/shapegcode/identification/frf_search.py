@@ -33,7 +33,7 @@ _MAX_CHANGES, _ROUNDS = 60, 4  # largest number of changes of a model: with few 
 _FEWEST = 12  # a window with no more lines is not fitted
 _DEGREE = 2  # polynomial degree of a window's background
 _CLEAR, _OPPOSED = 6.0, 8.0  # gain needed by a mode beyond the information criterion; more if opposite to the force
-_TWINS = 0.02  # modes nearer than this fraction of their width are one
+_TWINS = 0.02  # modes nearer than this fraction of half their half-power width are one
 _START_DAMPING = (0.005, 0.02, 0.06)
 _NO_VIBRATION = 0.5
 
@@ -413,7 +413,7 @@ def _apart(fit: ModalFit) -> Starts:
     order = np.argsort(np.max(np.abs(fit.residues), axis=0))[::-1]
     kept: list[int] = []
     for index in order:
-        width = 2.0 * _TWINS * fit.zeta[index] * fit.omega[index]
+        width = _TWINS * fit.zeta[index] * fit.omega[index]
         if fit.zeta[index] <= _NO_VIBRATION and all(abs(fit.omega[index] - fit.omega[i]) > width for i in kept):
             kept.append(int(index))
     starts = starts_of(fit)
