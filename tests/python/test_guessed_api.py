@@ -113,6 +113,8 @@ def test_a_simple_machine() -> None:
     assert machine.axes.z.modes == ()
     assert sg.convert(TEXT, machine).machine == "simple"
     assert machine.to_toml().count("max_acceleration_mm_s2 = 3000.0  # assumed") == 3
+    both = sg.Machine.simple(modes={"x": [sg.Mode(46, 0.02, excited_by=[1.0, 0.5, 0.0])]}).axes.x.modes[0]
+    assert both.excited_by is not None and both.excited_by.as_tuple() == (1.0, 0.5, 0.0)
     stated = sg.Machine.simple(modes={"x": 46}, max_acceleration_mm_per_s2=2000.0)
     assert stated.axes.x.max_acceleration_mm_s2 == 2000.0
     assert "max_acceleration_mm_s2 = 2000.0  # assumed" not in stated.to_toml()

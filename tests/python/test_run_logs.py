@@ -282,7 +282,7 @@ def test_a_clock_that_goes_back_in_a_log_without_states_makes_two_runs(tmp_path:
 def test_values_that_overtake_each_other_are_sorted(tmp_path: Path) -> None:
     run = only(tmp_path, LOG.replace("08:10:02.0000000Z|Block_Number|8", "08:10:00.4900000Z|Block_Number|8"))
     assert values(run.block) == [(-0.1, 1), (0.49, 8), (0.5, 7), (5.0, 12)]
-    assert run.notes == ("line 8: its time stamp is 0.110 s before that of the line before; sorted",)
+    assert run.notes == ("line 8: its time stamp is 0.110 s before that of the line above; sorted",)
 
 
 def test_a_silence_within_a_run_is_a_gap(tmp_path: Path) -> None:

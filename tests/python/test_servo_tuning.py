@@ -132,7 +132,7 @@ def test_refused(how: dict[str, Any], why: str, tmp_path: Path) -> None:
 def test_an_axis_that_the_file_names_is_no_other_one(tmp_path: Path) -> None:
     path = write(tmp_path / "ast.xml", "MX1")
     assert sg.identify(path, sg.ReadOptions(axis="x")).axis == "x"
-    with pytest.raises(sg.RecordError, match="contains the X axis, asked for is Y"):
+    with pytest.raises(sg.RecordError, match="contains the X axis, but Y is requested"):
         sg.identify(path, sg.ReadOptions(axis="y"))
 
 

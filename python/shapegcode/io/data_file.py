@@ -1,8 +1,8 @@
 """Reads and writes files. Data files must be regular, with limits of size, unpacked size, depth and text length;
 files are written completely or remain unchanged.
 
-All files from outside are opened here: settings, records, logs, dumps, results, programs. So no
-file of a few megabytes takes gigabytes of memory, and no pipe or device blocks a command.
+All input files are opened here, or checked here before a library reads them: settings, records, logs, dumps, results,
+programs. So no file of a few megabytes takes gigabytes of memory, and no pipe or device blocks a command.
 """
 
 import contextlib
@@ -42,7 +42,7 @@ _NOT_STRUCTURE = bytes(set(range(256)) - set(b'[]{}"'))
 _STRING = re.compile(rb'"[^"]*+"')
 _ONE_KIND = bytes.maketrans(b"{}", b"[]")
 _KEY_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
-#: tomllib's time grows with the square of such a key's length.
+#: A key of more than `MAX_DEPTH` parts: tomllib's time grows with the square of its length.
 _LONG_KEY = re.compile(rf"(?<![\w.-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{MAX_DEPTH}}}")
 
 Fault = Callable[[str], Exception]

@@ -195,7 +195,7 @@ class EdgeCapture:
             (n,) values.
 
         Raises:
-            RecordError: the signal is not in the file; the message lists those in it.
+            RecordError: no such axis, or the signal is not recorded for it; the message lists those that are.
         """
         found = self.axis(axis)
         if signal not in found.signals:
@@ -253,7 +253,7 @@ class EdgeCapture:
         return bool(np.any(np.abs(self.position(axis) - self.column("DES_POS", axis)) > TURN_DEG / 2.0))
 
     def speed(self, axis: int | str, *, actual: bool = False) -> FloatArray:
-        """Speed of an axis: differences of its position over two cycles, over one cycle at the ends of a section.
+        """Speed of an axis: differences of its position over two cycles, over one cycle at the ends and next to gaps.
 
         Args:
             axis: number or label.

@@ -61,7 +61,7 @@ def _joined_rows(path: Path, parts: list[_Part]) -> tuple[IntArray, dict[str, Fl
         columns[address] = column = np.ascontiguousarray(values[kept, rank])
         missing = np.flatnonzero(np.isnan(column))
         if missing.size:
-            where = "at all" if missing.size == len(column) else f"in {missing.size} of {len(column)} samples"
+            where = "in any sample" if missing.size == len(column) else f"in {missing.size} of {len(column)} samples"
             notes.append(f"{address}: no value {where}, the first at counter {counter[missing[0]]}")
     return counter, columns, notes
 

@@ -54,7 +54,7 @@ def part_of(text: str) -> str | None:
 
 
 def is_frf_text(path: Path, options: ReadOptions) -> bool:
-    """Whether a text file is a frequency response: its header names a frequency and parts, but no time."""
+    """Whether a text file is a frequency response: .frf, or a header with a frequency and both parts, but no time."""
     if options.time_column is not None or options.period_s is not None:
         return False
     if path.suffix.lower() == ".frf":
@@ -125,7 +125,7 @@ def _says(text: str) -> bool:
 
 
 def _places(table: TextTable, header: list[str], options: ReadOptions) -> dict[str, int]:
-    """Column index of each part: frequency, real and imaginary part, and others that the header names."""
+    """Column index of each part: frequency, real and imaginary part or magnitude and phase, coherence if present."""
     if not any(header):
         if len(header) not in _BARE_COLUMNS:
             raise RecordError(
@@ -216,7 +216,7 @@ def is_mat(path: Path, head: bytes) -> bool:
 
 
 def read_frf_mat(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
-    """Read a frequency response from a MATLAB file: a vector of frequencies, a complex one of the response."""
+    """Read a frequency response from a MATLAB file: a vector of frequencies; a complex response or its two parts."""
     held = _variables(path)
     listed = ", ".join(f"{name} {_shape(value)}" for name, value in held.items()) or "nothing"
     name = next((each for each in held if each.lower() in (*_FREQUENCIES, *_ANGULAR)), None)
@@ -339,7 +339,7 @@ def read_servo_tuning(path: Path, options: ReadOptions) -> list[FrequencyRespons
     root = _root(path)
     axis, warnings = _axis(path, root)
     if options.axis and axis and options.axis != axis:
-        raise RecordError(f"{path}: contains the {axis.upper()} axis, asked for is {options.axis.upper()}")
+        raise RecordError(f"{path}: contains the {axis.upper()} axis, but {options.axis.upper()} is requested")
     controller = next(root.iter("DynamicModelPositionController840DSL"), None)
     plant = _lines(path, controller, "m_pPlant")
     if plant is None:

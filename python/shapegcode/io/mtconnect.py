@@ -181,7 +181,7 @@ class _Document:
             self._now = None if item is None else (item, attributes, self._here)
 
     def _item(self, name: str, kind: str, given: str, identity: str) -> Item | None:
-        """Identify a data item by id or name, else by element and sub-type."""
+        """Identify a data item by an id or name that `items` states, else by element and sub-type."""
         chosen = {one.strip().lower() for one in self._table.chosen.values()}
         if {given.lower(), identity.lower()} & chosen:
             return self._table.find(given or identity, identity)
@@ -282,7 +282,7 @@ class _Odd:
         return item
 
     def pairs(self, number: int, line: bytes, fields: list[bytes]) -> tuple[tuple[Item, bytes], ...]:
-        """(item, value) pairs of a line; empty for other lines, which are noted."""
+        """(item, value) pairs of a line; empty for other lines, noted unless blank, comment or asset text."""
         if self.until:
             if line.strip() == self.until:
                 self.until = b""

@@ -127,7 +127,7 @@ class _Chooser:
         return factor
 
     def time(self) -> _Column | None:
-        """The column of the time; None: no column, and a period is stated."""
+        """The column of the time; None: no column, but an option or the preamble states the period."""
         options = self.options
         if options.time_column is not None:
             index = self._named(options.time_column, "--time-column")
@@ -146,7 +146,7 @@ class _Chooser:
         return _Column(index, self.labels[index], self._factor(index, "time", options.time_unit))
 
     def force(self) -> _Column | None:
-        """The column of the force; None: no column, a free decay."""
+        """The column of the force; None, for a free decay: no column, or --ignore-force."""
         options = self.options
         if options.ignore_force:
             return None

@@ -27,7 +27,7 @@ class Record:
     """Samples of one tap (with force) or of one free decay (without).
 
     Attributes:
-        source: file, with the number of the impact or the channel, for messages.
+        source: file, with column, dataset or impact if it has several, for messages.
         period_s: time between two samples.
         response: (n,) in the unit of `quantity`.
         quantity: what the sensor measured.
@@ -92,7 +92,7 @@ class ReadOptions:
         force_unit: unit of the force.
         response_unit: unit of the response.
         period_s: time between two samples, if the file has no time, or to check it.
-        quantity: measured quantity, if the file does not state it.
+        quantity: measured quantity, if the file does not state it; in a universal file it also selects the responses.
         force_scale: N per unit in the file; integer WAV: N at full scale.
         response_scale: m/s², m/s or m (see *quantity*) per unit in the file; integer WAV: at full scale.
         response_first: in a WAV file, the response is the first channel and the force the second.
@@ -166,7 +166,7 @@ def per_volt(option: str, text: str, allowed: tuple[Measured, ...]) -> tuple[Uni
 
 
 def stated_unit(text: str | None, allowed: tuple[Measured, ...]) -> Unit | None:
-    """The unit of an option, checked against the allowed quantities."""
+    """Unit stated by an option; None: not stated, unknown, or of a quantity that is not allowed."""
     unit = find_unit(text) if text else None
     return unit if unit is not None and unit.measures in allowed else None
 
@@ -182,7 +182,7 @@ _NAMES: dict[str, Quantity] = {
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
-    """Response over force at one point, line by line.
+    """A measured frequency response: response over force, one value per frequency.
 
     Attributes:
         source: file and dataset or column, for messages.
@@ -292,7 +292,7 @@ def ratio_unit(text: str) -> tuple[Unit, float] | None:
 
 
 def scale_of(where: str, label: str, options: ReadOptions) -> tuple[Quantity, float, list[str]]:
-    """Quantity and factor to SI of a response over force, by options, unit or name."""
+    """Quantity, factor to SI and warnings for a response over force, by options, unit or name."""
     force = stated_unit(options.force_unit, ("force",))
     over = options.force_scale or (1.0 if force is None else force.factor)
     named = options.quantity or next((_NAMES[word] for word in words_of(label) if word in _NAMES), None)
@@ -399,7 +399,7 @@ def even_period(
         raise UnevenTimeError(row, text, ascending=True)
     if share > _REPORTED_DEVIATION and not coarse:
         return period, [
-            f"times are up to {100 * share:.0f} % of a period from even spacing: assumed rounding, with the mean "
+            f"times are up to {100 * share:.0f} % of a period from even spacing: rounding is assumed, with a "
             f"period of {period:.6g} s"
         ]
     return period, []
@@ -419,8 +419,8 @@ _LONGEST_STEP = 3.0  # longest step relative to the mean: a longer one limits th
 _REACH = 16  # sinc of this many samples on either side in a Kaiser window with 80 dB, flat up to .4 of the grid's rate
 _BETA = 7.86
 _RIDGE = 1e-6
-#: Minimum factor on confidence intervals: content of the pulse above the band of the grid is an error in addition to
-#: the noise, which a fit to the resampled data does not detect.
+#: Minimum factor on confidence intervals: in addition to the noise, content of the pulse above the band of the grid is
+#: an error that a fit to the resampled data does not detect.
 _MIN_WIDENED = 3.0
 
 
@@ -461,7 +461,7 @@ def even_grid(times_s: FloatArray) -> EvenGrid:
 
 
 def resample(values: FloatArray, times_s: FloatArray, grid: EvenGrid) -> FloatArray:
-    """Band-limited signal on a grid that fits the samples best: least squares of sinc functions."""
+    """Values on a grid of the band-limited signal that fits the samples best: least squares of sinc functions."""
     offset = float(np.mean(values))
     at = (times_s - grid.times_s[0]) / grid.period_s
     first = np.floor(at).astype(int) - _REACH + 1

@@ -26,7 +26,7 @@ from shapegcode.io.units import Label, Meaning, Measured, factor_between, read_l
 LogFormat = Literal["shdr", "mtconnect", "edge", "csv"]
 
 MAX_VALUES = 4_000_000  # values of one run: 10 hours at 100 per second; about 60 MB
-_SHORTEST_NAME = 4  # of a name without its prefix: NIST_PLATE-12 is PLATE-12; OP2 may not be BOX_OP2
+_SHORTEST_NAME = 4  # of a name that may lack its prefix: PLATE-12 is NIST_PLATE-12; OP2 may not be BOX_OP2
 _TABLE_LINES = 100
 _SHDR_LINE = re.compile(rb"[^|\r\n]*\d[^|\r\n]*\|[^|\r\n]+\|")
 
@@ -116,7 +116,7 @@ def iter_run_logs(
 
 
 def _format(path: Path, stated: LogFormat | None) -> LogFormat:
-    """Format of a file by its content; with a stated format only check that it is not empty."""
+    """Format of a file by its content; a stated one is returned unless the file is empty or binary."""
     if stated is not None and stated not in get_args(LogFormat):
         raise RecordError(f"format {stated!r}: must be one of {', '.join(get_args(LogFormat))}")
     head = head_of(path)

@@ -1,6 +1,6 @@
 """Runs of programs in a log: values of their items over time; cut out of the events of a log.
 
-A run lasts from ACTIVE to PROGRAM_COMPLETED, in any control's words.
+A run lasts from ACTIVE to PROGRAM_COMPLETED, READY or the like; `run_items.STATES` has the words of controls.
 """
 
 from __future__ import annotations
@@ -53,18 +53,18 @@ class RunLog:
         spindle_rpm: speed of the spindle in 1/min.
         feed_override: ratio, 1: 100 %.
         rapid_override: ratio of the rapid override.
-        position_mm: (axis, positions in mm or degrees) of the logged axes.
+        position_mm: (axis, positions) of X, Y and Z, if logged; mm is assumed if the log states no unit.
         holds: (start_s, duration_s) of logged holds, interruptions and stops.
         program: program name in the log; None: no name.
         notes: gaps and ignored data, with the line.
         block_counts: meaning of `block`: "line" of the program file, from 1, or "sequence": N words.
         block_texts: (time_s, text) of the blocks, if the log has their text.
-        gaps: (start_s, duration_s) of long times without log entries: a dwell, a long block, or the log
-            or its clock was interrupted.
+        gaps: (start_s, duration_s) of more than 30 s without log entries: a dwell, a long block, or the log or its
+            clock was interrupted; in a Sinumerik Edge file, of any missing samples.
         lines: first and last line of the run in the file; (0, 0) if the file has no lines.
-        ended_by: status at the end, such as "PROGRAM_COMPLETED"; None: the log ends before.
+        ended_by: status at the end, such as "PROGRAM_COMPLETED"; None: `cut_end`, or the log has no status.
         cut_start: the log began within the run.
-        cut_end: the log ended, or its clock was set back, within the run.
+        cut_end: the log ended, its clock was set back, or the status became UNAVAILABLE or OFF, within the run.
     """
 
     source: str
@@ -91,7 +91,7 @@ class RunLog:
 
     @property
     def complete(self) -> bool:
-        """Whether the log contains the run from its start to its end."""
+        """False if the log lacks the start or the end of the run."""
         return not (self.cut_start or self.cut_end)
 
 
@@ -101,12 +101,12 @@ _SIGNALS: tuple[Role, ...] = (
     "block", "sequence", "feed", "tool", "spindle", "feed_override", "rapid_override", "runtime", *_AXES,
 )  # fmt: skip
 _COUNTS: frozenset[Role] = frozenset({"block", "sequence"})
-#: Items whose last value before the start is valid in the run; feed and block are not.
+#: Items whose last value before the start stays valid in the run; that of feed and block does not.
 _KEPT: frozenset[Role] = frozenset({"tool", "spindle", "feed_override", "rapid_override"})
-_LEAD_IN_S = 1.0  # a status is polled: values that are this much earlier belong to the run, too
+_LEAD_IN_S = 1.0  # a status is polled: values up to this much earlier belong to the run, too
 _NAME_S = 5.0  # largest delay of the program name after the start
 _LATE_START = 50  # a larger first block number is no start of a program
-_RESTART_BLOCKS = 20  # a program restarted after a hold goes back by more blocks
+_RESTART_BLOCKS = 20  # a program that restarts after a hold goes back by more blocks than this
 _CLOCKS_APART_S = 3.0  # allowed difference of clocks: whole seconds, shown late
 _CLOCKS_APART = 0.01
 
@@ -194,7 +194,7 @@ class RunPart:
         return self.holds[-1] if self.holds and self.holds[-1].end is None else None
 
     def restarted(self, tracks: Sequence[Track]) -> Iterator[RunPart]:
-        """Split the run where the program restarted after a stop, although the log shows no end."""
+        """Split the run where the program restarted after a hold or stop, although the log shows no end."""
         rest = self
         for hold in self.holds:
             if hold.end is None or not hold.resumed[0] or not _began_again(hold, rest, tracks):
@@ -417,7 +417,7 @@ class RunCutter:
                                "or its clock was interrupted")  # fmt: skip
             return
         if step >= -_DISORDER_S:
-            self.notes.add("disorder", line, f"its time stamp is {-step:.3f} s before that of the line before; sorted")
+            self.notes.add("disorder", line, f"its time stamp is {-step:.3f} s before that of the line above; sorted")
             return
         then = "" if run is None else "; the run ends there, its rest is ignored"
         if run is None and self._state == "unknown" and self._moved():
@@ -433,7 +433,7 @@ class RunCutter:
         self._first = line, time, stamp.decode("latin-1").strip()
 
     def _full(self, line: int) -> Iterator[RunLog]:
-        """Handle too many values: an error within a run; between runs old ones are dropped."""
+        """Handle too many values: a held run ends, a running one is an error; between runs old values are dropped."""
         if self._open is not None and self._open.held is not None:
             yield from self._finish(self._open.held.start, self._open.held.word)
         elif self._open is not None:

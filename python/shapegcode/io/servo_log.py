@@ -1,4 +1,4 @@
-"""Reads servo logs: CSV with a header, time and axis positions, with any column names."""
+"""Reads servo logs: text with columns of time and axis positions, identified by words in their names."""
 
 import re
 from dataclasses import dataclass
@@ -93,7 +93,7 @@ def _columns(table: TextTable) -> _Columns:
 
 
 def is_servo_log(path: Path, head: bytes) -> bool:
-    """Whether a file is text whose header names command and actual position of an axis."""
+    """Whether a file is text whose header names the commanded and the actual position of an axis."""
     if b"\0" in head or not any(word.encode() in head.lower() for word in _ACTUAL):
         return False
     try:
@@ -116,7 +116,7 @@ def _time_unit(table: TextTable, label: Label, step: float) -> float:
 
 
 def _length_factors(table: TextTable, columns: _Columns) -> list[float]:
-    """Factors to mm of the columns after the time; a column without a unit has that of the others, else mm."""
+    """Factors to mm of the columns after the time; a column without a unit has that of the first other one, else mm."""
     labels = [columns.labels[index] for index in columns.used[1:]]
     units = [unit_of(table.where, label, ("displacement",), "specify it with --units") for label in labels]
     factors = [None if unit is None else factor_between(unit, "mm") for unit in units]

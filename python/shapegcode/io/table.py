@@ -23,7 +23,7 @@ _LOG_HEAD_BYTES = 65_536
 
 
 def chunks(path: Path) -> Iterator[bytes]:
-    """Yield pieces of a file as UTF-8, without a byte order mark."""
+    """Yield pieces of a file without a byte order mark; UTF-16 becomes UTF-8."""
     decoder: codecs.IncrementalDecoder | None = None
     first = True
     with DataFile(path) as file:
@@ -40,7 +40,7 @@ def chunks(path: Path) -> Iterator[bytes]:
 
 
 def line_chunks(path: Path) -> Iterator[list[bytes]]:
-    """Yield the lines of a file in batches, without line ends."""
+    """Yield the lines of a file in batches, without line feeds."""
     rest = b""
     for piece in chunks(path):
         lines = (rest + piece).split(b"\n")
@@ -149,10 +149,10 @@ class Layout:
     decimal_comma: bool  # numbers have a decimal comma
     header: list[str]  # cells of the header; empty: no header
     header_line: int  # its line, from 1
-    units: list[str]  # cells of the row of units below it; empty: no such row
+    units: list[str]  # cells of the row of units below it (LabVIEW: in the preamble); empty: no such row
     first_row: int  # line of the first row of numbers, from 1
     columns: int  # cells of that row
-    skipped: int  # lines of text before the header
+    skipped: int  # lines before the header
     period_s: float | None = None  # sampling period that the preamble states
 
 

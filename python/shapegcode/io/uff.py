@@ -235,8 +235,8 @@ def whole_values(where: str, data: dict[str, Any]) -> npt.NDArray[Any]:
 def _force_of(path: Path, response: _Channel, forces: list[_Channel], responses: list[_Channel]) -> _Channel:
     """Find the force of a response.
 
-    The force at the response's reference; of several, the one with its version, load case or function number if these
-    distinguish measurements; else by their order in the file.
+    It is at the response's reference, if a force is. Of several, it has the response's version, load case or function
+    number, if these distinguish measurements; else the order in the file decides.
     """
 
     def alike(channel: _Channel, channels: list[_Channel]) -> list[_Channel]:
@@ -323,7 +323,7 @@ def is_frf_uff(path: Path, options: ReadOptions) -> bool:
 
 
 def read_frf_uff(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
-    """Read the frequency responses of a universal file: of several that of the driving point, if present."""
+    """Read the frequency responses of a universal file: of several only those at the driving point, if present."""
     file = UffFile(path, options)
     functions = _functions(file)
     units = next((file.dataset(k) for k, kind in enumerate(file.types) if kind == 164), None)
@@ -414,7 +414,7 @@ def _point(data: dict[str, Any]) -> str:
 def _scale(
     where: str, data: dict[str, Any], units: dict[str, Any] | None, options: ReadOptions
 ) -> tuple[Quantity, float, list[str]]:
-    """Quantity and factor to SI: from options, labels, dataset 164, types of the ordinate."""
+    """Quantity, factor to SI and warnings, from options, labels, type of the ordinate and dataset 164."""
     kind, denominator = int(data["ordinate_spec_data_type"]), int(data["orddenom_spec_data_type"])
     if kind in _FORCES and denominator in _RESPONSES:
         raise RecordError(f"{where}: force over response (an apparent mass or stiffness): export response over force")
@@ -449,7 +449,7 @@ def _scale(
 
 
 def _coherence(data: dict[str, Any], coherences: list[dict[str, Any]], lines: int) -> FloatArray | None:
-    """Coherence of the same points, if in the file."""
+    """Coherence of the same points with as many lines; None: not in the file."""
     for other in coherences:
         same = all(_place(other, which) == _place(data, which) for which in ("rsp", "ref"))
         values = np.real(np.asarray(other["data"]))

@@ -1,7 +1,7 @@
 """Units in the spellings of measuring programs (``m/s^2``, ``m_s2``, ``kgf``), and labels of columns that contain them.
 
 `read_label` splits every label in the same way: ``Acc_X [m/s^2]``, ``time_ms``, ``Kraft / N``, or a name with its unit
-in the row below. Meanings of names differ: ``x`` is an acceleration along X in a tap file, a position in a record of
+in the row below. Meanings of names differ: ``x`` is a response along X in a tap file, a position in a record of
 forces. So each file type has its own names; those of tap files are here, since universal files share them.
 """
 
@@ -242,7 +242,7 @@ def tap_label(text: str, unit_text: str = "") -> Label:
 
 
 def _tap_names(name: str) -> Meaning | None:
-    """The names of time, force and responses in English and German, alone or among other words."""
+    """Meaning of a name that contains an English or German word for time, force or a response, or an axis."""
     words = words_of(name)
     axis = next((word for word in words if word in {"x", "y", "z"}), None)
     found: list[Measured] = []

@@ -66,7 +66,7 @@ class Drive(TomlTable):
         "static friction of the guideways, not below the sliding one; stribeck and lugre need it"
     )
     friction_stribeck_velocity_mm_per_s: Positive = key(
-        "speed at which the friction has fallen from static to sliding", assumed=5.0
+        "speed at which 63 % of the fall from static to sliding friction is reached", assumed=5.0
     )
     friction_smoothing_velocity_mm_per_s: Positive = key(
         "speed within which the friction changes its sign (stribeck only)", assumed=0.1
@@ -171,7 +171,7 @@ class AxisMode(TomlTable):
         default=1.0,
     )
     excited_by: Direction | None = optional(
-        "shares of the accelerations of X, Y and Z that excite this mode, { y = 1, z = 0.2 }; left out: that of its "
+        "factors of the accelerations of X, Y and Z that excite this mode, { y = 1, z = 0.2 }; left out: that of its "
         "axis alone, { y = 1 } under axes.y. A mode that several axes excite is listed under one of them only"
     )
     moves: Direction | None = optional(
@@ -200,7 +200,7 @@ class AxisMode(TomlTable):
     )
 
     def excitation(self, axis: int) -> tuple[float, float, float]:
-        """Ratios of the accelerations of X, Y, Z that excite a mode of an axis (0, 1, 2)."""
+        """Factors of the accelerations of X, Y, Z that excite a mode of an axis (0, 1, 2)."""
         return _along(axis) if self.excited_by is None else self.excited_by.as_tuple()
 
     def motion(self, axis: int) -> tuple[float, float, float]:
@@ -227,7 +227,7 @@ def _along(axis: int) -> tuple[float, float, float]:
 
 
 class Axis(TomlTable):
-    """Limits of one axis; a machine file has a table for each of X, Y and Z."""
+    """Limits, vibration modes and feed drive of one axis; a machine file has a table for each of X, Y and Z."""
 
     max_feed_mm_per_min: _Speed = key("largest cutting feed of this axis", fanuc="1430")
     rapid_mm_per_min: _Speed = key("rapid traverse (G00)", fanuc="1420")

@@ -58,7 +58,7 @@ def import_parameters(
         or a built-in one.
 
     Raises:
-        MachineError: not a dump, an implausible value, or a limit of an axis that neither dump nor base has.
+        MachineError: not a dump or table, an implausible value, or a limit of an axis that neither dump nor base has.
         ArgumentError: modes to keep for an axis without modes in the base, or for a rigid one.
         OSError: a file cannot be read.
     """
@@ -263,7 +263,7 @@ def _axes(ini: _Ini, unit_mm: float) -> tuple[dict[str, dict[str, float]], dict[
 
 
 def _controller(ini: _Ini, remarks: dict[str, str]) -> Iterator[tuple[str, Any]]:
-    """Servo period and planner settings."""
+    """Kind of control, rule of block timing, servo period and planner settings."""
     yield "kind", "linuxcnc"
     # Blocks are not rounded to periods: the remainder is carried into the next block.
     yield "block_end", "carry"

@@ -52,7 +52,7 @@ class LinuxcncPlanner(TomlTable):
         assumed=0.0,
     )
     ramp_frequency_hz: Annotated[Positive, Field(ge=0.001, le=1e6)] = key(
-        "[TRAJ] ARC_BLEND_RAMP_FREQ: in a segment shorter than its inverse the speed is a linear ramp",
+        "[TRAJ] ARC_BLEND_RAMP_FREQ: in a segment that takes less time than its inverse the speed is a linear ramp",
         assumed=100.0,
     )
     kink_ratio: Annotated[Positive, Field(ge=0.001, le=1)] = key(
@@ -120,8 +120,8 @@ class Controller(TomlTable):
     )
     dialect: Literal["auto", "fanuc", "linuxcnc", "haas", "siemens"] = key(
         'dialect in which programs are read. "auto": recognized by words that only one control has; a warning '
-        "names the word; without such a "
-        "word LinuxCNC's with kind = \"linuxcnc\", else FANUC's. A program with words of another control is refused",
+        "names the word; without such a word it is LinuxCNC's with kind = \"linuxcnc\", else FANUC's. A stated "
+        "dialect refuses programs with words of another control",
         default="auto",
     )
     linuxcnc: LinuxcncPlanner | None = optional('settings of kind = "linuxcnc"; left out: the control\'s own defaults')
@@ -145,8 +145,8 @@ class Controller(TomlTable):
         assumed="look_ahead",
     )
     law: Literal["constant_time", "jerk_limited"] = key(
-        'speed change before interpolation. "constant_time": it lasts time_constant_s for any step; '
-        '"jerk_limited": by the acceleration and jerk of the axes',
+        'speed change before interpolation. "constant_time": it lasts time_constant_s for any step, longer where an '
+        'axis needs more; "jerk_limited": by the acceleration and jerk of the axes',
         assumed="constant_time",
     )
     time_constant_s: _Time = key(
@@ -156,7 +156,8 @@ class Controller(TomlTable):
         assumed=0.05,
     )
     bell_time_s: _Time = key(
-        "time constant of bell-shaped acc./dec.; length of the second moving average; 0: none",
+        "time constant of bell-shaped acc./dec. (look-ahead), or length of the second moving average (after "
+        "interpolation); 0: none",
         fanuc="1772",
         assumed=0.0,
     )
@@ -186,8 +187,8 @@ class Controller(TomlTable):
         "largest centripetal acceleration in arcs; it limits the feed there", fanuc="1735", assumed=1000.0
     )
     polyline_acceleration_mm_s2: Positive | None = optional(
-        "the same where two lines of a polyline meet; left out: as in arcs; with another corner_rule than "
-        '"speed_difference" not limited'
+        "largest centripetal acceleration where two lines of a polyline meet; left out: as in arcs with "
+        'corner_rule = "speed_difference", else not limited'
     )
     junction_deviation_mm: Annotated[Positive, Field(le=10)] | None = optional(
         'deviation at a corner, passed at the acceleration of the axes; corner_rule = "junction_deviation" needs it'
@@ -396,7 +397,7 @@ class MCodeTimes(InlineTable):
 
 
 class SpindleTimes(InlineTable):
-    """Time of the spindle over its speed: linear between the rows, and from 0 below the first."""
+    """Time of the spindle over its speed: linear from 0 and between the rows, constant beyond the last."""
 
     rpm: tuple[Positive, ...] = key("speeds, ascending", unit="1/min")
     s: tuple[Seconds, ...] = key("times", unit="s")
@@ -419,7 +420,7 @@ class TimeScatter(InlineTable):
     """Standard deviations of times that no parameter explains."""
 
     cuts_percent: Annotated[NonNegative, Field(le=100)] = key("scatter of the cutting time of a tool")
-    between_cuts_s: Seconds = key("scatter of the time between two cutting sections")
+    between_cuts_s: Seconds = key("scatter of the time between two cuts")
     runs_percent: Annotated[NonNegative, Field(le=100)] = key("scatter between repeated runs of a program")
 
 
@@ -477,7 +478,8 @@ class Times(TomlTable):
         "while the axes move; the control waits for the remainder before the next M code or cut; left out: none"
     )
     spindle_stop: SpindleTimes | None = optional(
-        "likewise to rest after M05; M00, M01, M02, M30, M06 and the next M03 wait for the remainder; left out: none"
+        "time of the spindle from a speed to rest after M05, as spindle_start; M00, M01, M02, M30, M06 and the next "
+        "M03 or M04 wait for the remainder; left out: none"
     )
     unknown_move_s: AxisTimes = key(
         "time of a rapid whose start or end the program does not give: G28, G30, G53, and the first one "

@@ -28,7 +28,7 @@ class Dialect:
     control: str  # its name
     facts: Mapping[str, Fact]  # by topic
     same: frozenset[str]  # words with the same meaning as on a FANUC control
-    # replacements of words; empty: the word is left out
+    # replacements of words; "": the word is left out
     becomes: Mapping[str, str] = field(default_factory=dict)
     means: Mapping[str, str] = field(default_factory=dict)  # words with another meaning, for the error message
     # words whose meaning depends on the setup of the control
@@ -52,7 +52,7 @@ class Dialect:
     least_block_s: float | None = None  # shortest block of the control; None: not known
     # lines that switch the feed override off, and on again; empty: none are known
     lock: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
-    lock_word: str = ""  # word that switches it off in a shaped block, written in each instead of those lines
+    lock_word: str = ""  # word that switches the override off, written in each shaped block instead of these lines
     # lines before and after a block with G09 ("" after: the word of the active path mode); None: G09 is a plain word
     exact_stop: tuple[str, str] | None = None
     header: tuple[str, ...] = ()  # comments for the operator

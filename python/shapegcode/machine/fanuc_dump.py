@@ -227,12 +227,12 @@ class DumpValues:
         return [entry for entry in found if entry is not None]
 
     def bit(self, number: int, bit: int) -> bool | None:
-        """A bit of a parameter, counted from the right; None if the dump does not contain it."""
+        """A bit of a parameter, counted from the right, from 0; that of X if per axis; None: missing or malformed."""
         entry = self.dump.get(number) or next(iter(self.entries(number)), None)
         return None if entry is None else self.bit_of(entry, bit)
 
     def bit_of(self, entry: Entry, bit: int) -> bool | None:
-        """A bit of a value, counted from the right; if it is not eight bits, note a problem and return None."""
+        """A bit of a value, counted from the right, from 0; if it is not eight bits, note a problem and return None."""
         if len(entry.text) != 8 or set(entry.text) - {"0", "1"}:
             name = f"parameter {entry.number} {entry.target}".rstrip()
             self.problems.append(Problem(name, entry.text, "must be eight bits, 0 or 1", entry.line))
@@ -404,7 +404,7 @@ def take_modes(draft: Draft, base: Machine | None, keep: str, rigid: str) -> Non
         key = f"axes.{axis}"
         if axis in keep:
             if not modes:
-                raise ArgumentError(f"{axis.upper()}: {base.name if base else 'no base machine'} has no mode to keep")
+                raise ArgumentError(f"{axis.upper()}: {base.name if base else 'without --from it'} has no mode to keep")
             draft.remarks[f"{key}.rigid"] = "its modes are kept"
             continue
         for name in ("modes", "rigid"):

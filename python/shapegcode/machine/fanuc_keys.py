@@ -62,7 +62,7 @@ def _limits_and_law(draft: Draft) -> bool:
     # The 16i family has 1770 and 1771 without 1769 or 1772.
     before = bool(numbers) and (numbers[0] == 1770 or filter_ms is not None or bell_ms is not None)
     if before:
-        why = "the dump has acceleration before interpolation, but whether it is on the program decides (G05.1, G08)"
+        why = "the dump has acceleration before interpolation, but the program decides whether it is on (G05.1, G08)"
         if values.bit(1604, 0):
             draft.set("controller.motion", "look_ahead", 1604, *numbers)
         else:

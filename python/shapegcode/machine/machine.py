@@ -189,7 +189,7 @@ class Machine(TomlTable):
         )
 
     def all_remarks(self) -> dict[str, str]:
-        """The remarks, with one for every default, so that a written default keeps its origin.
+        """The remarks, with one for every default that has a value, so that a written default keeps its origin.
 
         Returns:
             By dotted key, for keys of the machine.
@@ -205,7 +205,7 @@ class Machine(TomlTable):
         """Copy the machine with other provenance of its values.
 
         Args:
-            remarks: by dotted key, replacing the existing ones; see `shapegcode.settings.keys` for their form.
+            remarks: by dotted key; those of other keys are kept; see `shapegcode.settings.keys` for their form.
 
         Returns:
             A new machine; this one is unchanged.
@@ -222,7 +222,7 @@ class Machine(TomlTable):
 
     @property
     def dial_positions(self) -> tuple[float, ...]:
-        """Feed override ratios for which override-tolerant blocks are made, 0.1 apart: by [verdict], or 0.7 to 1.2."""
+        """Override ratios of override-tolerant blocks: ends of [verdict] (or 0.7, 1.2), multiples of 0.1 between."""
         low, high = self.verdict.override_percent
         if low == high == 100.0:
             low, high = _USUAL_DIAL_PERCENT
@@ -243,7 +243,8 @@ class Machine(TomlTable):
             The machine with its defaults.
 
         Raises:
-            MachineError: the file is not TOML or has wrong keys or values; every problem is listed.
+            MachineError: the file is not TOML or has wrong keys or values; every problem is listed. Also for a name
+                without folder and suffix that is neither a file nor a built-in machine.
             OSError: the file cannot be read.
         """
         if isinstance(path_or_name, str) and path_or_name in cls.builtin_names():
@@ -343,7 +344,7 @@ class Machine(TomlTable):
         Args:
             data: tables of the file, as parsed from TOML.
             source: their name in messages.
-            text: the file, for line numbers.
+            text: the file, for line numbers and origins in comments.
 
         Returns:
             The machine with its defaults.
@@ -397,7 +398,7 @@ class Machine(TomlTable):
 
         Args:
             remarks: origin of a value by dotted key (modes count from 1: ``axes.x.modes.1.frequency_hz``), written
-                after the key and into [origin]; replacing the machine's own.
+                after the key and into [origin]; each replaces the machine's own.
             short: leave out defaults and the descriptions of keys.
 
         Returns:
@@ -465,7 +466,7 @@ _OF_A_MACHINE = ("axes.", "controller.", "times.", "power_on.", "feed_control.")
 
 
 def inherited_text(name: str) -> str:
-    """A built-in machine's file as a template: its measured values become inherited."""
+    """A built-in machine's file as a template: values of the machine that are not assumed become inherited."""
     from shapegcode.settings.edit import with_remarks
 
     text = Machine.builtin_text(name)
@@ -477,7 +478,13 @@ def inherited_text(name: str) -> str:
     return with_remarks(text, remark)
 
 
-def _table_of(mode: float | Mode) -> dict[str, float]:
+def _table_of(mode: float | Mode) -> dict[str, float | dict[str, float]]:
     if not isinstance(mode, Mode):
         return {"frequency_hz": mode, "damping_ratio": _ASSUMED_DAMPING_RATIO}
-    return {"frequency_hz": mode.frequency_hz, "damping_ratio": mode.damping_ratio, "participation": mode.participation}
+    directions = {"excited_by": dict(zip("xyz", mode.excited_by, strict=True))} if any(mode.excited_by) else {}
+    return {
+        "frequency_hz": mode.frequency_hz,
+        "damping_ratio": mode.damping_ratio,
+        "participation": mode.participation,
+        **directions,
+    }

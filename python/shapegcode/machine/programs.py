@@ -13,7 +13,7 @@ from shapegcode.settings.keys import Bool, Float, NonNegative, Positive, Text, T
 
 
 def _named(pattern: str, wrong: str, shown: Callable[[str], str] = json.dumps) -> AfterValidator:
-    """Refuse names in a table that do not match the pattern."""
+    """Make a validator that refuses names in a table that do not match the pattern."""
 
     def check(table: dict[str, Any]) -> dict[str, Any]:
         for name in table:
@@ -165,7 +165,7 @@ class Emission(TomlTable):
         unit="digits",
     )
     block_period_s: Annotated[Positive, Field(le=1)] | None = optional(
-        "duration of a short block: a whole multiple of controller.interpolation_period_s and not below "
+        "duration of a shaped block that is not merged: a multiple of controller.interpolation_period_s, not below "
         "controller.block_time_s; left out: chosen for the shortest shaper"
     )
     prologue: tuple[Text, ...] = key(
@@ -173,8 +173,8 @@ class Emission(TomlTable):
     )
     epilogue: tuple[Text, ...] = key("lines written after each shaped cut", default=())
     override: Literal["ask", "any", "lock"] = key(
-        'treatment of the feed override in shaped cuts. "ask": the header asks the operator for 100 %; but as '
-        '"any" if verdict.override_percent is wider. "lock": lock_lines switch the feed override off before each '
+        'treatment of the feed override in shaped cuts. "ask": the header asks the operator for 100 %; with a wider '
+        'verdict.override_percent it acts as "any". "lock": lock_lines switch the feed override off before each '
         'shaped cut, unlock_lines switch it on again after it; "any": blocks of equal duration and a block period for '
         "which other overrides cause little vibration (a larger program)",
         default="ask",
@@ -206,12 +206,12 @@ class Emission(TomlTable):
     )
     compensation_guard: Literal["alarm", "stop"] = key(
         'where cutter compensation was expanded: "alarm" compares the offset in the control with the expanded radius '
-        'and raises an alarm if it differs; "stop" halts with M00 for the operator to compare (always if '
-        "programs are drip fed, where IF cannot run)",
+        'and raises an alarm if it differs; "stop" halts with M00 for the operator to compare (always where IF cannot '
+        "run: drip feed, no macros, another dialect)",
         default="alarm",
     )
     header: Bool = key(
-        "write comments: program version, machine, modes, block period, shaper duration, override, time constant",
+        "write comments: shapegcode version, machine, modes, block period, shaper duration, override, time constant",
         default=True,
     )
     failed_suffix: Annotated[str, Strict(), Field(min_length=1, pattern=r"^[^/\\\x00-\x1f]+$")] = key(
@@ -226,8 +226,8 @@ class Emission(TomlTable):
         default=0.02,
     )
     merge_tolerance_increments: NonNegative = key(
-        "blocks are merged into one if path and feed stay within this many least increments; "
-        "0: only where they agree exactly",
+        "blocks are merged into one that deviates from the shaped command by this many least increments at most, per "
+        "axis; 0: only where they agree exactly",
         unit="increments",
         default=0.35,
     )
@@ -278,12 +278,12 @@ class Emission(TomlTable):
 
     @property
     def locking(self) -> tuple[str, ...]:
-        """Lines that switch the feed override off, in the dialect's words; empty if it is not locked."""
+        """Lines that switch the feed override off, in the dialect's words; empty: not locked, or by `lock_word`."""
         return self._override_lines(0, self.lock_lines)
 
     @property
     def unlocking(self) -> tuple[str, ...]:
-        """Lines that switch the feed override on again, in the dialect's words; empty if it is not locked."""
+        """Lines that switch the feed override on again, in the dialect's words; empty: as `locking`."""
         return self._override_lines(1, self.unlock_lines)
 
     def _override_lines(self, rank: int, stated: tuple[str, ...]) -> tuple[str, ...]:
@@ -310,7 +310,7 @@ class Emission(TomlTable):
 
     @property
     def leaves_look_ahead(self) -> bool:
-        """True if the prologue switches a look-ahead mode off: G05.1 Q0 or G08 P0."""
+        """True if the prologue leaves a look-ahead mode off: its last such word is G05.1 Q0 or G08 P0."""
         last = [found for line in self.prologue for found in _LOOK_AHEAD.findall(line)]
         return bool(last) and last[-1] == "0"
 
@@ -370,7 +370,7 @@ class Shaping(TomlTable):
     )
     least_gain_um: NonNegative = key(
         "a cut is left unchanged unless shaping lowers residual vibration or the contour error of the machine table by "
-        "at least this; 0: everything is shaped",
+        "at least this; --shape-all shapes such cuts too",
         default=3.0,
     )
     plunge_angle_deg: Annotated[NonNegative, Field(le=90)] = key(
@@ -415,7 +415,7 @@ class Tolerance(TomlTable):
 
 
 class Price(TomlTable):
-    """Limits of the added time: a cut beyond them gets the tightest possible tolerance or is left unchanged."""
+    """Limits of the added time: a cut beyond them gets the tightest tolerance within them or is left unchanged."""
 
     program_time_percent: Annotated[Positive, Field(le=1e6)] = key(
         "largest increase of the program's time", default=10.0

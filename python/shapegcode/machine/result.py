@@ -70,7 +70,7 @@ class ParameterImport(Result):
     Attributes:
         dump: name of the dump.
         machine: the machine described by the dump.
-        read: values stored in keys, in the order of the keys.
+        read: values stored in keys, grouped by key.
         tables_read: keys from tables of offsets or variables.
         assumed: assumed values.
         missing: parameters missing in the dump, not understood or not used.
@@ -231,7 +231,7 @@ class OpenValue(OldNames):
     origin: str  # "assumed", "inherited" or "default"
     tested_value: str = ""  # the changed value, as text; empty: not tested
     effect: str = ""  # its largest effect on a figure, as text; empty: not tested
-    share: float | None = None  # the changed figure relative to its limit; None: not tested
+    share: float | None = None  # change of the figure relative to its limit; None: not tested
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -241,9 +241,9 @@ class MachineDescription(Result):
     Attributes:
         machine: the tables of the machine file, with defaults.
         keys: every value by its dotted key, in the order of the file.
-        warnings: a warning if origins were read from comments, as in older files.
+        warnings: origins that were read from comments, as in older files; remarks on the ranking.
         program: program for which the unverified values were ranked; None: not ranked.
-        matters: unverified values that change its verdict, largest effect first.
+        matters: unverified values that change a figure of its verdict, largest effect first.
         source: file of the machine, or its name, if known.
     """
 

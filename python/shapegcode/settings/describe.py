@@ -107,7 +107,7 @@ class _TomlWriter:
         self._explains = not self._short
 
     def _is_kept(self, key: str, table: keys.TomlTable, name: str, field: FieldInfo) -> bool:
-        """True if the file must contain the key, or has it with an origin."""
+        """True if the short file needs the key: mandatory, not the default, or with an origin to keep."""
         value = getattr(table, name)
         if field.is_required():
             return True

@@ -152,7 +152,7 @@ def _unit_remark(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
 
 
 def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
-    """Hint with the known key most similar to an unknown one."""
+    """Hint with the known key most similar to an unknown one, or with all known ones."""
     parent = tuple(part for part in location[:-1] if not isinstance(part, int))
     field = field_of(root, parent)
     model = root if not parent else table_type(field) if field is not None else None
@@ -245,7 +245,7 @@ def with_values(settings: _Model, values: Mapping[str, object], source: str, err
 
 
 def missing_row(settings: TomlTable, key: str) -> str:
-    """Problem of a dotted key whose list index, from 1, does not exist; empty if there is none."""
+    """Problem of a dotted key with a list index, from 1, that does not exist; empty: no problem."""
     held: Any = settings
     parts = _parts(key)
     for rank, name in enumerate(parts):
