@@ -10,6 +10,7 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import Offset, region_offset
 from shapegcode.program import Program
 from shapegcode.shaping.grid import Grid, choose_grid, make_grid
+from shapegcode.verdict.judge import rapid_vibration_um
 from test_moving_modes import OVER_MASS, OVER_Z, machine_with
 
 HEAD = "%\nO0001\nG21 G90 G94 G17 G54\n"
@@ -97,6 +98,28 @@ def test_an_unknown_position_is_shaped_for_the_nominal_frequency() -> None:
     report = sg.convert(program, machine).to_dict()
     assert any("position of Z is unknown" in warning for warning in report["warnings"])
     assert report["residual_vibration_um"]["emitted"]["x"] < 0.1
+
+
+@pytest.mark.parametrize("system", ["G54", "G55"])
+def test_a_rapid_vibrates_with_the_modes_at_its_position(system: str) -> None:
+    """As on a machine whose mode does not vary and has the frequency at Z 0 (52 Hz) or 400 (41 Hz)."""
+    head, offset_mm = HEAD.replace("G54", system), {"G54": 0.0, "G55": 400.0}[system]
+    moving = machine_with(OVER_Z).with_values("input.work_offsets", {"G55": [0.0, 0.0, 400.0]})
+
+    def rapids(*heights_mm: float, machine: sg.Machine = moving) -> float:
+        lines = [f"G00 X0 Y0 Z{z - offset_mm:g}\nG04 X2.\nG00 X30.\nG01 Y1. F600\nG00 Y0\nG04 X2." for z in heights_mm]
+        program = Program.from_text((head + "\n".join([*lines, "M30", "%", ""])).encode(), machine)
+        return rapid_vibration_um(program, MachineModel(machine)).x
+
+    def fixed(frequency_hz: int) -> sg.Machine:
+        text = sg.Machine.builtin_text("vx500").replace("frequency_hz = 46.0", f"frequency_hz = {frequency_hz}.0", 1)
+        return sg.Machine.from_toml(text)
+
+    low, high = rapids(0.0, machine=fixed(52)), rapids(400.0, machine=fixed(41))
+    assert abs(low - high) > 0.1 * high
+    assert rapids(0.0) == pytest.approx(low, rel=1e-9)
+    assert rapids(400.0) == pytest.approx(high, rel=1e-9)
+    assert rapids(0.0, 400.0) == rapids(400.0, 0.0) == pytest.approx(max(low, high), rel=1e-9)
 
 
 def test_warnings_and_modes_reach_the_report_and_the_header() -> None:

@@ -65,7 +65,7 @@ class Budget:
             load: load of the region.
 
         Returns:
-            The text; empty if none does.
+            The text; empty if it exceeds none.
         """
         for unit, value, limit in self._rates(load):
             if value > limit * (1.0 + _ROUNDING):
@@ -83,7 +83,7 @@ class TextNeeds:
     """Memory, data rate and block rate that a whole program needs."""
 
     bytes: int  # its size
-    baud: float  # required line speed in its section with the most blocks per second, bit/s
+    baud: float  # required line speed in its section with the most characters per second, bit/s
     blocks_per_second: float  # in its busiest section
     block_period_s: float  # block period of the program
 
@@ -103,15 +103,15 @@ class BudgetOutcome(OldNames):
     """Effect of a budget on a conversion."""
 
     limits: Budget  # the budget; null: no limit
-    # needs with every cut shaped; if the budget lengthens the block period: at the period without budget, before any
-    # region is slowed for the contour tolerance
+    # needs before the budget leaves cuts unchanged; if it lengthens the block period: at the period without budget,
+    # before any region is slowed for the contour tolerance
     before: TextNeeds
     after: TextNeeds  # of the emitted program
     block_period_s: float  # block period of the program
     left_unchanged: tuple[GivenUp, ...]  # regions left unchanged
 
 
-# On a longer block period a section may have fewer blocks per period, but hardly below this ratio.
+# Lowest expected ratio of the blocks per period of a section on a longer block period to those before.
 _LEAST_FILLED = 0.5
 _LINES_NAMED = 5  # regions listed in the warning
 
@@ -147,7 +147,7 @@ class Spending:
         periods = measured = round(grid.block_period_s / self._period_s)
         best, best_loads = grid, loads
         while self._factors(best_loads) or periods * self._period_s < best.shaper.duration_s:
-            # A shaper has at least one period; after the first period without excess, shorter shapers are still tried.
+            # After the first period without excess, shorter shapers are still tried; none is shorter than a period.
             factors = self._factors(loads)
             periods = max(periods + 1, math.floor(measured * min(factors, default=1.0) * _LEAST_FILLED))
             if periods > self._max_periods:
@@ -236,7 +236,7 @@ class Spending:
             raise self._too_large_error(original)
         if not loads or size <= limit:
             return {}
-        # Residual vibration removed by shaping a region, worst axis, in units of the tolerance.
+        # Residual vibration removed by shaping a region, worst axis, relative to the one that always passes.
         gain = {
             index: (max(both.original) - max(both.emitted)) / self._unit_um[index]
             for index, both in ((index, simulated[index].residual_vibration_um) for index in loads)

@@ -51,13 +51,13 @@ def convert(
 ) -> Conversion:
     """Shape the cuts of a program, and simulate the whole emitted program for its verdict.
 
-    None: value of the machine file; other values are checked as in a machine file.
+    Options that are None have the value of the machine file; the others are checked like its values.
 
     Args:
         program: the program to convert, or its file.
         machine: controller, modes, tolerances.
         contour: target of contour compensation, "response", "command" or "off": `shaping.contour`.
-        contour_tolerance_um: largest deviation of the target from the path, µm: `tolerance.contour_um`.
+        contour_tolerance_um: permitted deviation of the target from the path, µm: `tolerance.contour_um`.
         shaper: family of the shaper, such as "zvd": `shaping.family`.
         per_axis: one shaper per axis: `shaping.per_axis`.
         planner: planner of a cut before it is shaped, "look-ahead", "optimal" or "auto": `shaping.planner`.
@@ -65,12 +65,12 @@ def convert(
         rapids: write rapids as shaped moves where that saves time: `shaping.rapids`.
         budget: limits of the emitted program; None: no limit.
         arc_feed_ratio: feed on arcs relative to the programmed one, reached before the arc: `shaping.arc_feed_ratio`.
-        block_period_s: duration of a shaped block, s: `emission.block_period_s`; None in both: see `choose_grid`.
+        block_period_s: block period, s: `emission.block_period_s`; None there too: chosen by `choose_grid`.
         max_time_increase_percent: largest increase of the program's time: `price.program_time_percent`.
         max_cut_time_increase_percent: likewise of one cut: `price.cut_time_percent`.
-        only: shape nothing but the cuts in these lines of the original, each first and last; None: all.
-        leave: leave the cuts in these lines unchanged.
-        shape_all: shape every cut whose time stays within the table ``[price]``, even if it gains less than
+        only: ranges of lines (first, last) of the original: shape only the cuts with a line in one of them; None: all.
+        leave: likewise, but leave these cuts unchanged.
+        shape_all: shape every cut that can be shaped within the table ``[price]``, even if it gains less than
             `shaping.least_gain_um`, gets worse, or the program is within tolerance. False: such cuts stay unchanged.
         tolerance_curve: compute the cycle time at other contour tolerances.
         on_progress: called with stage, number of finished parts and number of parts.
@@ -79,12 +79,12 @@ def convert(
         The emitted program with its verdict. No file is written: `conversion.text` is the content of one.
 
     Raises:
-        ProgramError: the program cannot be read, or a region cannot be written.
+        ProgramError: the program cannot be read, is shaped already, or a region cannot be written.
         OSError: its file cannot be read.
         MachineError: a value that is invalid in a machine file.
-        DesignError: no shaper exists on this grid.
-        ArgumentError: the program was read with settings that differ from the machine's; a block period that the
-            controller cannot run, a budget that cannot be kept, lines without a cut.
+        DesignError: no shaper exists within `shaping.max_duration_s`.
+        ArgumentError: the program was read with settings that differ from the machine's; a machine without modes, a
+            block period that the controller cannot run, a budget that cannot be kept, lines without a cut.
         RoundTripError: the emitted program would not be equivalent: a defect of shapegcode.
     """
     stated = {

@@ -63,7 +63,7 @@ def at_the_control(
             f"{worst.limit_um:.1f} µm"
         ]
     size, room = emitted.size, machine.controller.program_memory_bytes
-    fits = "on this machine: " + ("fits" if size <= room else f"does not fit: {no_room(room)}")
+    fits = "in this control's memory: " + ("fits" if size <= room else f"does not fit: {no_room(room)}")
     return (
         ControlNote("memory", f"{size} bytes ({size / _TAPE_CHARACTERS_PER_M:.0f} m of tape); {room} bytes {fits}"),
         ControlNote("drip feed (DNC)", _line(loads, machine)),
@@ -124,7 +124,7 @@ def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_perio
         return f"{needs}{before}; {own.control}: {own.facts['look-ahead'].text}"
     if machine.emission.leaves_look_ahead:
         on = " ".join(machine.emission.epilogue)
-        again = f", {on} after it switches it on again" if on else ""
+        again = f", {on} after the cut switches it on again" if on else ""
         return f"{needs}; {prologue} before each shaped cut switches the look-ahead mode off{again}"
     if prologue:
         return f"{needs}; {prologue} before each shaped cut must select the control's mode for shaped cuts"
@@ -132,7 +132,7 @@ def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_perio
 
 
 def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFigures, model: MachineModel) -> str:
-    """Effect of single block on the cut that vibrates most, each block simulated from rest to rest."""
+    """Effect of single block on the cut that vibrates most; its fastest blocks are simulated from rest to rest."""
     index = max(range(len(placed)), key=lambda each: max(figures.regions[each].residual_vibration_um.original))
     place, region = placed[index], figures.regions[index]
     blocks = place.blocks(emitted)

@@ -278,8 +278,9 @@ def _used_shaper(grid: Grid) -> parts.UsedShaper:
 def prove(original: Program, emitted: Program, machine: Machine, *, rapids_shaped: bool) -> ChangeProof:
     """Compare an emitted program with its original; changes by shaping are allowed.
 
-    The verdict checks the deviation of the response. A shaped command deviates further (up to three tolerances
-    in the conversions of the tests); more than `_PATH_TOLERANCES` and `_PATH_UM` means that a part was left out.
+    The verdict limits the deviation of the response, or of the command if that is the target. The programmed path of
+    the blocks deviates further (up to three tolerances in the conversions of the tests); more than
+    `_PATH_TOLERANCES` and `_PATH_UM` means that a part was left out.
     """
     kinds = {"feeds", "blocks", "calls"}
     kinds |= {"shaped-rapids"} if rapids_shaped else set()
@@ -302,7 +303,7 @@ def recommend(
     """The grade of a program and its reason: the first that applies, from "do not run" upwards.
 
     `original_within`: every cut of the original keeps its limits. `could_gain`: shaping gains enough in some cut, or
-    might. `benefit`: a shaped cut gains enough. `other_changes`: a defect of shapegcode.
+    might. `benefit`: a shaped cut gains enough. `other_changes`: not caused by shaping, so a defect of shapegcode.
     """
     if worse := next((_at(cut, why) for cut in cuts for why in cut.worse), ""):
         return "do not run", worse
@@ -436,7 +437,7 @@ def _text_warnings(plan: ConversionPlan, written: Written, figures: ProgramFigur
     if fast is not None:
         yield (
             f"{program.place(fast.first_line)}: programmed feed {fast.path.fastest_feed_mm_per_s * 60.0:g} mm/min is "
-            f"over every axis' largest ({fastest:g} mm/min, axes.*.max_feed_mm_per_min): shaped at the axes' limits"
+            f"over the limit of every axis ({fastest:g} mm/min, axes.*.max_feed_mm_per_min): shaped at the axes' limits"
         )
     if size > controller.program_memory_bytes:
         yield (

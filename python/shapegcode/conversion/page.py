@@ -105,7 +105,7 @@ def _tried(pair: Pair[N], cut: CutOutcome) -> Pair[N | None]:
 
 def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[model.Section]:
     if len(conversion.cuts) > 1:
-        how = "The command below shapes ticked cuts. Gain: residual or contour falls by this at most."
+        how = "The command below shapes only the ticked cuts. Gain: residual or contour falls by this at most."
         parts, many = (_picker(conversion, provenance),), len(conversion.cuts) > _SHOWN_CUTS
         yield model.Section("cuts", "Cut by cut", parts, how=how, folded=many, printed=False)
     if conversion.tolerance_curve is not None:
@@ -149,7 +149,7 @@ def _further(conversion: Conversion) -> Iterator[model.NextStep]:
             yield model.NextStep(f"At the control, {note.topic}: {note.text}.")
     if conversion.parameter_sensitivity:
         key = conversion.parameter_sensitivity[0].key
-        text = f"Measure {key}: it is assumed, and the verdict depends on it more than on any other parameter."
+        text = f"Measure {key}: of the unverified parameters, the verdict depends most on this one."
         yield model.NextStep(text, "shapegcode identify --tap-plan -m MACHINE.toml" if ".modes" in key else "")
 
 

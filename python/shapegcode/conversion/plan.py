@@ -27,7 +27,7 @@ from shapegcode.verdict.judge import Judge, RegionFigures, most_to_gain_um, rapi
 if TYPE_CHECKING:
     from shapegcode.conversion.rapids.shape import ShapedRapids
 
-_SLOWER = 0.98  # factor below the feed that is just slow enough
+_SLOWER = 0.98  # ratio of the lowered feed to the one that would just suffice
 _LEAST_FEED_RATIO = 0.5  # of the programmed feed: below it, a too high speed has other causes
 _HELPED = 0.98  # ratio of errors: a tighter plan with less improvement is reverted
 _PRICE_MARGIN = 0.995  # ratio of the permitted time used for a plan
@@ -59,7 +59,7 @@ class Aims:
         self.allowed_um = [machine.tolerance.contour_um * _MARGIN] * count  # deviation for which its feed is planned
         self.feed_ratio = [1.0] * count  # ratio of the planned to the programmed feed
         self.original_s: dict[int, float] = {}
-        self.emitted_s: dict[int, float] = {}  # of every cut once shaped, until the set-points rest
+        self.emitted_s: dict[int, float] = {}  # of every cut that was ever shaped, until the set-points rest
         self._asked_s: dict[int, float] = {}  # likewise, for the requested tolerance
         self._blocks_s: dict[int, float] = {}  # time of its blocks
         self._tried: dict[int, _Attempt] = {}
@@ -85,7 +85,7 @@ class Aims:
                 self._asked_s[index] = region.emitted_s
 
     def slow_down(self, written: Written, figures: Sequence[RegionFigures]) -> bool:
-        """Lower the feed of cuts that are too fast along the path. False if there are none."""
+        """Lower the feed of cuts that are too fast along the path. False if no feed was lowered."""
         limit = 1.0 + self._machine.tolerance.feed_excess_ratio
         slower = False
         for place, region in zip(written.placed, figures, strict=True):
@@ -97,7 +97,7 @@ class Aims:
         return slower
 
     def tighten(self, written: Written, figures: Sequence[RegionFigures], judge: Judge) -> bool:
-        """Plan cuts beyond their contour tolerance more tightly, so that they are slower. False if there are none.
+        """Plan cuts beyond their contour tolerance more tightly, so that they are slower. False if no plan was changed.
 
         The bound on the feed treats corners and arcs one by one, but deviations within one shaper duration add up. If
         the planned deviation of a cut is below its tolerance, tightening starts from that deviation (a bound above it
@@ -203,7 +203,7 @@ class Aims:
         return min(self._asked_s[index], self._planned_s(index, tolerance_um * _MARGIN))
 
     def tolerance_curve(self, original_s: float, original_um: float) -> ToleranceCurve | None:
-        """Tolerance against time of the program."""
+        """Tolerance against time of the program; None if no cut was ever shaped."""
         cuts = list(self.emitted_s)
         if not cuts:
             return None
@@ -230,7 +230,7 @@ class Aims:
         return TolerancePoint(name, tolerance_um, time_s, increase, within)
 
     def _planned_s(self, index: int, allowed_um: float) -> float:
-        """Time of a cut planned for a deviation, s, with the simulated cost of slowing."""
+        """Time of a cut planned for a deviation, s; its cost of slowing is scaled to that of the blocks as written."""
         curve, blocks_s = self._curve_of(index), self._blocks_s[index]
         least_s, now_s, then_s = (curve.time_s(um) for um in (math.inf, self.allowed_um[index], allowed_um))
         ratio = max(0.0, blocks_s - least_s) / (now_s - least_s) if now_s > least_s else 1.0
@@ -265,7 +265,7 @@ def _bisect(low: float, high: float, is_enough: Callable[[float], bool]) -> floa
 
 _MARGIN = 0.95  # planned ratio of the tolerance: the rest is for rounding and effects outside the plan
 _FACTORS = (1.0, 1.25, 1.5, 2.0)  # ratios to the requested tolerance at which a cut is planned
-_BETWEEN = (2.8, 4.0, 5.6, 8.0)  # likewise, to refine the curve where the price requires it
+_BETWEEN = (2.8, 4.0, 5.6, 8.0)  # likewise, up to the deviation that needs no slowing
 _FLAT = 0.002  # relative change of time: a flatter curve has no knee
 
 
@@ -278,11 +278,11 @@ class CutCurve:
 
     @property
     def loosest_um(self) -> float:
-        """Tolerance above which no time is saved."""
+        """A planned deviation above which no time is saved, with a margin of 10 %."""
         return self.planned_um[-1] * 1.1
 
     def time_s(self, planned_um: float) -> float:
-        """Interpolate linearly over the logarithm of the deviation; constant beyond the planned points."""
+        """Time at a planned deviation: linear over its logarithm; constant beyond the planned points."""
         if len(self.planned_um) == 1 or not math.isfinite(planned_um):
             return self.times_s[-1]
         return float(np.interp(math.log(planned_um), np.log(self.planned_um), self.times_s))
@@ -293,10 +293,10 @@ class TolerancePoint:
     """The program at one contour tolerance."""
 
     name: str  # "as asked", "1.5 times", "the original's contour error", "no slowing needed"
-    tolerance_um: float  # planned tolerance; without slowing: the deviation reached
+    tolerance_um: float  # contour tolerance; "no slowing needed": smallest from the requested up that slows no cut
     time_s: float  # of the program
     time_increase_percent: float  # over the original
-    is_within_price: bool  # of the program and of each cut
+    is_within_price: bool  # the times of the program and of each cut are within the table [price]
     is_knee: bool = False  # a tighter tolerance costs disproportionately more time
 
     @property
@@ -307,14 +307,14 @@ class TolerancePoint:
 
 @dataclass(frozen=True)
 class ToleranceCurve:
-    """Tolerance against time, of the cuts that can be shaped."""
+    """Tolerance against time, over the cuts that were ever shaped in the conversion."""
 
     points: tuple[TolerancePoint, ...]  # from tight to loose
-    cuts: int  # number of cuts
+    cuts: int  # number of these cuts
 
     @property
     def sentence(self) -> str:
-        """Price of the requested tolerance and of the knee: "15 µm costs +102 %, 25 µm +18 %"; empty without knee."""
+        """Cost of the requested tolerance and the knee: "15 µm costs +102 % time, 25 µm +18 %"; empty without knee."""
         first, knee = self.points[0], next((each for each in self.points if each.is_knee), None)
         if knee is None:
             return ""
@@ -327,7 +327,7 @@ class ToleranceCurve:
 def plan_curve(
     path: _core.Path, fir: _core.Fir, options: _core.ShapingOptions, asked_um: float, original_um: float
 ) -> CutCurve:
-    """Plan a cut at several tolerances, from one that needs no slowing down to the requested one.
+    """Plan a cut at several tolerances: first one that needs no slowing, then tighter ones to the requested one.
 
     Each search starts from the speeds of the search before it.
     """
@@ -382,7 +382,7 @@ class CutCurves:
 
 
 def knee_of(tolerances_um: Sequence[float], times_s: Sequence[float]) -> int | None:
-    """Index of the point furthest below the line from first to last, on logarithmic scales."""
+    """Index of the point furthest below the line from first to last, on logarithmic scales; None: no knee."""
     if len(times_s) < 3 or times_s[0] <= times_s[-1] * (1.0 + _FLAT):
         return None
     x, y = np.log(tolerances_um), np.log(times_s)
@@ -402,7 +402,7 @@ def curve_table(curve: ToleranceCurve) -> Table:
         Column("increase %", value="time_increase_percent", digits=1),
         Column("", value="remarks", text=True),
     )
-    caption = f"cuts that can be shaped: {curve.cuts}"
+    caption = f"cuts shaped or tried: {curve.cuts}"
     return Table("tolerance against time", columns, curve.points, caption)
 
 
@@ -427,7 +427,7 @@ class Shaped:
     written: Written
     emitted: Program
     figures: list[RegionFigures]
-    trackers: list[_core.ContourTracker | None]  # of its cuts; None: text unchanged
+    trackers: list[_core.ContourTracker | None]  # one per shaped cut; None: simulated before with the same text
     started: StartedTrials  # sensitivity trials started early
     rapids: ShapedRapids | None = None  # None: rapids are not shaped
 

@@ -149,7 +149,7 @@ class RestartPlaces:
         self.reason = _why_none(region)  # why there can be none; empty if there can
 
     def low(self, piece: _core.ShapedCommand, at: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Periods of a piece with low commanded speed at which a start from rest keeps the contour tolerance."""
+        """Periods in *at* of low speed where a start from rest keeps the tolerance; their vibration, mm, and speed."""
         grid = np.asarray(piece.grid_mm)
         at = at[(at > 0) & (at < len(grid) - 1)]
         before, behind = (grid[at] - grid[at - 1]) / self._period_s, (grid[at + 1] - grid[at]) / self._period_s
@@ -162,7 +162,7 @@ class RestartPlaces:
     def choose(
         self, at: IntArray, left: FloatArray, end: int, *, last: bool, usable: Callable[[int], bool]
     ) -> Iterator[int]:
-        """Choose restart points, at most one interval apart wherever the command is slow enough."""
+        """Yield indices in *at* of restart points, at most one interval apart wherever the command is slow enough."""
         near = self._interval * _APART
         if last:
             at = at[: np.searchsorted(at, end - near)]

@@ -55,7 +55,7 @@ class ChangeProof:
 
     answer: str  # such as "42 of 42 rapids, 7 of 7 tool calls, 31 of 31 offsets unchanged; programmed …"
     counts: tuple[KindCount, ...]  # for each kind that occurs in one of the programs
-    path_um: float  # largest distance between the paths of a cut, both ways; of the command, not of the table
+    path_um: float  # largest distance between the programmed paths of a cut in both programs, in either direction
     refused: tuple[ProgramDifference, ...]  # differences not explained by shaping; none: proven
 
 
@@ -104,27 +104,27 @@ class Conversion(ProgramFigures, Result):
         machine: name of the machine.
         recommendation: recommendation for the program: one of the five values of `Grade`.
         reason: reason of the recommendation.
-        cuts: every cut, shaped or left unchanged, with its gain and its price.
-        tolerance_curve: what other contour tolerances cost in time; null: not computed, or nothing can be shaped.
+        cuts: every cut, shaped or left unchanged, with its gain and its time.
+        tolerance_curve: what other contour tolerances cost in time; null: not computed, or no cut was ever shaped.
         proof: that only the shaped cuts changed; null: nothing was shaped, or rapids were shaped without a header.
         advice: a smaller filter of the control that makes shaping unnecessary; null: none.
-        cycle_time_s: whole program: cuts, rapids with in-position wait, dwells, drilling cycles.
+        cycle_time_s: whole program: cuts, rapids with in-position wait, dwells, drilling cycles, tool changes, M codes.
         cutting_time_s: the cuts alone, until the set-points rest.
-        block_period_s: common duration of the shaped blocks.
+        block_period_s: block period: a shaped block lasts one, or several where blocks were merged.
         shaper: the shaper; its impulses are whole block periods apart.
         blocks: number of blocks read, and of shaped blocks.
         expanded: true if the original was expanded (calls, macros, coordinate modes) before shaping.
         expanded_radii_mm: radii of cutter compensation included in the path, by offset.
         bytes_read: size of the original, expanded.
         bytes_emitted: size of the emitted program.
-        limits: tolerances that were applied.
-        warnings: caution, before you run.
+        limits: tolerances and price that were applied.
+        warnings: sentences to read before the program is run.
         budget: only with a budget: its limits and effect.
         rapids: only with shaped rapids: their outcome.
         least_gain_um: smallest gain for which a cut is shaped, µm.
-        parameter_sensitivity: unverified values, by the effect of each on the deciding figure relative
-            to its limit.
-        unverified_parameters_tested: number of such values changed, one at a time.
+        parameter_sensitivity: unverified values that matter; first that which increases a figure most, relative to
+            the limit of the figure.
+        unverified_parameters_tested: number of unverified values that were changed, one at a time.
         at_the_control: cautions for loading and running it; empty if nothing was shaped.
         restart_points: blocks inside shaped cuts at which the control can restart.
         emitted: the emitted program, read back.
@@ -209,7 +209,7 @@ class Conversion(ProgramFigures, Result):
 
     @property
     def answer(self) -> str:
-        """Recommendation, figures and price; then missed limits with reasons."""
+        """Recommendation, figures and time; then the first cut beyond its limits, with its remedy."""
         lines = [self._headline(), *self._left_out()]
         if self.recommendation == "do not run" and not any(self.reason in line for line in lines):
             lines.append(self.reason)
@@ -288,7 +288,7 @@ class Conversion(ProgramFigures, Result):
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
         if self.nothing_shaped:
-            # A program read in the wrong unit was simulated at a twenty-fifth of its size or speed.
+            # A program read in the wrong unit was simulated with lengths and speeds wrong by a factor of 25.4.
             if any("(power_on.units)" in warning for warning in self.warnings):
                 return (
                     "check the unit, because the program has neither G20 nor G21: convert it with "
@@ -366,7 +366,7 @@ class Conversion(ProgramFigures, Result):
         ]
 
     def residual_limit_um(self, axis: str) -> float | None:
-        """Limit of the cut with the largest emitted residual, µm.
+        """Limit of residual vibration of an axis in the cut with the largest emitted one, µm.
 
         Args:
             axis: "x", "y" or "z".
@@ -429,7 +429,7 @@ class Conversion(ProgramFigures, Result):
         return replace(scene, variants=(*others, with_verdict))
 
     def page_sections(self, provenance: Provenance | None = None) -> tuple[Section, ...]:
-        """Before and after, sensitivity to unverified parameters, time components, and the operator's run sheet.
+        """Sections of its page, from "Before and after" to the operator's run sheet.
 
         Args:
             provenance: provenance of the result; None: unknown.

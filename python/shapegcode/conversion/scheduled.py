@@ -50,7 +50,7 @@ class ShapedMotion(Mover):
 
 @dataclass(frozen=True, repr=False, eq=False, kw_only=True)
 class ScheduledConversion(Conversion):
-    """A program with scheduled feeds, shaped; `original` is the program with these feeds, not yet shaped.
+    """A program with scheduled feeds, shaped; its `original` figures are of the program with these feeds, unshaped.
 
     Attributes:
         feed_schedule: the schedule; its `emitted` loads are the shaped program's.
@@ -135,7 +135,8 @@ def convert_scheduled(
         The conversion with its feed schedule.
 
     Raises:
-        ProgramError, DesignError, ArgumentError, StockError, RoundTripError: as `schedule_feed` and `convert`.
+        ProgramError, MachineError, DesignError, ArgumentError, StockError, RoundTripError: as `schedule_feed` and
+            `convert`.
     """
     machine = Machine.of(machine)
     surveyed = survey(

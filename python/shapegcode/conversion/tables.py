@@ -40,7 +40,7 @@ class Sensitivity(OldNames):
     value: str  # as in the file, with its unit
     origin: str  # "assumed", or "inherited" from another machine
     tested_value: str  # the changed value, as text
-    figure: str  # the figure that changes most relative to its limit
+    figure: str  # the figure that increases most relative to its limit
     figure_um: float  # that figure with the value of the file
     tested_um: float  # that figure with the changed value
     limit_um: float  # its limit
@@ -111,7 +111,7 @@ class _Region:
 def start_trials(
     judge: Judge, machine: Machine, place: Placed, emitted: Program, tracker: _core.ContourTracker, pool: Executor
 ) -> StartedTrials:
-    """Start the simulations with contour error that `parameter_sensitivity` needs, for a program with one region."""
+    """Start the first simulations with contour error for `parameter_sensitivity`, for a program with one region."""
     region = _Region(place, emitted, judge, tracker)
     trials = filter(region.needs_contour, islice(_trials(machine, region.moving), _FULL_RUNS))
     return {_name(trial): pool.submit(region.simulate, trial, contour=True) for trial in trials}
@@ -366,8 +366,8 @@ class CutOutcome(OldNames):
     tool: int | None  # T number that cuts; null: none programmed before
     is_shaped: bool  # False: it was left unchanged
     reason: str  # why it was left unchanged; empty if shaped
-    # gain of shaping: the larger reduction of residual vibration and contour error; for a cut that was never simulated
-    # as shaped, its upper bound
+    # gain of shaping: the larger reduction of residual vibration and contour error of the machine table; for a cut that
+    # was never simulated as shaped, its upper bound
     gain_um: float
     residual_um: Pair[float]  # residual vibration of the worst axis
     contour_um: Pair[float]  # contour error of the target of the tolerance
@@ -391,7 +391,7 @@ def remedy_for(reason: str) -> str:
     if "--only" in reason or "--leave" in reason:
         return "select it too"
     if "minimum_feed" in reason or "feed" in reason.partition(" ")[0]:
-        return "a programmed feed within controller.minimum_feed_mm_per_min"
+        return "a programmed feed of controller.minimum_feed_mm_per_min or more"
     if "max_program" in reason or "bytes" in reason or "baud" in reason:
         return "a larger size or rate limit for the program: the limits are in the reason"
     return "a lower programmed feed there, or --shape-all to see the effect of shaping"
@@ -496,5 +496,5 @@ class RapidsOutcome(OldNames):
     time_saved_s: float  # total time by which the next cuts can start sooner
     settle_band_um: float  # half the width of the band in which vibration counts as having decayed
     blocks: int  # shaped blocks that replace them
-    slowed_blocks: int  # of these, blocks whose speed step of an axis exceeds the corner limit of the look-ahead
+    slowed_blocks: int  # of these, blocks that look-ahead would slow: speed step or feed of an axis above its limit
     moves: tuple[RapidMove, ...]  # the replaced ones

@@ -1,7 +1,7 @@
 """Translate an emitted FANUC program into the dialect of another control.
 
-Nothing is shaped or simulated here. A word whose meaning differs or is unknown in the dialect is refused with its
-line. The original is translated once before shaping, to refuse it early.
+Nothing is shaped or simulated here. A word without a known equivalent in the dialect is refused with its line,
+unless emission.words replaces it. The original is translated once before shaping, to refuse it early.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Translation:
 
     text: bytes
     lines: npt.NDArray[np.int64]  # line in it, from 1, of each line of the FANUC program
-    blocks: int  # blocks added to those of the FANUC program: chords of arcs
+    blocks: int  # blocks more than in the FANUC program: chords of arcs; negative where blocks are joined (FLIN)
     cautions: tuple[str, ...]  # words whose meaning depends on the setup of the control
 
 
@@ -595,7 +595,7 @@ def _arcs(program: Program) -> Iterator[tuple[int, _core.Segment]]:
 
 
 def _block_times(blocks: _core.Path, period_s: float) -> Iterator[tuple[int, str]]:
-    """Yield line and time of each block in whole periods; as F is rounded up, it ends slightly earlier."""
+    """Yield line and time of each block, s, in whole periods: length / F is slightly less, since F is rounded up."""
     for number, line in enumerate(blocks.segment_lines):
         segment = blocks[number]
         periods = max(1, round(segment.length_mm / segment.feed_mm_per_s / period_s))

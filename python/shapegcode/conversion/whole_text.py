@@ -81,11 +81,11 @@ class Written:
     """The emitted program before its verdict."""
 
     parts: list[bytes]  # of the whole program; empty after it was read back
-    texts: list[tuple[RegionText, int]]  # texts of its shaped regions, and their first bytes
+    texts: list[tuple[RegionText, int]]  # text of each shaped region, and its offset in the program, bytes
     size: int  # bytes of the whole text
     placed: list[Placed]  # its shaped regions
     blocks: int  # shaped blocks in it
-    kept_warnings: list[str]  # a sentence for every region left unchanged
+    kept_warnings: list[str]  # a sentence for every region left unchanged that the tables do not list
     # planned deviation by index of a shaped region, µm, if there is a contour target
     planned_um: dict[int, float]
     loads: dict[int, TransferLoad]  # by index of a shaped region
@@ -108,7 +108,7 @@ class Written:
 class Prefetch(Generic[T]):
     """Runs tasks in a pool, in their order, a few of them before their results are fetched.
 
-    `tasks`: by number; each reports its finished ratio to its argument. `on_progress`: called with the sum of the
+    `tasks`: by number; each calls its argument with its finished ratio. `on_progress`: called with the sum of the
     finished weights, also of parts without a task, by the thread that fetches results; it may be replaced.
     """
 
@@ -174,7 +174,7 @@ class TextWriter:
         self._started: tuple[dict[int, Aim], Prefetch[EmittedRegion]] | None = None
 
     def begin(self, aims: dict[int, Aim]) -> None:
-        """Start to shape a few long regions on idle cores, before their gain is known."""
+        """If there are fewer regions than cores, start to shape them before their gain is known."""
         if len(aims) < cores():
             self._started = aims, self._ahead(aims, lambda _done: None)
             self._started[1].start()

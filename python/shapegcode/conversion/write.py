@@ -1,4 +1,4 @@
-"""Write the shaped blocks of a cutting region, with the lines around them and the positions of N words and comments."""
+"""Write the shaped blocks of a cutting region, the lines around them, and the original's N words and comments."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ class SpaceLeft:
     machine: Machine  # with the limits
 
     def require(self, text_bytes: int, blocks: int) -> None:
-        """Raise NoRoomError beyond the limits; called for each piece, so that at most one is written in vain."""
+        """Raise OverBudgetError beyond the limits; called for each piece, so that at most one is written in vain."""
         controller = self.machine.controller
         if text_bytes > self.bytes:
             limit = f"{controller.max_program_bytes} bytes (controller.max_program_bytes)"
@@ -250,7 +250,7 @@ class RegionWriter:
         space: SpaceLeft | None = None,
         on_progress: Callable[[float], None] = lambda _share: None,
     ) -> EmittedRegion:
-        """Shape one region and write it, from a full safe line to the modal state of the original."""
+        """Shape one region and write it: lines before it with the safe line, blocks, lines that restore the state."""
         options = self.options(limits, tolerance, self._model.offset(region))
         # Periods without the stops for restart points, and the number of stops.
         stopped = self._stop_for_restarts(region, options) if self._machine.emission.restart_stops else (0, 0)
@@ -503,7 +503,7 @@ def linear_lines(
 
 
 def joints_of(lines: Mapping[int, str], numbers: Sequence[int]) -> list[int] | None:
-    """Blocks that must begin a joined block: after other lines, and with N words; None: a line is not only a move."""
+    """Indices of blocks that must begin a joined block: after other lines, with N words; None: not only moves."""
     if not all(_MERE_MOVE.fullmatch(lines[number]) for number in numbers):
         return None
     pairs = enumerate(pairwise(numbers), start=1)

@@ -21,6 +21,7 @@ from shapegcode.machine.axes import Drive
 #: Machine position minus program position of X, Y, Z in mm; None if unknown.
 Offset = tuple[float | None, float | None, float | None]
 NO_OFFSET: Offset = (0.0, 0.0, 0.0)
+UNKNOWN_OFFSET: Offset = (None, None, None)  # modes are nominal: they do not vary
 _AXES = "xyz"
 
 

@@ -55,7 +55,7 @@ class Provenance:
     result: str  # name of its class
     by: str  # "shapegcode" and its version
     format: int  # see `FORMAT`
-    command: str  # as typed; with ``--program all`` for one program
+    command: str  # as typed; of ``--program all`` the command for this program alone
     files: tuple[ProvenanceFile, ...]  # read and written
 
     def file(self, role: str) -> ProvenanceFile | None:

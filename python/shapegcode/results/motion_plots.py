@@ -99,7 +99,7 @@ class Trace:
             zero_s: instant that becomes time zero.
 
         Returns:
-            At least two samples; `stops` if the stop is among them.
+            At least two samples; its `stops` is true if the stop is among them.
         """
         count = len(self.command_mm)
         ranks = (np.array([begin_s, end_s]) - self.start_s) / self.period_s

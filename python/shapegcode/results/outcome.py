@@ -174,7 +174,7 @@ class Outcome(OldNames):
 
     @property
     def answer(self) -> str:
-        """The result in one line: the first line of the command's output."""
+        """The result in one line or a few, with which the command's output begins."""
         raise NotImplementedError
 
     @property
@@ -191,7 +191,7 @@ class Outcome(OldNames):
 
     @property
     def exit_code(self) -> int:
-        """Exit code of the command: 0 done and within tolerance, 1 done but out of tolerance, 2 refused."""
+        """Exit code of the command: 0 done and within tolerance, 1 done but out of it; in some results 2: refused."""
         return 0 if self.ok else 1
 
     def to_dict(self) -> dict[str, Any]:
@@ -271,7 +271,7 @@ class Tracks(Generic[T]):
 class Deviation:
     """Deviation of the command or of the machine table from the programmed path."""
 
-    largest_mm: float  # distance, either side; corners that the track cuts short count too
+    largest_mm: float  # distance, either side; also from each corner of the path to the motion
     left_mm: float  # to the left of the travel, or above
     right_mm: float  # to the right of it, or below
 
@@ -297,7 +297,7 @@ class Deviation:
 class ContourError:
     """Deviation of command or table from the programmed path, µm."""
 
-    max: float  # distance, either side; corners that the track cuts short count too
+    max: float  # distance, either side; also from each corner of the path to the motion
     rms: float  # root mean square over all samples
     left: float  # largest to the left of the travel, or above
     right: float  # largest to the right of it, or below

@@ -227,7 +227,7 @@ def follow(
 ) -> tuple[FloatArray, FloatArray]:
     """Nearest points of a polyline to samples that follow it: distances along it, and positions.
 
-    If it passes a point twice, the distance travelled decides.
+    If it passes a point twice, the distance travelled decides; `complete`: the command travels all of it.
     """
     from scipy.spatial import KDTree
 

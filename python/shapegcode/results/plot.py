@@ -93,7 +93,7 @@ def aligned(panels: Sequence[Axes]) -> Axes:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Format a number for a title: at most *digits* significant digits, never as a power of ten."""
+    """Format a number for a title: *digits* significant digits or all before the point, never as a power of ten."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
     places = max(0, digits - 1 - math.floor(math.log10(abs(value))))

@@ -125,7 +125,7 @@ class Result(Outcome):
 
         Args:
             path: path of the file.
-            script: "inline": all in one file; "beside": the script in a file of the same folder, shared by pages.
+            script: "inline": all in one file; "beside": Plotly's script in a file of the same folder, shared by pages.
 
         Returns:
             The files written.
@@ -190,7 +190,7 @@ class Result(Outcome):
             The arrays.
 
         Raises:
-            ArgumentError: the result has no arrays; the message lists attributes that have.
+            ArgumentError: no such attribute with arrays; the message lists those that exist.
             ModuleNotFoundError: xarray is not installed.
         """
         import xarray as xr

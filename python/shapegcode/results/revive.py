@@ -112,7 +112,7 @@ def provenance_in(report: Mapping[str, Any]) -> Provenance:
 
 
 def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingProxyType({})) -> Result:
-    """A result from its JSON."""
+    """A result from its JSON, with *kept*: values of fields that are not in it."""
     provenance = provenance_in(report)
     package = importlib.import_module("shapegcode")  # every kind of result is public
     cls = getattr(package, provenance.result) if provenance.result in package.__all__ else None

@@ -33,7 +33,7 @@ class Column:
         text: left-aligned text, which wraps; other columns are right-aligned and never wrapped.
         left: left-aligned and never wrapped: a column of names.
         style: rich style of a cell from the row; None: plain.
-        link: link target of a cell on a page, given as `value`; empty: none.
+        link: link target of a cell on a page: attribute or function of the row, as for `value`; empty: none.
         priority: columns with the highest priority are dropped first if the table is too wide, the last one first; 0
             is never dropped, nor is the first column.
     """

@@ -25,7 +25,7 @@ _LEAST_BETTER = 0.3  # relative reduction of a figure that counts as a benefit
 
 @dataclass(frozen=True)
 class Placed:
-    """A region and the lines of its shaped blocks in the emitted program."""
+    """A region and its lines in the emitted program: its shaped blocks, or the cut left unchanged."""
 
     region: _core.Region  # of the original program
     first_line: int  # first emitted line, from 1
@@ -103,15 +103,15 @@ class OverrideResidual:
     """Residual vibration of the emitted program at another feed override."""
 
     override: float  # ratio, 0.9 = 90 %
-    residual_um: Xyz[float]  # maximum over all regions
+    residual_um: Xyz[float]  # maximum over the shaped cuts
 
 
 @dataclass(frozen=True)
 class FrequencyResidual:
-    """Residual vibration of the emitted program with every mode frequency shifted."""
+    """Residual vibration of the emitted program with every mode shifted by its uncertainty."""
 
-    shift: float  # in units of their uncertainty, -1 or +1
-    residual_um: Xyz[float]  # maximum over all regions
+    shift: float  # of the frequencies in units of their uncertainty, -1 or +1; damping is at its lowest
+    residual_um: Xyz[float]  # maximum over the shaped cuts
 
 
 @dataclass(frozen=True)
@@ -121,23 +121,23 @@ class CaseVerdict(OldNames):
     name: str  # shown name, unique
     block_end: str | None  # "ceil" or "carry"; null if look-ahead replans the blocks
     override: float  # feed override, 1 = 100 %
-    mode: str | None  # shifted mode: "x.1" as in the machine file, "all", or null
-    shift: float  # in units of its uncertainty, -1 or +1
+    mode: str | None  # shifted mode: "x.1" (first of the X axis), "all", or null: none
+    shift: float  # in units of its uncertainty, -1 or +1; 0 without a shifted mode
     look_ahead: bool  # the controller's look-ahead is left on
     underrun_ms: float  # duration of one buffer underrun; 0: none
     counts: bool  # it is within the range of the machine file
-    residual_um: Xyz[float]  # maximum over all regions
-    contour_error_um: Tracks[float | None]  # maximum over all regions; null if not measured
+    residual_um: Xyz[float]  # maximum over the cuts simulated in this case
+    contour_error_um: Tracks[float | None]  # maximum over the same cuts; null if not measured in each
     time_s: float | None  # of all cuts; null if those left unchanged were not simulated
     within: bool  # every region keeps its limits
     figure: str  # the figure that is largest relative to its limit
     value_um: float  # that figure
     limit_um: float  # its limit
-    share_of_limit: float | None  # their ratio; null if the limit is 0
+    share_of_limit: float | None  # their ratio; null: the limit is 0, and the figure is not
     lines: tuple[int, int]  # first and last line of the region with this figure
     # largest deviation towards the workpiece; only if its side is known
     gouge_um: Tracks[float | None] | None = field(default=None, metadata=sparse())
-    # largest deviation away from it; likewise
+    # largest deviation away from the workpiece; only if its side is known
     excess_um: Tracks[float | None] | None = field(default=None, metadata=sparse())
 
 
@@ -153,7 +153,8 @@ class FeedExcess:
     """Largest ratio of the emitted speed to the programmed feed at the same position of the path.
 
     The speed is that of the set-points along their own path, averaged over one, four or sixteen times the control's
-    block time; two increments, the effect of rounding, are subtracted. Positions are matched by path length, not time.
+    block time; two increments, the effect of rounding, are subtracted. The feed is that of the path where the
+    set-points are, not that at the same time.
     """
 
     ratio: float  # speed over programmed feed; 1: as programmed
@@ -186,7 +187,7 @@ class RegionVerdict:
     worse: tuple[str, ...] = ()  # missed tolerances in which it is worse than the original
 
     def is_benefit(self, contour_limit_um: float, least_gain_um: float) -> bool:
-        """True if a missed figure or a vibration falls by the least gain, and by 30 % or to within its limit."""
+        """True if a contour error above its limit or vibration falls by the least gain, and by 30 % or to its limit."""
         pairs = [(self.original_contour_error_um, self.contour_error_um, contour_limit_um, contour_limit_um)]
         residual = self.residual_vibration_um
         pairs += [
@@ -211,14 +212,14 @@ class ProgramFigures:
     # maximum of |table - command| from the instant at which the set-points rest
     residual_vibration_um: Pair[Xyz[float]]
     peak_vibration_um: Pair[Xyz[float]]  # maximum of |table - command| before that instant
-    contour_error_um: Tracks[Pair[ContourError]]  # distance to the programmed path of command and table
+    contour_error_um: Tracks[Pair[ContourError]]  # distance of command and table from the programmed path
     # maximum of |table - command| after a rapid before a cut; no limit applies
     rapid_vibration_um: Pair[Xyz[float]]
     orbit_error_percent: tuple[float, ...]  # per arc: area between emitted command and arc over the area of its sector
     override_residual: tuple[OverrideResidual, ...]  # residual vibration of the shaped cuts at 80, 90, 110 and 120 %
     # with every mode shifted by its uncertainty; empty if there is none
     frequency_residual: tuple[FrequencyResidual, ...]
-    slowed_blocks: int  # emitted blocks whose speed step of an axis exceeds the corner limit of the look-ahead
+    slowed_blocks: int  # emitted blocks that look-ahead would slow: speed step or feed of an axis above its limit
     # largest ratio of emitted speed to programmed feed; null if nothing was shaped
     feed_excess: FeedExcess | None
     # the simulated operating conditions; other overrides and shifted modes that do not count are simulated for
@@ -265,7 +266,7 @@ class Case:
     override: float = 1.0  # feed override, 1 = 100 %
     # the shifted mode ("x.1": first of the X axis, as in the machine file), "all", or None
     mode: str | None = None
-    shift: float = 0.0  # in units of its uncertainty, -1 or +1
+    shift: float = 0.0  # in units of its uncertainty, -1 or +1; 0 without a shifted mode
     look_ahead: bool = False  # the controller's look-ahead is left on
     starved_s: float = 0.0  # time for which the block buffer is empty once; 0: never
 
@@ -308,11 +309,11 @@ class LimitCheck:
     figure: str  # its name
     value_um: float  # its value
     limit_um: float  # its limit
-    decimals: int = 2  # significant decimals
+    decimals: int = 2  # shown decimals; more if figure and limit would look equal
 
     @property
     def share(self) -> float:
-        """Ratio to the limit; infinite if the limit is 0."""
+        """Ratio to the limit; with a limit of 0 infinite, or 0 for a figure of 0."""
         if self.limit_um > 0.0:
             return self.value_um / self.limit_um
         return math.inf if self.value_um > 0.0 else 0.0
@@ -491,7 +492,7 @@ class CaseSimulation:
     increment_mm: float  # least increment of the program
 
     def nominal(self, rule: _core.BlockEnd) -> _core.SimulationFigures:
-        """Simulate the blocks at 100 %; with the control's own block timing also underruns at the fastest blocks."""
+        """Simulate the blocks at 100 %; with the control's own block timing also other overrides, and underruns."""
         own = rule == self.model.own_rule
         return self.model.simulate_emitted(
             self.blocks, self.path, rule, offset=self.offset,

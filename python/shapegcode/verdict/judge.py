@@ -15,6 +15,7 @@ from shapegcode.errors import RoundTripError
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.modes import moving_axis
 from shapegcode.program import Program, least_increment_mm, written_increment_mm
 from shapegcode.program.computer import cores
 from shapegcode.results.outcome import ContourError, Deviation, Pair, Tracks, Xyz, largest_xyz_um
@@ -86,7 +87,7 @@ def _figures_um(simulated: _core.SimulationFigures) -> tuple[float, float]:
 
 
 def most_to_gain_um(original: _core.SimulationFigures) -> float:
-    """Upper bound of the gain of shaping: the larger figure of the original."""
+    """Upper bound of the gain of shaping: residual vibration or contour error of the original, the larger."""
     return max(_figures_um(original))
 
 
@@ -173,7 +174,10 @@ class Judge:
         return results
 
     def contour_um(self, figures: RegionFigures, *, turned: bool = True) -> float:
-        """Largest deviation of the target, µm, over the cases that count and that a lower feed can improve."""
+        """Largest deviation of the target, µm, in cases that count and a lower feed improves.
+
+        Without *turned* only those at 100 % feed override.
+        """
         deviations = [
             simulated.command if self.target == "command" else simulated.response
             for case, simulated in zip(self.cases, figures.cases, strict=True)
@@ -250,7 +254,7 @@ class Judge:
         return None if worst is None else worst.lines
 
     def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
-        """Limits of a region, the same in every case; that of the residual is relative to the original's."""
+        """Limits of a region, the same in every case; that of the residual: a ratio of the original's, or the floor."""
         tolerance, floor_um = self._machine.tolerance, residual_floor_um(place.region, self._machine)
         limit_um = np.maximum(tolerance.residual_ratio * (figures.original.residual_mm * 1e3), floor_um)
         return RegionLimits(limit_um, tolerance.contour_um, self.target)
@@ -300,7 +304,7 @@ class Judge:
 
 
 def residual_floor_um(region: _core.Region, machine: Machine) -> float:
-    """Residual vibration that passes in any case, µm."""
+    """Residual vibration that always passes, µm."""
     increment_um = least_increment_mm(machine, region.exit.units) * 1e3
     return max(machine.tolerance.residual_floor_um, machine.tolerance.residual_floor_increments * increment_um)
 
@@ -370,7 +374,7 @@ def judge_program(
     *,
     shaped: bool | None = None,
 ) -> ProgramFigures:
-    """Judge an emitted program, its cuts paired with the original's, in the operating conditions that count."""
+    """Judge an emitted program in nominal conditions and those that count. *pairs*: its cuts, and the original's."""
     machine = model.machine
     judge = Judge(model, [case for case in stated_cases(machine) if case.counts or case.nominal])
     is_shaped = [mine.shaped if shaped is None else shaped for mine, _ in pairs]
@@ -428,11 +432,15 @@ def simulate_unchanged(
 
 def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
     """Residual vibration of rapids before cuts, µm: maximum of |table - command| once their set-points rest."""
-    found: dict[tuple[float, ...], FloatArray] = {}
-    for start_mm, end_mm in _rapids_before_cuts(program):
-        key = tuple(np.round(end_mm - start_mm, 9))
+    found: dict[tuple[float | None, ...], FloatArray] = {}
+    moves = moving_axis(model.machine) is not None
+    for region, start_mm, end_mm in _rapids_before_cuts(program):
+        offset = model.offset(region)
+        where = (*start_mm, *offset) if moves else ()
+        key = (*np.round(end_mm - start_mm, 9), *where)
         if key not in found:
-            found[key] = model.simulate_rapid(start_mm, end_mm, model.verdict_options()).residual_mm
+            options = model.verdict_options(offset=offset)
+            found[key] = model.simulate_rapid(start_mm, end_mm, options).residual_mm
     shaped = [
         model.simulate_emitted(region.path, region.path, rule, contour=False, offset=model.offset(region)).residual_mm
         for region in program.regions
@@ -442,8 +450,8 @@ def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
     return largest_xyz_um([*found.values(), *shaped])
 
 
-def _rapids_before_cuts(program: Program) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Start and end of every rapid with only functions and dwells between it and the next cut."""
+def _rapids_before_cuts(program: Program) -> Iterator[tuple[_core.Region, FloatArray, FloatArray]]:
+    """Every rapid with only functions and dwells between it and the next cut: this cut, start and end."""
     moves = program.core.other_moves
     last: _core.Segment | None = None
     regions = program.regions
@@ -456,7 +464,7 @@ def _rapids_before_cuts(program: Program) -> Iterator[tuple[FloatArray, FloatArr
                 last = None
         elif kind == _core.StepKind.region:
             if last is not None and not regions[index].was_rapid:
-                yield np.asarray(last.start_mm), np.asarray(last.end_mm)
+                yield regions[index], np.asarray(last.start_mm), np.asarray(last.end_mm)
             last = None
 
 

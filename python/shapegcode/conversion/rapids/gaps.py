@@ -17,7 +17,7 @@ from shapegcode.conversion.write import EmittedRegion
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.model.modes import NO_OFFSET
+from shapegcode.model.modes import UNKNOWN_OFFSET
 from shapegcode.program import MM_PER_INCH, Program
 from shapegcode.verdict.figures import RegionVerdict
 
@@ -192,7 +192,7 @@ class _Reader:
         return ""
 
     def _feed_mm_per_s(self, travel_mm: FloatArray, units: int) -> float:
-        """Largest feed along a travel, whole in F: each axis within its limit, the path within the largest of them."""
+        """Largest feed along a travel, whole number in F: each axis within its limit, the path within their largest."""
         share = np.abs(travel_mm) / np.linalg.norm(travel_mm)
         moved = share > 0.0
         along = float((self._largest_mm_per_s[moved] / share[moved]).min())
@@ -375,7 +375,7 @@ class RapidPlant:
         self._known: dict[tuple[float, ...], Timing] = {}
 
     def rapid(self, rapid: Rapid) -> Timing:
-        """Simulate a rapid of the original; if its region is unknown, with the nominal modes."""
+        """Simulate a rapid as G00; without a region, whose work offset is not known, with the nominal modes."""
         travel = rapid.travel_mm
         key = tuple(np.round(travel, 9))
         if not self._moving and key in self._known:
@@ -390,7 +390,7 @@ class RapidPlant:
         return self._machine_model.simulate_rapid(rapid.start_mm, rapid.end_mm, self._options(rapid.region))
 
     def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:
-        """Simulate a replacement with each rule of block timing; the later to settle. `stops_s`: dwells before it."""
+        """Times of a replacement, with the rule of block timing that settles later. `stops_s`: dwells before it."""
         period = self.model.period_s
         offset = self._machine_model.offset(region)
         runs = []
@@ -435,7 +435,8 @@ class RapidPlant:
         return clock_s + max(0.0, settling_s - still_s)
 
     def _options(self, region: _core.Region | None) -> _core.SimulationOptions:
-        return self._machine_model.options(offset=NO_OFFSET if region is None else self._machine_model.offset(region))
+        model = self._machine_model
+        return model.options(offset=UNKNOWN_OFFSET if region is None else model.offset(region))
 
     def _settling_s(self, command_mm: FloatArray, region: _core.Region | None) -> float:
         slowest_per_s = self._machine_model.slowest_decay_per_s

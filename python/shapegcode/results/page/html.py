@@ -1,6 +1,7 @@
 """A page as one HTML file, readable offline; its parts are readable without scripts. Every text is escaped here.
 
-Its Content-Security-Policy forbids every connection and allows only scripts with the listed hashes.
+Its Content-Security-Policy forbids every connection and allows only scripts with the listed hashes; with "beside" also
+scripts in files.
 """
 
 import base64

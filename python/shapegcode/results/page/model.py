@@ -23,7 +23,7 @@ from shapegcode.results.table import Column, Table
 if TYPE_CHECKING:
     from shapegcode.results.page.scene import Scene
 
-Script = Literal["inline", "beside"]  # script of a page: in its file, or in a file of the same folder
+Script = Literal["inline", "beside"]  # Plotly's script of a page: in its file, or in a file of the same folder
 
 Light = Literal["green", "calm", "amber", "red"]
 """Green: run it; calm: nothing to do; amber: do something first; red: do not run it."""
@@ -57,7 +57,7 @@ class HeatRow:
 
     name: str  # heading of the line
     values: tuple[float | None, ...]  # by column; None: not measured
-    shares: tuple[float | None, ...]  # ratios to a limit, for the colours: below 1 is within; None: no colour
+    shares: tuple[float | None, ...]  # ratios to a limit, for the colours: up to 1 is within; None: no colour
     remark: str = ""  # text at its end
     counts: bool = True  # it counts in the verdict; False: it is only shown
     keys: tuple[str, ...] = ()  # position of each value in the JSON, as in `Figure`; empty: none
@@ -170,7 +170,7 @@ Part = Figures | HeatMap | Bars | Notes | NextSteps | Picture | Text | Table | C
 class Section:
     """A part of the page with a heading."""
 
-    key: str  # its anchor: small letters and hyphens, unique on the page
+    key: str  # its anchor: lower-case letters and hyphens, unique on the page
     title: str  # heading
     parts: tuple[Part, ...]  # below it, in order
     how: str = ""  # explanation, one line below the heading

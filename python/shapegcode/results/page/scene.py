@@ -1,6 +1,7 @@
 """Motion of a page: programs over time, decimated for display (Douglas and Peucker 1973), packed.
 
-Extremes are kept; every curve is within a given fraction of a pixel. Figures are never computed from these data.
+Maxima of the curves are kept; `Scene.thinned` states how far they may be off. Figures are never computed from these
+data.
 """
 
 import base64
@@ -44,7 +45,7 @@ CHANNELS: Mapping[str, Channel] = {
 class Variant:
     """A program over time."""
 
-    key: str  # "original" or "emitted", or another name of small letters
+    key: str  # "original" or "emitted", or another name in lower case
     label: str  # shown name
     file: str  # name of the program
     text: str  # program text
@@ -65,7 +66,7 @@ class ModeLine:
 
     axis: str  # "x", "y" or "z"
     frequency_hz: float
-    label: str  # for example "X 46 Hz (assumed)"
+    label: str  # for example "mode of X, 46 Hz"
 
 
 @dataclass(frozen=True, eq=False)
