@@ -70,11 +70,11 @@ void register_errors(py::module_& module) {
   module.attr("ProgramError").attr("alarm") = 0;
   module.attr("ProgramError").attr("file") = "";
   types().design = make_type(module, "DesignError", py::make_tuple(base),
-                             "The requested shaper does not exist, or not on this grid.");
+                             "The requested shaper does not exist, or not on this grid, or cannot be computed.");
   types().argument =
       make_type(module, "ArgumentError", py::make_tuple(base, value_error), "A value is outside its stated range.");
-  types().numeric =
-      make_type(module, "NumericError", py::make_tuple(base), "A solver failed; the message carries its flag.");
+  types().numeric = make_type(module, "NumericError", py::make_tuple(base),
+                              "A solver failed or did not converge; the message says which.");
   py::register_exception_translator([](std::exception_ptr pointer) {
     try {
       if (pointer) {

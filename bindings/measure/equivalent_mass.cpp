@@ -39,7 +39,7 @@ Args:
     stiffness_n_per_m: Stiffness, above 0.
     force_n: Force in N, shape (n,).
     period_s: Time between samples in s, above 0.
-    theta: Number of periods over which the acceleration is linear, at least 1; stable from 1.37 on.
+    theta: Number of periods over which the acceleration is linear, at least 1; from 1.37 on stable for any period.
     displacement_m: At the first sample.
     velocity_m_per_s: At the first sample.
 
@@ -83,7 +83,7 @@ Returns:
     The mass that makes the RMS of simulated and measured response equal.
 
 Raises:
-    ArgumentError: A value outside its range, a response that is zero throughout, or such a force without an impulse.
+    ArgumentError: A value outside its range, a zero response, or a zero force without an impulse.
 
 Source: paper 003, section 2.2.)");
 }
@@ -126,7 +126,7 @@ Returns:
     The mass, the number of halvings and both RMS.
 
 Raises:
-    ArgumentError: A value outside its range, a response that is zero throughout, or such a force without an impulse.
+    ArgumentError: A value outside its range, a zero response, or a zero force without an impulse.
 
 Source: paper 003, section 2.2, steps 1-7.)");
 }

@@ -26,7 +26,8 @@ void register_follow(py::module_& module) {
           },
           py::arg("command_mm"), py::arg("response_mm"),
           "Takes the next samples of command and response, (k, 3), mm. Returns the vectors from the foot on the path "
-          "to the response, (k, 3), mm. Raises ArgumentError on other shapes or values that are not finite.");
+          "to the response, (k, 3), mm. Raises ArgumentError on other or unequal shapes, or values that are not "
+          "finite.");
   module.def(
       "thin_curves",
       [](const Eigen::VectorXd& times, const Eigen::Ref<const Eigen::MatrixXd>& values,
@@ -39,7 +40,7 @@ void register_follow(py::module_& module) {
         return py::array_t<std::int64_t>(py::array(py::cast(kept)));
       },
       py::arg("times"), py::arg("values"), py::arg("tolerances"),
-      R"(Selects samples of curves over time that look the same (Douglas and Peucker 1973, distance along the value).
+      R"(Selects the samples needed for curves to look the same (Douglas and Peucker 1973, distance along the value).
 
 Args:
     times: Times of the rows, (n,), rising.

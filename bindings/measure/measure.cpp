@@ -59,8 +59,8 @@ void register_sections(py::module_& module) {
       "path_sections",
       [](const std::shared_ptr<Path>& path, double short_mm) { return path_sections(*path, short_mm); },
       py::arg("path").none(false), py::arg("short_mm") = 0.5,
-      "The whole path as sections: sequences of lines of one direction and of arcs about one centre. Successive "
-      "sequences shorter than `short_mm` are one section of the kind `curve`.");
+      "The whole path as sections: sequences of lines of one direction and of arcs about one centre, which end at an "
+      "exact stop at the latest. Successive sequences shorter than `short_mm` are one section of the kind `curve`.");
   module.def(
       "line_sections",
       [](const std::shared_ptr<Path>& path, const std::vector<std::pair<std::uint32_t, std::uint32_t>>& ranges) {
@@ -151,7 +151,9 @@ void register_figures(py::module_& module) {
       .def_readonly("section", &SectionFigures::section, "The section.")
       .def_readonly("time_s", &SectionFigures::time_s, "Time in which the command moves in it, s.")
       .def_readonly("peak_mm", &SectionFigures::peak_mm, "Largest |response - command| during motion, (3,), mm.")
-      .def_readonly("rest", &SectionFigures::rest, "Worst stop of the command in it (largest residual), or None.")
+      .def_readonly("rest", &SectionFigures::rest,
+                    "Worst stop of the command in it (largest residual); in the section where the motion ends, its "
+                    "last stop; or None.")
       .def_readonly("command", &SectionFigures::command, "Deviation of the command from the path.")
       .def_readonly("response", &SectionFigures::response, "Deviation of the response from the path.")
       .def_readonly("command_sides", &SectionFigures::command_sides, "Deviation of the command, by side of the path.")

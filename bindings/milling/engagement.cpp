@@ -163,7 +163,7 @@ void register_material(py::module_& module) {
             return self.distance_mm(layer, x, y);
           },
           py::arg("layer"), py::arg("x_mm"), py::arg("y_mm"),
-          "Distance from the boundary of a layer, positive in material, limited to two nodes of the grid, mm.")
+          "Distance from the boundary of a layer, positive in material, limited to twice the grid spacing, mm.")
       .def("volume_in_cylinder_mm3", &Material::volume_in_cylinder_mm3, py::arg("x_mm"), py::arg("y_mm"),
            py::arg("radius_mm"), py::arg("bottom_mm"), py::arg("top_mm"),
            "Material in a vertical cylinder, mm3, such as a tool at its start position.")
@@ -172,8 +172,8 @@ void register_material(py::module_& module) {
           [](const Material& self, const Eigen::Vector2d& low, const Eigen::Vector2d& high, py::ssize_t rows,
              py::ssize_t columns) { return take(self.heights_mm(low, high, rows, columns)); },
           py::arg("low_mm"), py::arg("high_mm"), py::arg("rows"), py::arg("columns"),
-          "Top of the material over a rectangle, (rows, columns), mm, from its low corner on; NaN where there is none. "
-          "Raises ArgumentError on less than one row or column.");
+          "Top of the material over a rectangle, rows along Y, columns along X, mm, from its low corner on; NaN where "
+          "there is none. Raises ArgumentError on less than one row or column.");
 }
 
 void register_layer_borders(py::module_& module) {
@@ -236,7 +236,8 @@ void register_corner(py::module_& module) {
       .def_readonly("from_rad", &CornerEngagement::from_rad, "Engaged azimuths, from the direction of feed, rad.")
       .def_readonly("to_rad", &CornerEngagement::to_rad, "rad.")
       .def_readonly("radial_depth_mm", &CornerEngagement::radial_depth_mm,
-                    "From the end on the rough boundary to the finished wall's tangent at the contact, mm.");
+                    "Width of cut: from the end of the engagement on the rough boundary to the finished wall's tangent "
+                    "at the contact, mm.");
 
   py::class_<CornerCut>(module, "CornerCut", "The corner of a pocket that is finished after roughing (paper 001).")
       .def(py::init([](double tool_radius, double rough_radius, double finish_radius, double allowance, double turn,
@@ -250,7 +251,8 @@ void register_corner(py::module_& module) {
            py::arg("after_mm") = CornerCut{}.after_mm, py::arg("mirrored") = false,
            "The tool moves along +X with the wall to its right, turns left by `turn_rad` and follows the second wall; "
            "the finished walls meet at the origin. `mirrored`: wall to the left. Equal tool and finish radius: the "
-           "path has a sharp vertex. Raises ArgumentError on corner radii below the tool's or an allowance above it.")
+           "path has a sharp vertex. Raises ArgumentError on corner radii below the tool's, an allowance above the "
+           "radius of the tool, or a rough corner that leaves no material.")
       .def_readonly("tool_radius_mm", &CornerCut::tool_radius_mm, "mm.")
       .def_readonly("rough_radius_mm", &CornerCut::rough_radius_mm, "Radius of the corner after roughing, mm.")
       .def_readonly("finish_radius_mm", &CornerCut::finish_radius_mm, "Radius of the corner to be made, mm.")
@@ -267,7 +269,8 @@ void register_corner(py::module_& module) {
           py::arg("beyond_mm"),
           "The material before finishing as a ring (n, 2), mm, to `beyond_mm` outside of the walls.")
       .def("at", &corner_engagement, py::arg("s_mm"), py::arg("behind_vertex") = false,
-           "Engagement at a distance along the path, in closed form.")
+           "Engagement at a distance along the path, in closed form; `behind_vertex`: at a sharp vertex, after the "
+           "turn.")
       .def(
           "track",
           [](const CornerCut& self, double axial_depth, double step) {

@@ -70,8 +70,8 @@ with k1 = specific_n_per_mm2 * t**specific_exponent, k2 = ratio * t**ratio_expon
            py::arg("specific_n_per_mm2"), py::arg("specific_exponent") = 0.0, py::arg("ratio") = 0.0,
            py::arg("ratio_exponent") = 0.0, py::arg("tangential_edge_n_per_mm") = 0.0,
            py::arg("radial_edge_n_per_mm") = 0.0, py::arg("thickness") = ChipThickness::mean,
-           "Raises ArgumentError on a value that is not finite, a force below 0, or an exponent (tangential, or sum of "
-           "both) of -1 or less.")
+           "Raises ArgumentError on a value that is not finite, a force or ratio below 0, or an exponent (tangential, "
+           "or sum of both) of -1 or less.")
       .def_readonly("specific_n_per_mm2", &CuttingCoefficients::specific_n_per_mm2, "k1 at a chip of 1 mm, N/mm2.")
       .def_readonly("specific_exponent", &CuttingCoefficients::specific_exponent, "Of k1.")
       .def_readonly("ratio", &CuttingCoefficients::ratio, "k2 at a chip of 1 mm.")

@@ -128,7 +128,7 @@ void register_answers(py::module_& module) {
       .value("path_moves", JogResult::path_moves,
              "The control is neither held nor flushed nor aborted, or not yet at rest.")
       .value("no_axis", JogResult::no_axis, "There is no such axis.")
-      .value("not_finite", JogResult::not_finite, "A number that is not finite.")
+      .value("not_finite", JogResult::not_finite, "A number that is not finite, or a distance of retrace() below zero.")
       .value("no_speed", JogResult::no_speed, "The speed of a jog by a distance is not above zero.")
       .value("beyond_travel", JogResult::beyond_travel,
              "The distance leads out of the travel, or the axis is at its end already.")
@@ -179,7 +179,8 @@ Args:
     max_feed: Highest speed in the axis' unit (mm or degrees) per s; 0: no offset.
     max_acceleration: Likewise per s^2.
     max_jerk: Likewise per s^3.
-    backlash: Of the drive, compensated by the offset in negative motion; initially as after positive motion.)")
+    backlash: Backlash of the drive in the axis' unit, subtracted from its position in negative motion; the control
+        starts as after positive motion.)")
       .def(py::init([](double max_feed, double max_acceleration, double max_jerk, double backlash) {
              return OffsetLimits{max_feed, max_acceleration, max_jerk, backlash};
            }),
@@ -200,9 +201,9 @@ Args:
       .value("stopping", Activity::stopping, "Decelerating for hold(), flush() or abort().")
       .value("held", Activity::held, "At rest after hold(), or at a programmed stop.")
       .value("starved", Activity::starved,
-             "Decelerating: the queue ran empty before a segment with `stop_at_end`. Idle when at rest.")
+             "Decelerating: the queue ran empty, and its last segment has no `stop_at_end`. Idle once at rest.")
       .value("aborted", Activity::aborted, "At rest after abort() or emergency_stop(); the path is discarded.")
-      .value("jogging", Activity::jogging, "Away from the position where the path rests, or back to it.");
+      .value("jogging", Activity::jogging, "An axis moves away from the position where the path rests, or back to it.");
 
   py::class_<FollowingLimits>(module, "FollowingLimits", R"(Limits of an axis that follows the path. Immutable.
 
@@ -269,7 +270,8 @@ void register_state(py::module_& module) {
           "How often the motion slowed down because no section was planned in time.")
       .def_property_readonly(
           "set_point_distance_mm", [](const PyState& self) { return self.state.set_point_distance_mm; },
-          "`distance_mm` at the last set-point, which smoothing and shaper delay by `delay_periods`, rounded.")
+          "`distance_mm` at the last set-point, which correction, smoothing and shaper delay by `delay_periods`, "
+          "rounded.")
       .def_property_readonly(
           "set_point_line", [](const PyState& self) { return self.state.set_point_line; }, "`line` at that set-point.")
       .def_property_readonly(
@@ -312,8 +314,8 @@ constexpr const char* controller_doc =
 
 Look-ahead over a window of segments, junctions rounded within the tolerance, motion nearly as fast as the limits of the
 axes allow, one set-point per period through contour correction, smoothing and shaper. The set-points keep every finite
-limit. One thread may push, one may step, one may plan, any may call the rest except restart(); step(), run() and plan()
-release the global interpreter lock. The real-time form is the C++ class of the same name.
+limit. One thread may push and call flushed(), one may step, one may plan, any may call the rest except restart();
+step(), run() and plan() release the global interpreter lock. The real-time form is the C++ class of the same name.
 
 Args:
     period_s: Time between set-points in s.
@@ -323,8 +325,8 @@ Args:
     max_acceleration_mm_per_s2: Likewise.
     max_jerk_mm_per_s3: Likewise; requires an acceleration.
     following: Limits of the axes that follow the path, at most six.
-    contour_tolerance_mm: Permitted deviation from the path by rounded corners, smoothing and shaper. 0: corners are
-        exact stops; inf: neighbouring corners are rounded up to the middle between them.
+    contour_tolerance_mm: Permitted deviation from the path by rounded corners, smoothing and shaper. 0 (only without
+        smoothing and shaper): corners are exact stops; inf: corners are rounded up to the middle between neighbours.
     smoothing_time_s: Duration of each of two moving averages of every axis in s; 0: none.
     shaper: A Shaper on the grid of the period, a Fir, or a Mode (for its ZV on the grid) for all axes; a list with one
         of these for each axis; or a FollowingFir. None: no shaper.
@@ -334,13 +336,15 @@ Args:
     lead_periods: Periods by which plan(), called by another thread, is ahead of the motion. None: step() plans when the
         planned motion runs out.
     travel: Travel range of each axis, (low, high); empty: no limits.
-    offset: Limits of the offset of each axis, by which the limits of the path are reduced; empty: no offset.
-    emergency_acceleration: Maximum of each axis, for emergency_stop(); empty: it decelerates as abort() does.
+    offset: Limits of the offset of each axis, by which the limits of the path are reduced; empty: no offset. Not with
+        a FollowingFir.
+    emergency_acceleration: Acceleration of each axis for emergency_stop(), at least its maximum; empty: it decelerates
+        as abort() does.
     spindle_bandwidth_hz: Bandwidth for following a spindle in Hz.
     retrace_periods: Periods of motion stored for retrace().
     other_shapers: Shapers that can replace `shaper` (number 0) in motion, numbers 1 and up: each one for all axes, or a
-        list with one for each.
-    fade_time_s: Duration of an exchange in s. The limits of the path are reduced for it, less for a longer one.
+        list with one for each. Not with a FollowingFir or a contour correction.
+    fade_time_s: Duration of an exchange in s. Exchanges reduce the limits of the path, less if they take longer.
 
 Raises:
     ArgumentError: A value outside its range.
@@ -410,7 +414,7 @@ Returns:
     PushResult; unless it is `accepted`, nothing has changed.
 
 Raises:
-    ArgumentError: No radius, no sweep, or a number that is not finite.)");
+    ArgumentError: No radius, no sweep, no such `normal`, or a number that is not finite.)");
 }
 
 }  // namespace
@@ -513,7 +517,7 @@ Returns:
     (n, n_axes), mm or the unit of a following axis.
 
 Raises:
-    ArgumentError: Periods below 0.)")
+    ArgumentError: `max_periods` below 0.)")
       .def("plan", &PyController::plan,
            "Plans until enough motion lies ahead; only with `lead_periods`, from one thread. False: nothing to do.")
       .def(
@@ -602,7 +606,7 @@ Returns:
           },
           py::arg("axis"), py::arg("low"), py::arg("high"), R"(Sets the travel range of an axis.
 
-If the planned path would leave it, the control is held, with the planned stop.
+If the path to be run next would leave it, the control is held and stops where the motion already planned ends.
 
 Args:
     axis: Its index, from 0.
@@ -622,7 +626,7 @@ Returns:
                              "Positions of the following axes at the end of the last segment, (n_axes - 3,).")
       .def_property_readonly(
           "delay_periods", [](const PyController& self) { return self.control().delay_periods(); },
-          "Mean delay of correction, smoothing and shaper, in periods.")
+          "Mean delay of correction, smoothing and the shaper requested last, in periods.")
       .def_property_readonly(
           "correction_delay", [](const PyController& self) { return self.control().correction_delay(); },
           "Part of `delay_periods` caused by the contour correction, in periods.");

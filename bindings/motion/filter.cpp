@@ -78,9 +78,9 @@ struct PyVaryingStream {
 void register_varying(py::module_& module) {
   py::class_<VaryingFir>(module, "VaryingFir", R"(A set of filters on one grid, with a varying choice among them.
 
-Each increment of the input is replaced by the whole impulse train of the filter that is valid where it begins (scatter
-form), so that every increment keeps the zeros of its own filter, however often the filters change. Place k is filter k
-of the set; place k + w (0 < w < 1) gives the part 1 - w of an increment to filter k and w to filter k + 1.
+Each increment of the input is replaced by the whole impulse train of the filter that its place selects (scatter form),
+so that every increment keeps the zeros of its own filter, however often the filters change. Place k is filter k of the
+set; place k + w (0 < w < 1) gives the part 1 - w of an increment to filter k and w to filter k + 1.
 
 Args:
     set: The filters (Fir), at least one.
@@ -138,8 +138,8 @@ Raises:
 
   py::class_<FollowingFir>(module, "FollowingFir", R"(A set of filters along an axis, whose position selects the filter.
 
-Filter k of the set is valid where the axis is at position k; in between the increments are divided, beyond the ends the
-nearest filter is valid. The middle of each increment selects its filter.
+Filter k of the set is valid where the axis is at position k; between two positions each increment is divided between
+their filters, beyond the ends the nearest filter is valid. The middle of each increment selects its filter.
 
 Args:
     fir: The set.
@@ -169,7 +169,7 @@ Raises:
           },
           py::arg("samples"),
           "Filter samples (n, n_axes) in mm; the result has fir.duration_samples more rows. Raises ArgumentError on "
-          "another shape, a value that is not finite, or samples without the axis.");
+          "another shape, no sample, a value that is not finite, or samples without the axis.");
 }
 
 }  // namespace

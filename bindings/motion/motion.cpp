@@ -64,8 +64,8 @@ void register_trajectory(py::module_& module) {
       py::arg("feed_mm_per_s") = py::none(), py::arg("period_s") = 0.001,
       R"(Set-points of a whole path from rest to rest, nearly as fast as the limits of every axis allow.
 
-Junctions are rounded within the tolerance, jerk is limited, and the motion rests at segments with `stop_at_end`. The
-differences of the set-points keep the limits to a factor of 1.001, and the programmed feeds. Bit for bit those of a
+Junctions are rounded within the tolerance, jerk is limited, and the motion rests at exact stops. The differences of the
+set-points keep the limits to a factor of 1.001, and the programmed feeds. The set-points are bit for bit those of a
 `MotionController` without filters that is given all segments at once. See docs/concepts/time_optimal.md.
 
 Args:
@@ -78,7 +78,7 @@ Args:
     period_s: Time between two set-points, s.
 
 Returns:
-    Set-points, (n_samples, 3), mm, read-only; the first is the start, the last exactly the end.
+    Set-points, (n_samples, 3), mm, read-only; the first is the start, the last exactly the end; none without length.
 
 Raises:
     ArgumentError: A limit or period that is not above zero and finite, a tolerance below zero, a segment without feed.
@@ -108,12 +108,13 @@ void register_motion(py::module_& module) {
       .def_readwrite("polyline_acceleration_mm_per_s2", &MotionLimits::polyline_acceleration_mm_per_s2,
                      "Centripetal acceleration along polylines, mm/s^2.")
       .def_readwrite("corner_stop_angle_rad", &MotionLimits::corner_stop_angle_rad,
-                     "A corner that turns by as much or more is a stop.")
+                     "A corner that turns by this angle or more is a stop, rad.")
       .def_readwrite("junction_deviation_mm", &MotionLimits::junction_deviation_mm,
-                     "A corner is passed as an arc that cuts it by this distance.")
+                     "A corner is passed as an arc that cuts it by this distance, mm.")
       .def_readwrite("block_time_s", &MotionLimits::block_time_s, "Minimum duration of a block, s.")
-      .def_readwrite("contour_acceleration_mm_per_s2", &MotionLimits::contour_acceleration_mm_per_s2,
-                     "Of a change of direction, per axis, on arcs and along polylines, shape (3,).")
+      .def_readwrite(
+          "contour_acceleration_mm_per_s2", &MotionLimits::contour_acceleration_mm_per_s2,
+          "Acceleration of each axis by a change of direction, on arcs and along polylines, shape (3,), mm/s^2.")
       .def_readwrite("feed_override", &MotionLimits::feed_override, "Scales the programmed feeds.")
       .def_readwrite("arc_feed_ratio", &MotionLimits::arc_feed_ratio, "Feed on arcs relative to the programmed one.")
       .def_readwrite("feed_spread_s", &MotionLimits::feed_spread_s,
@@ -121,16 +122,17 @@ void register_motion(py::module_& module) {
       .def_readwrite("feed_excess_ratio", &MotionLimits::feed_excess_ratio,
                      "Neighbours faster by up to this ratio need no `feed_spread_s`.");
 
-  py::class_<FilterTolerance>(
-      module, "FilterTolerance",
-      "Deviation permitted to a filter after the interpolation at corners and on arcs; with zero variance no limit.")
+  py::class_<FilterTolerance>(module, "FilterTolerance",
+                              "Deviation permitted to a filter after the interpolation, at corners and on arcs; none "
+                              "if its variance and mean deviation are 0.")
       .def(py::init<>())
       .def_readwrite("contour_tolerance_mm", &FilterTolerance::contour_tolerance_mm,
                      "Deviation allowed to the filter, mm; infinity: any.")
       .def_readwrite("corner_share", &FilterTolerance::corner_share,
                      "Part of the tolerance for one corner: deviations of corners within one filter length add up.")
       .def_readwrite("variance_s2", &FilterTolerance::variance_s2, "Second central moment of the filter, s^2.")
-      .def_readwrite("mean_deviation_s", &FilterTolerance::mean_deviation_s, "Its mean absolute deviation, s.");
+      .def_readwrite("mean_deviation_s", &FilterTolerance::mean_deviation_s,
+                     "Mean absolute deviation of the filter from its mean delay, s.");
 
   py::class_<SpeedProfile, std::shared_ptr<SpeedProfile>>(module, "SpeedProfile",
                                                           "Distance along a path as a function of time.")

@@ -96,7 +96,7 @@ void register_path(py::module_& module) {
           py::arg("start_mm"), py::arg("end_mm"), py::arg("centre_mm"), py::arg("sweep_rad"), py::arg("feed_mm_per_s"),
           py::arg("normal") = 2,
           "An arc or helix about the axis `normal` (0 X, 1 Y, 2 Z); `sweep_rad` > 0 turns counter-clockwise seen from "
-          "its positive end. Raises ArgumentError on a zero radius or sweep.")
+          "the positive end of this axis. Raises ArgumentError on a zero radius or sweep.")
       .def_readonly("start_mm", &Segment::start_mm, "Start, shape (3,), mm.")
       .def_readonly("end_mm", &Segment::end_mm, "End, shape (3,), mm.")
       .def_readonly("centre_mm", &Segment::centre_mm, "Centre of an arc, shape (3,), mm.")
@@ -124,7 +124,7 @@ void register_path(py::module_& module) {
 
   py::class_<Path, std::shared_ptr<Path>>(module, "Path", "A connected sequence of segments.")
       .def(py::init<std::vector<Segment>>(), py::arg("segments"),
-           "Raises ArgumentError if a segment does not start where its predecessor ends.")
+           "Raises ArgumentError if a segment does not start where its predecessor ends (1e-6 mm).")
       .def("__len__", &Path::size)
       .def(
           "__getitem__",
@@ -156,7 +156,7 @@ void register_path(py::module_& module) {
             for (std::size_t i = 0; i < self.size(); ++i) slowest = std::min(slowest, self.feed_mm_per_s(i));
             return slowest;
           },
-          "Smallest programmed feed, mm/s; infinity for an empty path.")
+          "Smallest programmed feed, mm/s: 0 with a rapid, infinity for an empty path.")
       .def_property_readonly(
           "programmed_time_s",
           [](const Path& self) {
@@ -166,7 +166,7 @@ void register_path(py::module_& module) {
             }
             return time;
           },
-          "Time at the programmed feeds without any acceleration, s.")
+          "Time at the programmed feeds without any acceleration, s; infinity with a rapid.")
       .def_property_readonly(
           "fastest_feed_mm_per_s",
           [](const Path& self) {
@@ -196,7 +196,7 @@ void register_path(py::module_& module) {
       .def_property_readonly(
           "segment_lines",
           [](const Path& self) { return of_segments(self, [&](std::size_t i) { return self.line(i); }); },
-          "Source line of each segment, (n,), from 1.")
+          "Source line of each segment, (n,), from 1; 0 if there is none.")
       .def_property_readonly(
           "arcs_in_xy",
           [](const Path& self) {
@@ -208,7 +208,7 @@ void register_path(py::module_& module) {
           "Whether every arc lies in the XY plane (G17).")
       .def_property_readonly("extent_mm", &extent, "Size of the box around it, shape (3,), mm; arcs as in `polyline`.")
       .def("polyline", &polyline, py::arg("step_rad") = arc_step_rad,
-           "Points along the path, (n, 3), mm: segment ends, arcs in steps of `step_rad`.");
+           "Points along the path, (n, 3), mm: its start, segment ends, arcs in steps of at most `step_rad`.");
 }
 
 }  // namespace shapegcode::bindings

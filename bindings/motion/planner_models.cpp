@@ -31,22 +31,30 @@ void register_planner_models(py::module_& module) {
       .def_readwrite("arc_tolerance_mm", &PlannerRules::arc_tolerance_mm, "grbl: chords of an arc lie within it ($12).")
       .def_readwrite("junction_deviation_mm", &PlannerRules::junction_deviation_mm,
                      "grbl: a corner is passed as an arc that cuts it by this distance ($11).")
-      .def_readwrite("period_s", &PlannerRules::period_s, "linuxcnc: of the servo thread, in which it plans.")
-      .def_readwrite("blend_tolerance_mm", &PlannerRules::blend_tolerance_mm, "linuxcnc: G64 P; 0: half of a segment.")
-      .def_readwrite("naive_cam_tolerance_mm", &PlannerRules::naive_cam_tolerance_mm,
-                     "linuxcnc: G64 Q: lines of one feed within it are joined, an arc in XY becomes two lines.")
-      .def_readwrite("ramp_frequency_hz", &PlannerRules::ramp_frequency_hz, "linuxcnc: shorter segments are ramps.")
-      .def_readwrite("kink_ratio", &PlannerRules::kink_ratio, "linuxcnc: ratio of the acceleration for a kink.")
+      .def_readwrite("period_s", &PlannerRules::period_s, "linuxcnc: period of the servo thread, which plans, s.")
+      .def_readwrite("blend_tolerance_mm", &PlannerRules::blend_tolerance_mm,
+                     "linuxcnc: G64 P; 0: only half of a segment limits.")
+      .def_readwrite(
+          "naive_cam_tolerance_mm", &PlannerRules::naive_cam_tolerance_mm,
+          "linuxcnc: G64 Q: lines of one feed within it are joined, an arc in XY within it becomes two lines.")
+      .def_readwrite("ramp_frequency_hz", &PlannerRules::ramp_frequency_hz,
+                     "linuxcnc: segments that take less than 1/it are ramps.")
+      .def_readwrite("kink_ratio", &PlannerRules::kink_ratio,
+                     "linuxcnc: part of the acceleration that a kink may take.")
       .def_readwrite("max_feed_override", &PlannerRules::max_feed_override, "linuxcnc: override for which it plans.")
-      .def_readwrite("rapid_follows", &PlannerRules::rapid_follows,
-                     "linuxcnc: a rapid follows the path; otherwise its last segment has half of the acceleration.")
+      .def_readwrite(
+          "rapid_follows", &PlannerRules::rapid_follows,
+          "linuxcnc: a rapid follows the path; otherwise the path's last segment has half of the acceleration.")
       .def_readwrite("optimization_depth", &PlannerRules::optimization_depth, "linuxcnc: segments in its look-ahead.")
       .def_readwrite("look_ahead_blocks", &PlannerRules::look_ahead_blocks, "grbl: blocks of its planner's buffer.");
 
-  py::class_<LinuxcncSlowing>(module, "LinuxcncSlowing", "Effect of LinuxCNC's two rules for short segments on a path.")
+  py::class_<LinuxcncSlowing>(module, "LinuxcncSlowing",
+                              "Effect of LinuxCNC's rules for short segments (kinks and ramps) on a path.")
       .def_readonly("segments", &LinuxcncSlowing::segments, "Number of segments.")
-      .def_readonly("kinks", &LinuxcncSlowing::kinks, "Junctions that need more than the kink ratio.")
-      .def_readonly("largest_ratio", &LinuxcncSlowing::largest_ratio, "Largest ratio of acceleration at a junction.")
+      .def_readonly("kinks", &LinuxcncSlowing::kinks,
+                    "Junctions that need at least the kink ratio of the acceleration.")
+      .def_readonly("largest_ratio", &LinuxcncSlowing::largest_ratio,
+                    "Largest ratio of the acceleration that a junction needs.")
       .def_readonly("speed_mm_per_s", &LinuxcncSlowing::speed_mm_per_s, "Speed at that junction, mm/s.")
       .def_readonly("angle_rad", &LinuxcncSlowing::angle_rad, "Change of direction at that junction, rad.")
       .def_readonly("line", &LinuxcncSlowing::line, "Source line of that junction.")
@@ -58,8 +66,8 @@ void register_planner_models(py::module_& module) {
         return linuxcnc_slowing(*path, limits, rules, corner_rad);
       },
       py::arg("path").none(false), py::arg("limits"), py::arg("rules"), py::arg("corner_rad"),
-      "Effect of LinuxCNC's two rules for short segments on a path at its feeds. Turns above `corner_rad` do not "
-      "count.");
+      "Effect of LinuxCNC's rules for short segments (kinks and ramps) on a path at its feeds. Turns above "
+      "`corner_rad` do not count.");
 
   module.def(
       "controlled_motion",

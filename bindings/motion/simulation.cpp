@@ -30,8 +30,8 @@ void register_simulation(py::module_& module) {
       .def_readonly("count", &DeviationStats::count, "Samples.")
       .def_property_readonly("rms_mm", &DeviationStats::rms_mm, "mm.");
 
-  py::class_<ContourTracker, std::shared_ptr<ContourTracker>>(
-      module, "ContourTracker", "Geometry of a path for the distance of a moving point to it.")
+  py::class_<ContourTracker, std::shared_ptr<ContourTracker>>(module, "ContourTracker",
+                                                              "Tracks the distance of a moving point from a path.")
       .def(py::init([](const std::shared_ptr<Path>& path) { return ContourTracker(*path); }),
            py::arg("path").none(false), "Raises ArgumentError on a path without segments.");
 
@@ -63,8 +63,8 @@ void register_simulation(py::module_& module) {
       .def_readwrite("measure_command", &SimulationOptions::measure_command,
                      "False: the deviation of the response alone, no orbit errors.")
       .def_readwrite("feed_window_s", &SimulationOptions::feed_window_s,
-                     "Averaging time of the largest speed relative to the programmed feed, also with four and sixteen "
-                     "times it, s; 0: not measured.")
+                     "Averaging time of the speed for its largest ratio to the programmed feed, s; four and sixteen "
+                     "times it are used, too; 0: not measured.")
       .def_readwrite("feed_slack_mm", &SimulationOptions::feed_slack_mm,
                      "Distance that rounding may add within `feed_window_s`, mm.")
       .def_readwrite("last_seconds", &SimulationOptions::last_seconds,
@@ -89,7 +89,7 @@ void register_simulation(py::module_& module) {
       .def_property_readonly("ratio", &FeedExcess::ratio, "Speed over feed; 0 where nothing was measured.");
 
   py::class_<StarvedFigures>(module, "StarvedFigures", "Effect of a buffer underrun.")
-      .def_readonly("block", &StarvedFigures::block, "Block after which the set-points wait.")
+      .def_readonly("block", &StarvedFigures::block, "Index of the block after which the set-points wait.")
       .def_readonly("residual_mm", &StarvedFigures::residual_mm,
                     "Largest |response - command| while the set-points rest, during the wait and at the end, (3,), mm.")
       .def_readonly("command", &StarvedFigures::command, "Deviation of the command from the path.")
@@ -107,13 +107,14 @@ void register_simulation(py::module_& module) {
                     "Largest |response - command| from the instant at which the set-points rest, (3,), mm.")
       .def_readonly("settling_s", &SimulationFigures::settling_s,
                     "Time from the rest of the set-points until |response - command| stays within the band, (3,), s; "
-                    "inf: not within the limit.")
+                    "inf: it leaves the band in the last fifth of `settling_limit_s`.")
       .def_readonly("peak_mm", &SimulationFigures::peak_mm, "Largest |response - command| in motion, (3,), mm.")
       .def_readonly("peak_acceleration_mm_per_s2", &SimulationFigures::peak_acceleration_mm_per_s2,
                     "Of the command, (3,), mm/s^2.")
       .def_readonly("command", &SimulationFigures::command, "Deviation of the command from the path.")
       .def_readonly("response", &SimulationFigures::response, "Deviation of the response from the path.")
-      .def_readonly("orbit_error_percent", &SimulationFigures::orbit_error_percent, "Orbit error per arc, in percent.")
+      .def_readonly("orbit_error_percent", &SimulationFigures::orbit_error_percent,
+                    "Orbit error of the command per arc of the path, in percent.")
       .def_readonly("response_orbit_error_percent", &SimulationFigures::response_orbit_error_percent,
                     "Orbit error of the response per arc of the path, in percent, if requested.")
       .def_readonly("feed_excess", &SimulationFigures::feed_excess, "Of the command, if requested.")
@@ -187,8 +188,8 @@ void register_simulation(py::module_& module) {
   module.def(
       "fastest_block_ends", [](const std::shared_ptr<Path>& blocks) { return fastest_block_ends(blocks->segments()); },
       py::arg("blocks").none(false),
-      "Blocks after which a stop excites most: for each axis the block with the highest speed at its end, except the "
-      "last block; ascending, without repetition.");
+      "Indices of the blocks after which a stop excites most: for each axis the block with the highest speed at its "
+      "end, except the last block; ascending, without repetition.");
 
   module.def(
       "count_slowed_blocks",

@@ -81,7 +81,8 @@ void register_simulation_stream(py::module_& module) {
           py::arg("program").none(false), py::arg("model"), py::arg("options"),
           py::arg("region_offsets_mm") = std::vector<Vector3>{}, py::arg("rest_s") = 0.0,
           "A whole program on one time axis. `region_offsets_mm`: from the positions of each region to machine "
-          "positions, for modes that vary with them. Raises ArgumentError on an invalid model.")
+          "positions, for modes that vary with them. Raises ArgumentError on an invalid model, options with another "
+          "period, or not one offset per region.")
       .def(
           "read",
           [](SimulationStream& self, std::size_t most) {

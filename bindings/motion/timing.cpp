@@ -71,7 +71,8 @@ void define_parts(py::class_<T, Extra...>& type, auto parts) {
   part("acceleration_s", &TimeParts::acceleration_s,
        "Time added to cutting blocks and rapids by acceleration and, in look-ahead, by its other limits, s.");
   part("tool_change_s", &TimeParts::tool_change_s, "M06, s.");
-  part("function_s", &TimeParts::function_s, "Other M codes, s.");
+  part("function_s", &TimeParts::function_s,
+       "Other M codes, start of the program, waits for the spindle, rapids of unknown length, s.");
 }
 
 void define_model(py::module_& module) {
@@ -81,7 +82,7 @@ void define_model(py::module_& module) {
              "After it: each axis is filtered, and cutting blocks overlap (paper 004).");
   py::enum_<FilterShape>(module, "FilterShape", "Shape of the acceleration after interpolation.")
       .value("linear", FilterShape::linear,
-             "Moving average of the time constant; with a bell time a second one after it.")
+             "Moving average over the time constant; with a bell time a second one after it.")
       .value("exponential", FilterShape::exponential, "Geometric weights of the time constant.");
   py::enum_<RapidPath>(module, "RapidPath", "Path of a rapid (1401#1).")
       .value("linear", RapidPath::linear, "Straight: the slowest axis determines the tangential rate.")
@@ -117,7 +118,7 @@ void define_model(py::module_& module) {
                      "Moving average after look-ahead, s (1769); 0: none.")
       .def_readwrite("rapid_rate_mm_per_s", &FanucModel::rapid_rate_mm_per_s, "Per axis, shape (3,) (1420).")
       .def_readwrite("rapid_time_constant_s", &FanucModel::rapid_time_constant_s,
-                     "From rest to the rate, per axis, s, shape (3,) (1620).")
+                     "Ramp from rest to the rate at override 1, per axis, s, shape (3,) (1620).")
       .def_readwrite("rapid_bell_time_s", &FanucModel::rapid_bell_time_s, "s (1621); 0: none.")
       .def_readwrite("rapid_path", &FanucModel::rapid_path, "Straight, or every axis at its own rate.")
       .def_readwrite("in_position", &FanucModel::in_position, "Measured or from the servo lag.")
@@ -154,7 +155,8 @@ void define_model(py::module_& module) {
           "Pairs of a spindle speed in 1/min and the time from it to rest in s.");
 
   module.def("for_shaped_blocks", &for_shaped_blocks, py::arg("model"),
-             "The same controller while shaped blocks run: block by block at their feed, without look-ahead.");
+             "The same controller while shaped blocks run: block by block at their feed, without look-ahead (planners "
+             "other than FANUC's keep it).");
   module.def("acceleration_filters", &acceleration_filters, py::arg("model"),
              "Filters after interpolation in order: none, one or two.");
   module.def(
@@ -166,8 +168,8 @@ void define_model(py::module_& module) {
         return block_overlap_time_s(lengths, feeds, model);
       },
       py::arg("lengths_mm"), py::arg("feeds_mm_per_s"), py::arg("model"),
-      "Time of a sequence of overlapping cutting blocks, s: sum of ceil(l / (F T)) T plus the length of the filters "
-      "(paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.");
+      "Time of a sequence of overlapping cutting blocks, s: sum of ceil(l / (F T)) T (with BlockEnd.carry of l / F) "
+      "plus the length of the filters (paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.");
   module.def(
       "rapid_time_s",
       [](const Vector3& travel_mm, const FanucModel& model) {
@@ -231,7 +233,7 @@ void define_simulation(py::module_& module) {
         return simulate_circle(radius_mm, feed_mm_per_s, model);
       },
       py::arg("radius_mm"), py::arg("feed_mm_per_s"), py::arg("model"),
-      "Run circles in XY at a constant feed and measure the mean radius over whole turns. Raises ArgumentError on a "
+      "Run circles in XY at a constant feed and measure the mean radius over one turn. Raises ArgumentError on a "
       "radius or feed <= 0.");
 }
 
@@ -245,7 +247,7 @@ void register_timing(py::module_& module) {
                        in_position_s, length_mm);
   PYBIND11_NUMPY_DTYPE(BlockTime, line, kind, start_s, duration_s, feed_mm_per_s);
 
-  py::enum_<BlockKind>(module, "BlockKind", "Kind of a row of the block table, which contains the number of the kind.")
+  py::enum_<BlockKind>(module, "BlockKind", "Kind of a row of CycleTime.blocks, which has it as a number.")
       .value("cutting", BlockKind::cutting)
       .value("rapid", BlockKind::rapid)
       .value("dwell", BlockKind::dwell)
@@ -281,7 +283,7 @@ void register_timing(py::module_& module) {
       .def_readonly("in_position_s", &InterpolatedTime::in_position_s, "Waits after rapids and exact stops, s.")
       .def_readonly("dwell_s", &InterpolatedTime::dwell_s, "s.")
       .def_readonly("tool_change_s", &InterpolatedTime::tool_change_s, "s.")
-      .def_readonly("function_s", &InterpolatedTime::function_s, "s.")
+      .def_readonly("function_s", &InterpolatedTime::function_s, "As in CycleTime, s.")
       .def_readonly("set_points", &InterpolatedTime::set_points, "Number of set-points.")
       .def_readonly("region_s", &InterpolatedTime::region_s, "Per region, wait included, s.");
 
@@ -293,7 +295,7 @@ void register_timing(py::module_& module) {
       },
       py::arg("program").none(false), py::arg("model"), py::arg("per_block") = false,
       "Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in "
-      "look-ahead. Raises ArgumentError on an invalid model.");
+      "look-ahead. Raises ArgumentError on an invalid model, or a block without a feed.");
   module.def(
       "interpolate_program",
       [](const std::shared_ptr<Program>& program, const FanucModel& model) {
@@ -301,8 +303,8 @@ void register_timing(py::module_& module) {
         return std::make_shared<InterpolatedTime>(interpolate_program(*program, model));
       },
       py::arg("program").none(false), py::arg("model"),
-      "Cycle time by full interpolation, set-point by set-point. Raises ArgumentError on an invalid model, or a "
-      "program of more than 4e9 set-points.");
+      "Cycle time by full interpolation, set-point by set-point. Raises ArgumentError on an invalid model, a block "
+      "without a feed, or a program of more than 4e9 set-points.");
 }
 
 }  // namespace shapegcode::bindings

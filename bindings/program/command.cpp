@@ -36,8 +36,9 @@ void register_shaped_command(py::module_& module) {
                              "How a region is turned into a shaped command on the block grid.")
       .def(py::init<>())
       .def_readwrite("limits", &ShapingOptions::limits, "Limits of the look-ahead.")
-      .def_readwrite("planner", &ShapingOptions::planner,
-                     "The time-optimal planner needs feed, acceleration and jerk of every axis in `limits`.")
+      .def_readwrite(
+          "planner", &ShapingOptions::planner,
+          "What plans the command; `time_optimal` needs feed, acceleration and jerk of every axis in `limits`.")
       .def_readwrite("tolerance", &ShapingOptions::tolerance, "Tolerance for the shaper and the filters after it.")
       .def_readwrite("block_period_s", &ShapingOptions::block_period_s, "s.")
       .def_readwrite("interpolation_period_s", &ShapingOptions::interpolation_period_s, "s.")
@@ -118,17 +119,18 @@ Raises:
             }
             return part;
           },
-          py::arg("periods"), "Next part of at most `periods` periods, or None after the last.")
+          py::arg("periods"), "Next part of at most `periods` periods. None: there is none left, or is_withdrawn.")
       .def("begin_early", &RegionShaper::begin_early,
-           R"(Call before the first part: returns parts before the search for the feed has ended.
+           R"(Lets next() return parts before the search for the feed has ended; call it before the first part.
 
-If the region is one motion from rest to rest, next() returns parts while the search measures them, as if its first plan
-kept the tolerance. If it does not, next() returns None and is_withdrawn is True: all parts returned are invalid.)")
+If the region is one motion from rest to rest, with a target, next() returns parts while the search measures them, as if
+its first plan kept the tolerance. If it does not, next() returns None and is_withdrawn is True: all parts returned are
+invalid.)")
       .def("begin_anew", &RegionShaper::restart,
            R"(Restarts the region from its beginning, with the feed that the search then finds.
 
 Returns:
-    False, and nothing is done, if no part was returned early.)")
+    False, and nothing is done, if begin_early() was not called or had no effect.)")
       .def_property_readonly("is_withdrawn", &RegionShaper::is_withdrawn, "Whether the returned parts are invalid.")
       .def_property_readonly("largest_deviation_mm", &RegionShaper::largest_deviation_mm,
                              "Largest deviation of the target from the path, over the motions returned so far, mm.")

@@ -51,7 +51,7 @@ void register_compare(py::module_& module) {
             }
             return counts;
           },
-          "For each kind (ComparedKind, number in the original, in the emitted program, unchanged).")
+          "For each kind: (ComparedKind, number in the original, in the emitted program, unchanged).")
       .def_readonly("path_mm", &ProgramComparison::path_mm,
                     "Largest distance between the paths of a cut in both programs, in either direction, mm.")
       .def_property_readonly(
@@ -64,7 +64,7 @@ void register_compare(py::module_& module) {
             }
             return differences;
           },
-          "For each difference (ComparedKind, line of the original, line of the emitted program, contents of the "
+          "For each difference: (ComparedKind, line of the original, line of the emitted program, contents of the "
           "original, of the emitted program, distance of the paths in mm); line 0: the program has nothing there.");
 
   module.def(

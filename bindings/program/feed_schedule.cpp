@@ -31,8 +31,8 @@ void register_travel(py::module_& module) {
   py::class_<Travel>(module, "Travel", "Actual speeds along a path, per section from one station to the next.")
       .def_property_readonly(
           "highest_mm_per_s", [](const Travel& self) { return column(self.highest_mm_per_s); },
-          "Largest distance within a window, divided by the window, (n,), mm/s. Only travel in XY in the present "
-          "direction counts, converted to travel along the path.")
+          "Largest distance within a window, divided by the window, (n,), mm/s. Except in plunges, only travel in XY "
+          "in the present direction counts, converted to travel along the path.")
       .def_property_readonly(
           "time_s", [](const Travel& self) { return column(self.time_s); }, "Time on each section, (n,), s.")
       .def_readonly("duration_s", &Travel::duration_s, "Time until the set-points rest, s.");
@@ -50,7 +50,7 @@ void register_travel(py::module_& module) {
       py::arg("period_s"), py::arg("filters") = std::vector<Fir>{}, py::arg("window_s") = 0.0,
       "Actual speeds of a path under a speed profile, followed along `along`, the same path or the one from which it "
       "was made. `stations_mm` (n,) ascend to the length of `along`; `filters` act after the set-points; speeds are "
-      "averaged over `window_s`. Raises ArgumentError on stations that do not ascend.");
+      "averaged over `window_s`. Raises ArgumentError on stations that do not ascend to that length.");
   module.def(
       "travel_blocks",
       [](const std::shared_ptr<Path>& blocks, const std::shared_ptr<Path>& along, BlockEnd block_end,
@@ -105,8 +105,8 @@ void define_schedule(py::module_& module) {
         return std::make_shared<Path>(with_feeds(*path, sections));
       },
       py::arg("path").none(false), py::arg("stretches"),
-      "The path with other feeds: segments are divided where a section ends within one. Raises ArgumentError if the "
-      "sections do not cover it.");
+      "The path with the feeds of the sections `stretches`: segments are divided where a section ends within one. "
+      "Raises ArgumentError if the last section does not end at the path's end.");
   module.def(
       "look_ahead_on_load",
       [](const VectorArray& stations, const VectorArray& feeds, const VectorArray& load, const VectorArray& before_s,
@@ -158,8 +158,8 @@ void define_feed_writer(py::module_& module) {
       [](const Program& program, const Region& region, const std::vector<FeedStretch>& sections,
          const FeedWriterOptions& options) { return write_feeds(program, region, sections, options); },
       py::arg("program").none(false), py::arg("region"), py::arg("stretches"), py::arg("options"),
-      "The region's lines with the feeds of sections that cover its path; everything else in them does not change. "
-      "Raises ArgumentError if they do not cover it, or end within a block that cannot be divided.");
+      "The region's lines with the feeds of the sections `stretches`, which cover its path; everything else in them "
+      "does not change. Raises ArgumentError if they do not, or if one ends within a block that cannot be divided.");
 }
 
 }  // namespace

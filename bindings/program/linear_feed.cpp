@@ -65,15 +65,16 @@ void register_linear_feed(py::module_& module) {
       },
       py::arg("path").none(false), py::arg("period_s"), py::arg("tolerance_mm"), py::arg("joints"), py::arg("modes"),
       "Joins blocks of constant feed, each of whole periods, into blocks of linear feed. At the ends of the periods "
-      "the motion stays within a tolerance of the original motion. A block begins at each of `joints` (ascending); "
-      "speeds at the end of the path are chosen so that `modes` of X, Y and Z are at rest there.");
+      "the motion stays within a tolerance of the original motion. `joints`: ascending indices of blocks that must "
+      "begin a joined one; speeds at the end of the path are chosen so that `modes` of X, Y and Z are at rest there.");
   module.def(
       "largest_difference_mm",
       [](const std::shared_ptr<Path>& path, const std::vector<LinearBlock>& blocks, double period_s) {
         return largest_difference_mm(*path, blocks, period_s);
       },
       py::arg("path").none(false), py::arg("blocks"), py::arg("period_s"),
-      "Largest difference of the joined blocks from the blocks of constant feed at the ends of their periods.");
+      "Largest distance between the motions of the joined blocks and of the blocks of constant feed, at the ends of "
+      "the periods, mm.");
 }
 
 }  // namespace shapegcode::bindings

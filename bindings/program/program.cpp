@@ -192,7 +192,8 @@ void register_gcode(py::module_& module) {
       .def_readwrite("bytes", &WorkLimits::bytes, "Bytes of program texts read.")
       .def_readwrite("expansion_moves", &WorkLimits::expansion_moves, "Moves beyond one for each line of the texts.")
       .def_readwrite("expansion_bytes", &WorkLimits::expansion_bytes, "Bytes by which the expanded program is longer.")
-      .def_readwrite("seconds", &WorkLimits::seconds, "Minimum time: moves at their feed, and dwells, s.")
+      .def_readwrite("seconds", &WorkLimits::seconds,
+                     "Minimum time: moves at their feed, dwells, tool changes and M codes, s.")
       .def_readwrite("feed_mm_per_s", &WorkLimits::feed_mm_per_s, "Highest speed of each axis while cutting, mm/s.")
       .def_readwrite("rapid_mm_per_s", &WorkLimits::rapid_mm_per_s, "Highest speed of each axis in a rapid, mm/s.")
       .def_readwrite("tool_change_s", &WorkLimits::tool_change_s, "Time of an M06, s.")
@@ -222,8 +223,9 @@ void register_gcode(py::module_& module) {
       .def_readwrite("retained_variables", &ReaderOptions::retained_variables, "#500 ... #999.")
       .def_readwrite("bindings", &ReaderOptions::bindings, "Codes bound to programs.")
       .def_readwrite("program", &ReaderOptions::program, "O number of the program to read; -1: the first.")
-      .def_readwrite("program_index", &ReaderOptions::program_index,
-                     "Index in `list_programs` of the program, of which alone `text` consists; -1: by number.")
+      .def_readwrite(
+          "program_index", &ReaderOptions::program_index,
+          "Index in `list_programs` of the program to read, of which alone `text` then consists; -1: by number.")
       .def_property(
           "load_program", [](const ReaderOptions& self) { return static_cast<bool>(self.load_program); },
           [](ReaderOptions& self, py::object loader) {
@@ -292,9 +294,9 @@ void register_gcode(py::module_& module) {
           "unexpanded", [](const Program& self) { return py::bytes(self.unexpanded); },
           "The original text, if `text` is the expanded program; else empty.")
       .def("find", &find, py::arg("what"), py::arg("begin") = 0,
-           "Index of the first occurrence of bytes in the text, or -1.")
+           "Index of the first occurrence of bytes in the text from `begin` on, or -1.")
       .def("overwrite", &overwrite, py::arg("begin"), py::arg("what"),
-           "Overwrites as many bytes of the text. Raises ArgumentError beyond the text's end.")
+           "Overwrites the text from `begin` on with the bytes `what`. Raises ArgumentError beyond the text's end.")
       .def_property_readonly(
           "text", [](const Program& self) { return py::bytes(self.text); }, "The whole text.")
       .def("slice", &slice, py::arg("begin"), py::arg("end"), "Bytes of the text between two offsets.")
@@ -305,7 +307,8 @@ void register_gcode(py::module_& module) {
       .def_readonly("block_count", &Program::block_count, "Lines with at least one word.")
       .def_readonly("move_count", &Program::move_count, "Moves, dwells, and blocks with machine functions.")
       .def_readonly("least_time_s", &Program::least_time_s,
-                    "Minimum time: moves at their feed within the axis limits, without acceleration, and dwells, s.")
+                    "Minimum time: moves at their feed within the axis limits, without acceleration; dwells, tool "
+                    "changes and M codes, s.")
       .def_readonly("header_offset", &Program::header_offset, "Byte offset at which a header comment may be inserted.")
       .def_readonly("program_number", &Program::program_number, "O number; -1: none.")
       .def_property_readonly(

@@ -28,7 +28,8 @@ void register_siemens(py::module_& module) {
       .def_readwrite("work_offsets", &SiemensOptions::work_offsets, "By name (\"G54\", \"G54.1P5\"), mm.")
       .def_readwrite("left_out", &SiemensOptions::left_out, "Words that are left out, each with its note.")
       .def_readwrite("left_out_addresses", &SiemensOptions::left_out_addresses, "Addresses, likewise.")
-      .def_readwrite("refused", &SiemensOptions::refused, "Called with a word: why it is refused; empty: not known.")
+      .def_readwrite("refused", &SiemensOptions::refused,
+                     "Called with a word; returns why it is refused, empty if not known.")
       .def_property(
           "called", [](const SiemensOptions& self) { return static_cast<bool>(self.called); },
           [](SiemensOptions& self, py::object find) { self.called = source_loader<std::string>(std::move(find)); },

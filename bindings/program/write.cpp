@@ -110,7 +110,8 @@ void register_emission(py::module_& module) {
       "Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. "
       "Raises ArgumentError on a position outside +-99999.999 mm.");
 
-  py::class_<BlockMark>(module, "BlockMark", "An N word and a comment, written before the block that begins there.")
+  py::class_<BlockMark>(module, "BlockMark",
+                        "An N word and a comment, written before the first block that begins at `period` or later.")
       .def(py::init([](std::uint32_t period, std::int32_t n_number, const py::bytes& comment, std::uint32_t n_digits) {
              return BlockMark{period, n_number, static_cast<std::string>(comment), n_digits};
            }),

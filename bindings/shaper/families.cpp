@@ -106,7 +106,8 @@ void register_sensitivity(py::module_& m) {
       .def_readonly("residual_ratio", &WorstResidual::residual_ratio, "Residual ratio at frequency_hz, no unit.")
       .def_readonly("frequency_hz", &WorstResidual::frequency_hz, "Natural frequency in Hz at which it was found.")
       .def_readonly("upper_bound", &WorstResidual::upper_bound,
-                    "No frequency of the band has a larger residual ratio; within 1e-6 of residual_ratio, or 1e-12.");
+                    "No frequency of the band has a larger residual ratio; above residual_ratio by at most 1e-6 of it, "
+                    "or 1e-12.");
   py::class_<FrequencyBand>(m, "FrequencyBand", "A band of frequencies.")
       .def_readonly("lowest_hz", &FrequencyBand::lowest_hz, "Lower end in Hz.")
       .def_readonly("highest_hz", &FrequencyBand::highest_hz, "Upper end in Hz.");
@@ -158,7 +159,7 @@ Args:
     vibration_limit: Residual ratio (no unit), above 0 and below 1.
 
 Returns:
-    The band; of zero width if the limit is exceeded at the mode itself; up to at most ten times its frequency.
+    The band; of zero width if the limit is exceeded at the mode; never beyond ten times the mode's frequency.
 
 Raises:
     ArgumentError: The limit is outside its range.

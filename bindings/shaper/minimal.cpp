@@ -46,9 +46,9 @@ void register_search(py::module_& m) {
       R"(Minimal multi-mode shapers: n+1 impulses that cancel n = 1 ... 6 modes, damped or not.
 
 One mode is closed form and two are searched completely. Three and more are searched from many low-discrepancy starts
-and by boxes of times in ascending duration, each of which is proven empty or shrunk to one solution; `complete` and
-`complete_up_to_s` tell what is proven. Shapers with fewer impulses that cancel all modes are listed too; solutions that
-are not isolated (undamped modes at odd ratios, which one ZV cancels) are not.
+and by boxes of times in ascending duration, each proven empty, shrunk to one solution, or unresolved; `complete` and
+`complete_up_to_s` state what is proven. Shapers with fewer impulses that cancel all modes are listed too; families of
+solutions that are not isolated (with undamped modes at odd ratios, which one ZV cancels) are not.
 
 Args:
     modes: One to six modes, no two poles within 1e-6 of one another (relative).

@@ -107,7 +107,8 @@ Raises:
 }
 
 void register_shaper(py::module_& m) {
-  py::class_<Shaper>(m, "Shaper", R"(Input shaper: amplitudes at ascending times that add up to one. Immutable.
+  py::class_<Shaper>(m, "Shaper",
+                     R"(Input shaper: impulses at ascending times, whose amplitudes add up to one. Immutable.
 
 Args:
     times_s: Times of the impulses in s, shape (n,), n >= 1, strictly ascending from exactly 0.
@@ -138,8 +139,8 @@ Source: paper 002, eq. 4 and 9.)")
       .def("residual_ratio", &shapegcode::residual_ratio, py::arg("mode"),
            R"(Residual vibration of a mode after the last impulse, relative to the unshaped one.
 
-V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation has no effect. Its
-rounding floor is about 1e-16*(1 + omega*t_N)*abs_sum.
+V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation has no effect.
+V has a rounding floor of about 1e-16*(1 + omega*t_N)*abs_sum.
 
 Args:
     mode: The mode that vibrates; it need not be one that the shaper was designed for.
@@ -197,11 +198,11 @@ Returns:
     A shaper with 2 non-negative impulses.
 
 Raises:
-    ArgumentError: A value is outside its range, or a damping ratio beside a mode.
+    ArgumentError: A value is outside its range, or a damping ratio is given although `mode` is a Mode.
 
 Source: paper 002, eq. 1-2 (Smith 1958).)");
   m.def("zv_on_grid", &shapegcode::zv_on_grid, py::arg("mode"), py::arg("period_s"), release_gil(),
-        R"(ZV with impulses at multiples of a period only; the second one is divided between two neighbours.
+        R"(ZV with impulses at multiples of a period only: the second impulse is divided between two of them.
 
 Args:
     mode: The mode to cancel.
@@ -230,7 +231,7 @@ Source: paper 002, eq. 3.)");
   m.def(
       "convolved_zv", [](const std::vector<Mode>& modes) { return shapegcode::convolved_zv(modes); }, py::arg("modes"),
       release_gil(),
-      R"(Convolved ZV, the conventional multi-mode shaper: 2^n non-negative impulses.
+      R"(Convolved ZV, the conventional multi-mode shaper: up to 2^n non-negative impulses.
 
 Args:
     modes: The n >= 1 modes to cancel.
@@ -254,14 +255,14 @@ Args:
     first: One mode, damped or not.
     second: The other one; either may be the faster.
     max_duration_s: Largest duration in s, above 0, at most 100 periods of the faster mode.
-    max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1. Rounding may exceed 1: use
-        has_negative to select the non-negative ones.
+    max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1. With 1, rounding
+        may exclude non-negative shapers: select those by has_negative instead.
 
 Returns:
     The shapers, residual_ratio of both modes below 1e-13; empty if there is none in the range.
 
 Raises:
-    ArgumentError: The modes' poles agree within 1e-6, or a value is outside its range.
+    ArgumentError: The modes' poles agree within 1e-6 (relative), or a value is outside its range.
 
 Source: paper 002, eq. 12-17; the search is this project's.)");
   m.def(

@@ -163,7 +163,7 @@ def unit_of_another(folder: Path) -> None:
         (without_lines, "Block_Number|block"),
         (few_readings, "reports|readings|lines"),
         (broken_off, "completed at line .* s before its end"),
-        (unit_of_another, "mm/s would not be an override.*feed_unit"),
+        (unit_of_another, "mm/s that would not be an override.*feed_unit"),
     ],
 )
 def test_what_does_not_belong_together_is_refused(spoil: Callable[[Path], None], said: str, tmp_path: Path) -> None:

@@ -205,7 +205,7 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match=r"force over response"):
         identify(write_uff(tmp_path / "k.uff", ordinate_spec_data_type=13, orddenom_spec_data_type=8))
     good = FrequencyResponse("frf", HZ[1:], noisy(HZ[1:]))
-    with pytest.raises(RecordError, match=r"band of 500 to 900 Hz: must ascend and lie within the lines, 0.5 to 399.5"):
+    with pytest.raises(RecordError, match=r"band of 500 to 900 Hz: must ascend and overlap the lines, 0.5 to 399.5"):
         identify([good], band_hz=(500.0, 900.0))
     with pytest.raises(RecordError, match="10 lines of a frequency response; required: 16"):
         FrequencyResponse("few", HZ[1:11], noisy(HZ[1:11]))

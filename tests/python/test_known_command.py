@@ -166,7 +166,7 @@ def test_what_is_refused_with_its_reason(program: Path, motion: tuple[FloatArray
         found_in(program, Record("other axis", good.period_s, 0.3 * noise + 0.5 * hum))
     with pytest.raises(RecordError, match=r"every sample is 9.81 m/s²: nothing was measured"):
         found_in(program, Record("flat", good.period_s, np.full(len(noise), 9.81)))
-    with pytest.raises(RecordError, match=r"correlate with it, the best by [0-9]?[0-9] % \(limit 50 %\)"):
+    with pytest.raises(RecordError, match=r"correlate with the record, the best by [0-9]?[0-9] % \(limit 50 %\)"):
         found_in(program, Record("noise", good.period_s, noise))
     clipped = Record("clipped", good.period_s, np.clip(good.response, -3.0, 3.0))
     with pytest.raises(RecordError, match=r"overload: the acceleration is cut off at 3 m/s²"):

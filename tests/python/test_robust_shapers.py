@@ -213,7 +213,7 @@ def test_refusal_shows_the_nearest() -> None:
     text = str(failed.value)
     assert text.startswith("no design within 20 ms on a 5 ms grid keeps below 1 % for 46:0.02±10% Hz, 131:0.02±10% Hz")
     match = re.search(
-        r"the longest allowed reaches ([\d.]+) %; (\d+) ms suffices; a period of ([\d.]+) ms reaches", text
+        r"the longest allowed shaper reaches ([\d.]+) %; (\d+) ms suffices; a period of ([\d.]+) ms reaches", text
     )
     assert float(match[1]) == pytest.approx(100.0 * least_possible(PAPER_BANDS, 0.005, 4), rel=0.005)
     assert least_possible(PAPER_BANDS, 0.005, round(int(match[2]) / 5)) <= 0.01

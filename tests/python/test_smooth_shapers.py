@@ -172,7 +172,7 @@ def test_refusals_say_what_would_do() -> None:
         DesignError, match=r"131 Hz .* 5 ms grid .*a period below .* ms resolves its highest zero, 282\.8"
     ):
         design("smooth-ei2", band, DesignOptions(period_s=0.005))
-    with pytest.raises(DesignError, match="it is for modes with less damping"):
+    with pytest.raises(DesignError, match="this family is for modes with less damping"):
         design("smooth-ei2", [ModeBand(Mode(30.0, 0.8))], DesignOptions(period_s=0.0005))
     with pytest.raises(DesignError, match=r"would take 80250 samples: at most 20000; use a longer period"):
         design("smooth-zv", [ModeBand(Mode(0.1, 0.0))], DesignOptions(period_s=0.0001, max_duration_s=10.0))

@@ -181,7 +181,7 @@ def test_what_a_conversion_would_write_counts_too(tmp_path: Path, monkeypatch: p
     (tmp_path / "part.nc").write_text(f"{HEAD}G01 X200. F2000\nX0\n{END}")
     blocks = round(sg.Program.read(tmp_path / "part.nc", machine).core.least_time_s / machine.controller.block_time_s)
     monkeypatch.setattr(computer, "available_bytes", lambda: 50_000)
-    with pytest.raises(sg.ProgramError, match=rf"up to {blocks} blocks are to be written: .* 50000 are available"):
+    with pytest.raises(sg.ProgramError, match=rf"about {blocks} blocks are to be written: .* 50000 are available"):
         read_for_conversion(tmp_path / "part.nc", machine)
     monkeypatch.setattr(computer, "available_bytes", lambda: None)
     assert read_for_conversion(tmp_path / "part.nc", machine).regions

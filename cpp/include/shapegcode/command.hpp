@@ -146,16 +146,16 @@ class RegionShaper {
   RegionShaper& operator=(RegionShaper&&) noexcept;
   ~RegionShaper();
 
-  /// Next part of at most `periods` periods; false after the last one, and `part` is then unchanged.
+  /// Next part of at most `periods` periods; false after the last one or if withdrawn, and `part` is then unchanged.
   /// `part.segment_periods` contains all marks of the motions begun so far.
   [[nodiscard]] bool next(ShapedCommand& part, std::uint32_t periods);
-  /// Call before the first part. If the region is one motion from rest to rest, next() then returns parts while the
-  /// search for the feed still measures them, as if its first plan kept the tolerance. If it does not, next() returns
-  /// false and is_withdrawn() is true: all parts returned so far are invalid.
+  /// Call before the first part. If the region is one motion from rest to rest, with a target, next() then returns
+  /// parts while the search for the feed still measures them, as if its first plan kept the tolerance. If it does not,
+  /// next() returns false and is_withdrawn() is true: all parts returned so far are invalid.
   void begin_early() noexcept;
   [[nodiscard]] bool is_withdrawn() const noexcept;
-  /// Restarts the region from its beginning, with the feed that the search then finds; false, and nothing done, if no
-  /// part was returned early.
+  /// Restarts the region from its beginning, with the feed that the search then finds; false, and nothing done, if
+  /// begin_early() was not called or had no effect.
   bool restart();
   /// Largest deviation of the target from the path in mm, over the motions returned so far.
   [[nodiscard]] double largest_deviation_mm() const noexcept;

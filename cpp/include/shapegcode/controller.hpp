@@ -22,7 +22,7 @@
 //     settings.limits.max_jerk_mm_per_s3.setConstant(50000.0);
 //     settings.shaper = Fir({0, 11}, {0.516, 0.484});           // ZV of 46 Hz on a grid of 1 ms
 //     MotionController control(settings);
-//     control.push(make_line({0, 0, 0}, {40, 0, 0}, 100.0));     // planning thread
+//     control.push(make_line({0, 0, 0}, {40, 0, 0}, 100.0));     // pushing thread
 //     control.push(make_line({40, 0, 0}, {40, 40, 0}, 100.0));
 //     std::array<double, 3> set_point;
 //     while (control.step(set_point) != Activity::idle) drive(set_point);   // every millisecond
@@ -52,8 +52,8 @@ struct OffsetLimits {
   double max_feed = 0.0;
   double max_acceleration = 0.0;
   double max_jerk = 0.0;
-  /// Backlash of the drive: compensated by the offset in negative motion; the control starts as after a positive
-  /// motion.
+  /// Backlash of the drive: subtracted from the axis' position in negative motion; the control starts as after a
+  /// positive motion.
   double backlash = 0.0;
 };
 
@@ -71,8 +71,9 @@ struct ControllerSettings {
   MotionLimits limits;
   /// One for each following axis after X, Y and Z, at most six.
   std::vector<FollowingLimits> following;
-  /// Permitted deviation from the path by corner rounding, smoothing and shaper. 0: corners are exact stops; none:
-  /// corners are rounded up to the middle between neighbours, and smoothing and shaper may deviate without limit.
+  /// Permitted deviation from the path by corner rounding, smoothing and shaper. 0 (only without smoothing and shaper):
+  /// corners are exact stops; none: corners are rounded up to the middle between neighbours, and smoothing and shaper
+  /// may deviate without limit.
   double contour_tolerance_mm = 0.05;
   /// Duration of each of two moving averages for every axis; 0 = none, as rounded corners need none.
   double smoothing_time_s = 0.0;
@@ -81,7 +82,8 @@ struct ControllerSettings {
   ControllerShaper shaper = Fir({0}, {1.0});
   /// Shapers that can replace `shaper` (number 0, one for all axes or one for each) in motion, numbers 1 and up, and
   /// the time of the cross-fade. Limits and tolerance are kept meanwhile; the path's limits are reduced by what the
-  /// fade may need, which is less the longer it takes. Not with a contour correction.
+  /// fade may need, which is less the longer it takes. Not with a contour correction or a shaper that depends on an
+  /// axis.
   std::vector<AxisShapers> other_shapers;
   double fade_time_s = 0.5;
   /// Compensate, to the second order, the radius error of arcs caused by smoothing and shaper. Costs a delay of
@@ -99,9 +101,9 @@ struct ControllerSettings {
   int lead_periods = 60;
   /// Of each axis, or empty. A segment that leads beyond it is not accepted.
   std::vector<AxisTravel> travel;
-  /// Of each axis, or empty. The limits of the path are reduced by them.
+  /// Of each axis, or empty. The limits of the path are reduced by them. Not with a shaper that depends on an axis.
   std::vector<OffsetLimits> offset;
-  /// Maximum acceleration of each axis, for emergency_stop(); empty: it decelerates as abort() does.
+  /// Acceleration of each axis for emergency_stop(), at least its maximum; empty: it decelerates as abort() does.
   std::vector<double> emergency_acceleration;
   /// Periods of motion stored for retrace(), some 150 bytes each.
   std::size_t retrace_periods = 0;
@@ -150,9 +152,9 @@ enum class Activity : std::uint32_t {
   moving,    ///< along the path, or the shaper's output is not yet at rest
   stopping,  ///< decelerating for hold(), flush() or abort()
   held,      ///< at rest after hold(), or at a programmed stop
-  starved,   ///< decelerating: the queue ran empty before a segment with `stop_at_end`. Idle when at rest
+  starved,   ///< decelerating: the queue ran empty, its last segment has no `stop_at_end`. Idle once at rest
   aborted,   ///< at rest after abort() or emergency_stop(); the path is discarded
-  jogging,   ///< away from the position where the path rests, or back to it
+  jogging,   ///< an axis moves away from the position where the path rests, or back to it
 };
 [[nodiscard]] const char* text_of(Activity activity) noexcept;
 
@@ -161,7 +163,7 @@ enum class JogResult : std::uint8_t {
   accepted,
   path_moves,  ///< the control is neither held nor flushed nor aborted, or not yet at rest
   no_axis,
-  not_finite,
+  not_finite,     ///< or a distance of retrace() below zero
   no_speed,       ///< of a distance: not above zero
   beyond_travel,  ///< the distance leads out of the travel, or the axis is at its end already
   no_record,      ///< the settings store no periods for retrace()
@@ -205,8 +207,8 @@ struct ControllerState {
 
 /// Runs a path that grows during motion: look-ahead over a window of segments, motion nearly as fast as the limits of
 /// the axes allow, one set-point per period through contour correction, smoothing and shaper. One thread may push, one
-/// may step, one may plan, any may call the rest. Override, hold and abort act before smoothing and shaper, which
-/// therefore always keep their effect.
+/// may step, one may plan, any may call the rest unless stated otherwise. Override, hold and abort act before smoothing
+/// and shaper, which therefore always keep their effect.
 class MotionController {
  public:
   /// Throws Error(argument) on invalid settings, with value and limit.
@@ -217,13 +219,13 @@ class MotionController {
   MotionController(const MotionController&) = delete;
   MotionController& operator=(const MotionController&) = delete;
 
-  /// Appends a segment, from the planning thread: never blocks, does not allocate. `following_end`: positions of the
+  /// Appends a segment, from the pushing thread: never blocks, does not allocate. `following_end`: positions of the
   /// following axes at its end; they move in proportion to the path length. If only following axes move, the length of
   /// the segment is the largest of their distances, and the feed is that axis'.
   PushResult push(const Segment& segment, std::span<const double> following_end = {},
                   const SegmentRules& rules = {}) noexcept;
 
-  /// Appends an event after the segment pushed last, from the planning thread. As many events may wait as segments.
+  /// Appends an event after the segment pushed last, from the pushing thread. As many events may wait as segments.
   PushResult push_event(const ControllerEvent& event) noexcept;
   /// Likewise a dwell: the set-points rest there for this time. A hold during the dwell restarts it.
   PushResult push_dwell(double time_s) noexcept;
@@ -288,8 +290,8 @@ class MotionController {
   /// Sets an offset, which the axis approaches within the limits of the settings' `offset`, at rest and in motion; it
   /// is shaped like the path. From any thread. False: the axis has no such limits, or the value is not finite.
   bool offset(int axis, double value) noexcept;
-  /// Sets the travel range of an axis. If the planned path would leave it, the control is held, with the planned stop.
-  /// From any thread. False: there is no such axis, or `low` is above `high`.
+  /// Sets the travel range of an axis. If the path to be run next would leave it, the control is held and stops where
+  /// the motion already planned ends. From any thread. False: there is no such axis, or `low` is above `high`.
   bool travel(int axis, const AxisTravel& travel) noexcept;
 
   /// Fades to one of the settings' shapers, from the next period on or after an earlier fade or a synchronous segment;

@@ -10,9 +10,9 @@ namespace shapegcode {
 /// The kind of input that an Error concerns; the Python binding maps each kind to one exception class.
 enum class ErrorKind : std::uint8_t {
   program,   ///< the CNC program text: carries line and column
-  design,    ///< a shaper that does not exist, or not on this grid
+  design,    ///< a shaper that does not exist, or not on this grid, or cannot be computed
   argument,  ///< an argument of a function is outside its stated range
-  numeric,   ///< a solver failed; the message carries its flag
+  numeric,   ///< a solver failed or did not converge; the message says which
 };
 
 /// The one error type of the library. The message carries the value and the limit; `line` and `column` count from 1

@@ -156,7 +156,7 @@ struct FanucModel {
 
   MotionKind motion = MotionKind::look_ahead;
   FilterShape filter_shape = FilterShape::linear;  ///< after_interpolation only (1610)
-  double time_constant_s = 0.05;                   ///< after_interpolation: A (1622); rounded to whole periods
+  double time_constant_s = 0.05;                   ///< after_interpolation: A (1622); linear: rounded to whole periods
   double bell_time_s = 0.0;                        ///< after_interpolation, linear: second moving average; 0: none
   /// Exponential: the weights end when less than this ratio of their sum remains (the controller stops when less than
   /// an increment remains); the length of the filter is time_constant_s * ln(1 / ratio).
@@ -205,7 +205,8 @@ struct FanucModel {
 /// Throws Error(argument) on an impossible value; the message names it.
 void check(const FanucModel& model);
 
-/// Filters after interpolation in order: none, one or two (acceleration after interpolation, or 1769 in look-ahead).
+/// Filters after interpolation in order: none, one or two (acceleration after interpolation, 1769 in look-ahead, or
+/// LinuxCNC's cubic interpolation of the joints).
 [[nodiscard]] std::vector<Fir> acceleration_filters(const FanucModel& model);
 
 /// Periods that filters add to a sequence of set-points: the number of taps of their cascade (A for one moving average

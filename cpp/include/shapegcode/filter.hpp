@@ -89,7 +89,7 @@ class FirStream {
 };
 
 /// A set of filters on one grid, with a varying choice among them. Each increment of the input is replaced by the whole
-/// impulse train of the filter valid where the increment begins (scatter form). Every train is completed, so every
+/// impulse train of the filter that its place selects (scatter form). Every train is completed, so every
 /// increment keeps the zeros of its own filter, however often the filters change. Taking the output from another filter
 /// at a switch (gather form) would cut off the trains in progress.
 ///
@@ -162,9 +162,10 @@ class VaryingFirStream {
 /// A set of filters along an axis: the position of the input selects the valid one.
 class FollowingFir {
  public:
-  /// Filter k of `fir` is valid where axis `axis` (0, 1, 2) is at `position_mm[k]`; in between the increments are
-  /// divided, beyond the ends the nearest filter is valid. Throws Error(argument) on an invalid axis, a number of
-  /// positions other than that of filters, or positions that are not finite and strictly ascending.
+  /// Filter k of `fir` is valid where axis `axis` (0, 1, 2) is at `position_mm[k]`; between two positions each
+  /// increment is divided between their filters, beyond the ends the nearest filter is valid. Throws Error(argument) on
+  /// an invalid axis, a number of positions other than that of filters, or positions that are not finite and strictly
+  /// ascending.
   FollowingFir(VaryingFir fir, int axis, std::vector<double> position_mm);
 
   [[nodiscard]] const VaryingFir& fir() const noexcept { return fir_; }

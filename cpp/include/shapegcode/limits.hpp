@@ -34,7 +34,7 @@ struct MotionLimits {
   Vector3 max_acceleration_mm_per_s2 = Vector3::Constant(none);
   Vector3 max_jerk_mm_per_s3 = Vector3::Constant(none);
   Vector3 corner_speed_difference_mm_per_s = Vector3::Constant(none);  ///< per axis at a corner
-  double corner_stop_angle_rad = none;  ///< a corner that turns by as much or more is a stop
+  double corner_stop_angle_rad = none;  ///< a corner that turns by this angle or more is a stop
   double block_time_s = 0.0;            ///< minimum duration of a block: the control's block processing time
   double junction_deviation_mm =
       none;  ///< a corner is passed as an arc that cuts it by this distance, at the axes' acceleration
@@ -49,8 +49,8 @@ struct MotionLimits {
   double feed_excess_ratio = 0.0;  ///< neighbours faster by up to this ratio need no such spread
 };
 
-/// Deviation permitted to a filter after the interpolation at corners and on arcs. With zero variance it limits
-/// nothing.
+/// Deviation permitted to a filter after the interpolation at corners and on arcs. With zero variance and mean
+/// deviation it limits nothing.
 struct FilterTolerance {
   double contour_tolerance_mm = MotionLimits::none;  ///< permitted deviation by the filter
   double corner_share =

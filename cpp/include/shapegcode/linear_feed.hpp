@@ -45,12 +45,13 @@ struct LinearBlock {
                                                        std::span<const double> times_s);
 
 /// Joins blocks of constant feed, each of whole periods, into blocks of linear feed. At the ends of the periods the
-/// motion stays within a tolerance of the original motion. A block begins at each of `joints` (ascending); speeds at
-/// the end of the path are chosen so that `modes` are at rest there.
+/// motion stays within a tolerance of the original motion. `joints`: ascending indices of blocks at which a joined
+/// block must begin; speeds at the end of the path are chosen so that `modes` are at rest there.
 [[nodiscard]] std::vector<LinearBlock> linear_blocks(const Path& path, double period_s, double tolerance_mm,
                                                      std::span<const std::uint32_t> joints, const AxisModes& modes);
 
-/// Largest difference of the joined blocks from the blocks of constant feed at the ends of their periods.
+/// Largest distance between the motions of the joined blocks and of the blocks of constant feed, at the ends of the
+/// periods, mm.
 [[nodiscard]] double largest_difference_mm(const Path& path, std::span<const LinearBlock> blocks, double period_s);
 
 }  // namespace shapegcode

@@ -76,7 +76,7 @@ struct SpeedCaps {
 /// corners are lengthened by half of it on both sides, so that smoothing does not raise the speed at the corner.
 ///
 /// With a jerk time the acceleration of an axis may exceed its limit where segments of different direction meet at
-/// speed (only the corner limits apply there), and jerk on arcs is not bounded.
+/// speed (only the corner limits apply there); on arcs `max_jerk_mm_per_s3` limits the jerk of the turn, v^3/r^2, only.
 [[nodiscard]] SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const FilterTolerance& filter = {},
                                       const SpeedCaps* caps = nullptr);
 

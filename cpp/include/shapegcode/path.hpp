@@ -46,7 +46,8 @@ struct Segment {
   return segment;
 }
 
-/// An arc or helix about `centre`; `sweep_rad` signed (see Segment). Throws Error(argument) on a zero radius.
+/// An arc or helix about `centre`; `sweep_rad` signed (see Segment). Throws Error(argument) on a zero radius or sweep,
+/// a number that is not finite, or no such axis.
 [[nodiscard]] Segment make_arc(const Vector3& start, const Vector3& end, const Vector3& centre, double sweep_rad,
                                int normal, double feed_mm_per_s, std::uint32_t line = 0);
 

@@ -28,15 +28,16 @@ struct PlannerRules {
   double minimum_cruise_ratio = 0.5;             ///< klipper: max_accel_to_decel is max_accel times (1 - ratio)
   double arc_tolerance_mm = 0.002;               ///< grbl: chords of an arc lie within it ($12)
   double junction_deviation_mm = 0.01;  ///< grbl: a corner is passed as an arc that cuts it by this distance ($11)
-  double period_s = 0.001;              ///< linuxcnc: of the servo thread, in which it plans ([EMCMOT] SERVO_PERIOD)
+  double period_s = 0.001;              ///< linuxcnc: of the servo thread, which plans ([EMCMOT] SERVO_PERIOD)
   double blend_tolerance_mm = 0.0;      ///< linuxcnc: G64 P; 0: limited by half of a segment only
   /// linuxcnc: G64 Q, by default that of P: lines of one feed within it are joined, an arc in XY within it becomes two
   /// lines
   double naive_cam_tolerance_mm = 0.0;
-  double ramp_frequency_hz = 100.0;  ///< linuxcnc: shorter segments are ramps ([TRAJ] ARC_BLEND_RAMP_FREQ)
-  double kink_ratio = 0.1;           ///< linuxcnc: ratio of the acceleration for a kink (ARC_BLEND_KINK_RATIO)
+  double ramp_frequency_hz = 100.0;  ///< linuxcnc: segments of less than 1/it s are ramps ([TRAJ] ARC_BLEND_RAMP_FREQ)
+  double kink_ratio = 0.1;           ///< linuxcnc: part of the acceleration that a kink may take (ARC_BLEND_KINK_RATIO)
   double max_feed_override = 1.0;    ///< linuxcnc: [DISPLAY] MAX_FEED_OVERRIDE, for which it plans
-  /// linuxcnc: a rapid follows the path; else (a dwell, an M function) its last segment has half of the acceleration
+  /// linuxcnc: a rapid follows the path; else (a dwell, an M function) the path's last segment has half of the
+  /// acceleration
   bool rapid_follows = true;
   std::size_t optimization_depth = 50;  ///< linuxcnc: segments in its look-ahead (ARC_BLEND_OPTIMIZATION_DEPTH)
   /// grbl: blocks of its planner's buffer. It can stop at the end of the last of them at any time.
@@ -61,16 +62,15 @@ struct ControlledMotion {
 [[nodiscard]] ControlledMotion controlled_motion(const std::shared_ptr<const Path>& path, const MotionLimits& limits,
                                                  const PlannerRules& rules);
 
-/// Effect of LinuxCNC's two rules for short segments on a path at its feeds.
+/// Effect of LinuxCNC's rules for short segments (kinks and ramps) on a path at its feeds.
 struct LinuxcncSlowing {
   std::size_t segments = 0;
-  std::size_t kinks = 0;        ///< junctions that need more of the acceleration than the kink ratio
+  std::size_t kinks = 0;        ///< junctions that need at least the kink ratio of the acceleration
   double largest_ratio = 0.0;   ///< needed by any junction of at most `corner_rad`
   double speed_mm_per_s = 0.0;  ///< there
   double angle_rad = 0.0;
   std::uint32_t line = 0;
-  std::size_t ramps =
-      0;  ///< segments whose speed is a ramp, because they are shorter than the ramp frequency's inverse
+  std::size_t ramps = 0;  ///< segments whose speed is a ramp, because they take less than the ramp frequency's inverse
 };
 
 /// Finds segments slowed by these rules. Turns of more than `corner_rad` are corners of the path and do not count.

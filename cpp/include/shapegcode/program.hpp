@@ -69,7 +69,7 @@ struct WorkLimits {
   std::uint64_t bytes = 1'000'000'000;         ///< of program texts read
   std::uint64_t expansion_moves = 800'000;     ///< moves beyond one for each line of the texts
   std::uint64_t expansion_bytes = 33'554'432;  ///< of the expanded program beyond those of the texts
-  double seconds = 100'000.0;                  ///< minimum time: moves at their feed within the axis limits; dwells
+  double seconds = 100'000.0;                  ///< minimum time: moves within feeds and axis limits; dwells; M codes
   Vector3 feed_mm_per_s = Vector3::Constant(std::numeric_limits<double>::infinity());   ///< of each axis while cutting
   Vector3 rapid_mm_per_s = Vector3::Constant(std::numeric_limits<double>::infinity());  ///< of each axis in a rapid
   double tool_change_s = 0.0;                                                           ///< of an M06

@@ -27,7 +27,7 @@ bool step_into(std::span<double> out, PositionSource& source) noexcept {
   return moving;
 }
 
-/// Data exchanged between stages: positions in mm, one row per period, one contiguous column per axis.
+/// Samples of a motion: positions in mm, one row per period, one contiguous column per axis.
 struct Samples {
   double period_s = 0.0;
   Eigen::MatrixXd positions_mm;  ///< (n_samples, n_axes), column-major

@@ -19,7 +19,7 @@
 //     shapegcode_rules rules;
 //     shapegcode_rules_init(&rules, sizeof rules);
 //     rules.stop_at_end = 1;
-//     shapegcode_controller_push_line(control, corner, 100.0, &rules);  // planning thread
+//     shapegcode_controller_push_line(control, corner, 100.0, &rules);  // pushing thread
 //     double set_point[3];
 //     shapegcode_activity activity;
 //     do {                                                              // real-time thread, every millisecond
@@ -28,8 +28,8 @@
 //     } while (activity != SHAPEGCODE_IDLE);
 //     shapegcode_controller_destroy(control);
 //
-// A program compiled with an older header of version 1 runs with a newer library: codes keep their values, structs only
-// grow at their ends and contain their size, and functions keep their meaning.
+// A program compiled with an older header of version 1 runs with a newer library: codes keep their values, only structs
+// whose size is stored or passed grow, at their ends, and functions keep their meaning.
 
 #ifdef __cplusplus
 extern "C" {
@@ -52,7 +52,7 @@ typedef enum shapegcode_status {
   SHAPEGCODE_NOT_CONNECTED = 2,    ///< it does not start where the one before ended
   SHAPEGCODE_NO_LENGTH = 3,        ///< it moves no axis by more than 1e-9 mm or degrees
   SHAPEGCODE_NO_FEED = 4,          ///< a feed that is not above zero, or not finite
-  SHAPEGCODE_NOT_FINITE = 5,       ///< a position, centre or sweep is not finite
+  SHAPEGCODE_NOT_FINITE = 5,       ///< a number is not finite, or a distance of retrace is below zero
   SHAPEGCODE_WRONG_AXES = 6,       ///< not as many following axes as the settings have
   SHAPEGCODE_AFTER_ABORT = 7,      ///< nothing is accepted between abort and restart
   SHAPEGCODE_NO_ARC = 8,           ///< no radius, no sweep, no such plane, or the sweep does not lead to the end
@@ -67,7 +67,8 @@ typedef enum shapegcode_status {
   SHAPEGCODE_NO_RECORD = 17,       ///< no periods are stored for retrace
   SHAPEGCODE_ERROR_ARGUMENT = -1,  ///< a value is outside its range; the message of create names it and the limit
   SHAPEGCODE_ERROR_NULL = -2,      ///< a required pointer is NULL
-  SHAPEGCODE_ERROR_STRUCT_SIZE = -3,  ///< a struct is not initialised, or from a newer header than the library
+  SHAPEGCODE_ERROR_STRUCT_SIZE = -3,  ///< a struct is not initialised, has an unknown feed_rate or feed_of, or is from
+                                      ///< a newer header than the library
   SHAPEGCODE_ERROR_OUT_OF_MEMORY = -4,
   SHAPEGCODE_ERROR_INTERNAL = -5  ///< a defect of the library
 } shapegcode_status;
@@ -81,9 +82,9 @@ typedef enum shapegcode_activity {
   SHAPEGCODE_MOVING = 1,    ///< along the path, or the shaper's output is not yet at rest
   SHAPEGCODE_STOPPING = 2,  ///< decelerating for hold, flush or abort
   SHAPEGCODE_HELD = 3,      ///< at rest after hold, or at a programmed stop
-  SHAPEGCODE_STARVED = 4,   ///< decelerating: the queue ran empty before a segment with stop_at_end. Idle when at rest
-  SHAPEGCODE_ABORTED = 5,   ///< at rest after abort; the path is discarded
-  SHAPEGCODE_JOGGING = 6    ///< away from the position where the path rests, or back to it
+  SHAPEGCODE_STARVED = 4,   ///< decelerating: the queue ran empty, its last segment has no stop_at_end. Idle at rest
+  SHAPEGCODE_ABORTED = 5,   ///< at rest after abort or emergency_stop; the path is discarded
+  SHAPEGCODE_JOGGING = 6    ///< an axis moves away from the position where the path rests, or back to it
 } shapegcode_activity;
 
 /// A short English text; of an unknown code, too. Never NULL.
@@ -102,7 +103,7 @@ typedef struct shapegcode_settings shapegcode_settings;
 typedef enum shapegcode_number {
   SHAPEGCODE_PERIOD_S = 1,
   SHAPEGCODE_FOLLOWING_AXES = 2,        ///< axes that follow X, Y and Z, 0 to 6
-  SHAPEGCODE_CONTOUR_TOLERANCE_MM = 3,  ///< of rounded corners, smoothing and shaper
+  SHAPEGCODE_CONTOUR_TOLERANCE_MM = 3,  ///< of rounded corners, smoothing and shaper; 0 only without the latter two
   SHAPEGCODE_SMOOTHING_TIME_S = 4,      ///< duration of each of two moving averages; 0: none
   SHAPEGCODE_CONTOUR_CORRECTION = 5,    ///< 1: compensate the radius error of arcs by smoothing and shaper
   SHAPEGCODE_WINDOW = 6,                ///< segments in the look-ahead window, 8 at least
@@ -112,7 +113,7 @@ typedef enum shapegcode_number {
   SHAPEGCODE_LAW = 10,           ///< a shapegcode_law
   SHAPEGCODE_TIME_CONSTANT_S = 11,
   SHAPEGCODE_JERK_TIME_S = 12,
-  SHAPEGCODE_CORNER_STOP_ANGLE_RAD = 13,  ///< a corner that turns by as much or more is a stop
+  SHAPEGCODE_CORNER_STOP_ANGLE_RAD = 13,  ///< a corner that turns by this angle or more is a stop
   SHAPEGCODE_BLOCK_TIME_S = 14,           ///< minimum duration of a segment
   SHAPEGCODE_JUNCTION_DEVIATION_MM = 15,  ///< a corner is passed as an arc that cuts it by this distance
   SHAPEGCODE_CENTRIPETAL_ACCELERATION = 16,
@@ -148,7 +149,8 @@ typedef struct shapegcode_shaper {
   size_t count;
 } shapegcode_shaper;
 
-/// Creates settings: no limits, no shaper, 1 ms, a contour tolerance of 0.05 mm. NULL: out of memory.
+/// Creates settings: ramps of 50 ms (SHAPEGCODE_CONSTANT_TIME), no other limits, no shaper, 1 ms, a contour tolerance
+/// of 0.05 mm. NULL: out of memory.
 shapegcode_settings* shapegcode_settings_create(void);
 
 /// Frees settings; NULL is allowed.
@@ -199,11 +201,11 @@ typedef struct shapegcode_state {
 } shapegcode_state;
 
 /// A control. One thread may push, one may step, one may plan, any may call the rest except create, destroy and
-/// restart.
+/// restart, unless stated otherwise.
 typedef struct shapegcode_controller shapegcode_controller;
 
 /// Makes a control at rest at zero. On any result but SHAPEGCODE_OK `*controller` is NULL and `message` (may be NULL)
-/// names the error, with value and limit, truncated to `message_size` characters and always terminated.
+/// names the error, with value and limit, truncated to `message_size` bytes including the terminating zero.
 shapegcode_status shapegcode_controller_create(const shapegcode_settings* settings, shapegcode_controller** controller,
                                                char* message, size_t message_size);
 
@@ -244,7 +246,7 @@ typedef struct shapegcode_rules {
 shapegcode_status shapegcode_rules_init(shapegcode_rules* rules, size_t struct_size);
 
 /// Appends a straight move from the end of the previous segment (at first: from the position of create or restart) to
-/// `end`, with one value per axis. From the planning thread: never blocks, does not allocate. `rules` may be NULL:
+/// `end`, with one value per axis. From the pushing thread: never blocks, does not allocate. `rules` may be NULL:
 /// those of shapegcode_rules_init().
 shapegcode_status shapegcode_controller_push_line(shapegcode_controller* controller, const double* end,
                                                   double feed_mm_per_s, const shapegcode_rules* rules);
@@ -262,7 +264,7 @@ shapegcode_status shapegcode_controller_push_arc(shapegcode_controller* controll
                                                  const shapegcode_arc* arc, double feed_mm_per_s,
                                                  const shapegcode_rules* rules);
 
-/// Appends an event after the segment pushed last, from the planning thread; as many events may wait as segments.
+/// Appends an event after the segment pushed last, from the pushing thread; as many events may wait as segments.
 shapegcode_status shapegcode_controller_push_event(shapegcode_controller* controller, uint32_t id, uint64_t word);
 
 /// Likewise a dwell: the set-points rest there for this time. A hold during the dwell restarts it.
@@ -315,7 +317,7 @@ shapegcode_status shapegcode_controller_resume(shapegcode_controller* controller
 /// Decelerates to rest along the path and discards the rest of it; at rest, flushed lets new segments start there.
 shapegcode_status shapegcode_controller_flush(shapegcode_controller* controller);
 
-/// Completes a flush, from the planning thread: `*done` is 1 and `position` the position of rest, from which segments
+/// Completes a flush, from the pushing thread: `*done` is 1 and `position` the position of rest, from which segments
 /// are accepted again; 0: it is not yet at rest, or plan is running, or there was no flush.
 shapegcode_status shapegcode_controller_flushed(shapegcode_controller* controller, double* position, int* done);
 
@@ -337,15 +339,16 @@ shapegcode_status shapegcode_controller_jog(shapegcode_controller* controller, i
 shapegcode_status shapegcode_controller_jog_by(shapegcode_controller* controller, int axis, double distance,
                                                double speed);
 
-/// Moves back along the path by this distance from its position of rest, as far as periods are stored; a smaller
-/// distance than before: forward. Allowed when a jog is; resume returns to the position of rest, then continues.
+/// Moves back along the path by this distance from its position of rest, as far as periods are stored, at half
+/// the original speed; a smaller distance than before: forward. Allowed when a jog is; resume returns to the position
+/// of rest, then continues.
 shapegcode_status shapegcode_controller_retrace(shapegcode_controller* controller, double distance_mm);
 
 /// Sets an offset, which the axis approaches within the limits of the offset, at rest and in motion. From any thread.
 shapegcode_status shapegcode_controller_offset(shapegcode_controller* controller, int axis, double value);
 
-/// Sets the travel range of an axis. If the planned path would leave it, the control is held, with the planned stop.
-/// From any thread.
+/// Sets the travel range of an axis. If the path to be run next would leave it, the control is held and stops where the
+/// motion already planned ends. From any thread.
 shapegcode_status shapegcode_controller_travel(shapegcode_controller* controller, int axis, double low, double high);
 
 /// Sets the control at rest at a position (one value per axis), with an empty queue. Not while another thread pushes,
@@ -356,7 +359,7 @@ shapegcode_status shapegcode_controller_restart(shapegcode_controller* controlle
 shapegcode_status shapegcode_controller_state(const shapegcode_controller* controller, shapegcode_state* state,
                                               size_t struct_size);
 
-/// Mean delay of correction, smoothing and shaper in periods.
+/// Mean delay of correction, smoothing and the shaper requested last, in periods.
 shapegcode_status shapegcode_controller_delay(const shapegcode_controller* controller, double* periods);
 
 #ifdef __cplusplus

@@ -1,6 +1,7 @@
 #pragma once
 
-// The whole library in one include. A program text becomes moves, and the moves a time:
+// The library in one include, except linear_feed.hpp, linuxcnc_program.hpp and siemens_program.hpp. A program text
+// becomes moves, and the moves a time:
 //
 //     #include "shapegcode/shapegcode.hpp"
 //

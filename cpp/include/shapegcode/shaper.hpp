@@ -109,7 +109,7 @@ inline constexpr int max_repeated_zeros = 20;
 /// the duration are merged. Throws Error(argument) if either is not a valid shaper. Source: paper 002, eq. 3.
 [[nodiscard]] Shaper convolve(const Shaper& first, const Shaper& second);
 
-/// Convolved ZV of one or more modes, the conventional multi-mode shaper: 2^n impulses. Throws Error(argument) if
+/// Convolved ZV of one or more modes, the conventional multi-mode shaper: up to 2^n impulses. Throws Error(argument) if
 /// `modes` is empty, and as `pole` does. Source: paper 002, section 2.
 [[nodiscard]] Shaper convolved_zv(std::span<const Mode> modes);
 

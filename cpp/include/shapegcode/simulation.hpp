@@ -32,8 +32,8 @@ struct SimulationOptions {
   bool measure_command = true;          ///< false: the response alone; no figures of the command, no orbit errors
   bool measure_response = true;         ///< false: the command alone; no figures of the response
   bool measure_response_orbit = false;  ///< also orbit errors of the response, if the contour is measured
-  /// Averaging time of the largest speed relative to the programmed feed, also with four and sixteen times it; 0: not
-  /// measured. Requires the deviation of the command.
+  /// Averaging time of the speed for its largest ratio to the programmed feed; four and sixteen times it are used, too;
+  /// 0: not measured. Requires the deviation of the command.
   double feed_window_s = 0.0;
   double feed_slack_mm = 0.0;  ///< distance that rounding may add within such a time
   /// Blocks only: simulate only this time before the end (0: all). Sufficient for the residual if older vibration has
@@ -153,7 +153,8 @@ struct TravelOptions {
   double window_s = 0.0;
 };
 
-/// Actual speeds along a path, per section from one station to the next.
+/// Actual speeds along a path, per section from one station to the next. Except in plunges, only travel in XY in the
+/// present direction counts, converted to travel along the path.
 struct Travel {
   std::vector<double> highest_mm_per_s;  ///< largest distance within a window, divided by the window
   std::vector<double> time_s;            ///< spent on the section; 0 if one period passes over all of it
@@ -161,8 +162,8 @@ struct Travel {
 };
 
 /// Speeds of a path under a speed profile (a controller with look-ahead): its set-points after the filters are followed
-/// along `along`, the same path or the one from which it was made. `stations_mm` ascend from above 0 to the length of
-/// `along`. Throws Error(argument) on stations that do not, a period <= 0 or a window < 0.
+/// along `along`, the same path or the one from which it was made. `stations_mm` ascend from 0 or above to the length
+/// of `along`; two may be equal, as at a corner. Throws Error(argument) on others, a period <= 0 or a window < 0.
 [[nodiscard]] Travel travel_path(const std::shared_ptr<const Path>& path,
                                  const std::shared_ptr<const SpeedProfile>& profile, const Path& along,
                                  std::span<const double> stations_mm, const TravelOptions& options);

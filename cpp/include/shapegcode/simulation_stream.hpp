@@ -51,7 +51,8 @@ class SimulationStream {
   /// in-position, dwells, tool changes and M codes. The plant is simulated continuously. Where the coordinates jump
   /// without motion (work offset, tool length, an axis of unknown position), command and plant jump together.
   /// `region_offsets_mm`: from the positions of each region to machine positions, for modes that vary with them; empty:
-  /// zero. Also throws Error(argument) on a model that `check` refuses, or if there is not one offset per region.
+  /// zero. Also throws Error(argument) on a model that `check` refuses, options with another period than its, or not
+  /// one offset per region.
   SimulationStream(std::shared_ptr<const Program> program, const FanucModel& model, const SimulationOptions& options,
                    std::vector<Vector3> region_offsets_mm = {}, double rest_s = 0.0);
   ~SimulationStream();

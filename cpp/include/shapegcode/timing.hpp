@@ -17,7 +17,7 @@ struct TimeParts {
   double acceleration_s = 0.0;  ///< added to cutting blocks and rapids by acceleration; in look-ahead also by the
                                 ///< limits at corners and on arcs
   double tool_change_s = 0.0;   ///< M06
-  double function_s = 0.0;      ///< other M codes
+  double function_s = 0.0;  ///< other M codes, start of the program, waits for the spindle, rapids of unknown length
 
   [[nodiscard]] double total_s() const noexcept {
     return cutting_s + rapid_s + in_position_s + dwell_s + acceleration_s + tool_change_s + function_s;
@@ -73,7 +73,7 @@ struct CycleTime {
 /// planner in look-ahead. Each region is a motion from rest to rest, and so is each uninterrupted sequence of cutting
 /// moves outside of regions. Waits for in-position follow rapids and motions that end with an exact stop (G09, G61).
 /// Moves of an axis of unknown position count as far as they are known. Throws Error(argument) on a model that `check`
-/// refuses.
+/// refuses, or a block without a feed.
 [[nodiscard]] CycleTime time_program(const Program& program, const FanucModel& model, bool per_block = false);
 
 /// Cycle time by full interpolation.
@@ -91,7 +91,8 @@ struct InterpolatedTime {
 
 /// Full interpolation of a program, sample by sample: blocks through the acceleration filters, or look-ahead profiles,
 /// until the set-points rest; rapids; the servo loop until the axes are in position. Shares no closed form with
-/// `time_program`. Throws Error(argument) on a model that `check` refuses.
+/// `time_program`. Throws Error(argument) on a model that `check` refuses, a block without a feed, or more than 4e9
+/// set-points.
 [[nodiscard]] InterpolatedTime interpolate_program(const Program& program, const FanucModel& model);
 
 /// Effect of acceleration after interpolation and servo lag on a circle.
@@ -100,7 +101,7 @@ struct CircleFigures {
   double radial_error_mm = 0.0;   ///< programmed radius minus radius of the axes after the servo loop
 };
 
-/// Runs circles in XY at a constant feed until the transient has decayed and measures the mean radius over whole turns.
+/// Runs circles in XY at a constant feed until the transient has decayed and measures the mean radius over one turn.
 /// To second order the result is (sum of the filters' variances + (1 - a^2) / K^2) v^2 / (2 r): the radial error
 /// formulas of the controller manual (fanuc.md B1). Throws Error(argument) on a radius or feed <= 0.
 [[nodiscard]] CircleFigures simulate_circle(double radius_mm, double feed_mm_per_s, const FanucModel& model);

@@ -84,7 +84,7 @@ struct FitBorders {
                                                   std::span<const std::int8_t> arc_normal, const FitBorders& borders,
                                                   const FitOptions& options, std::uint32_t* left_periods = nullptr);
 
-/// N word and comment at a position of the original, written before the block that begins there.
+/// N word and comment at a position of the original, written before the first block that begins there or later.
 struct BlockMark {
   std::uint32_t period = 0;    ///< block period of its position
   std::int32_t n_number = -1;  ///< -1: none
@@ -151,7 +151,7 @@ struct RefedRegion {
 /// written where the feed changes and where the original has it; if requested, a last line with F alone restores the
 /// modal feed of the original. Where a section ends within a divisible block, the block is divided: the first part
 /// keeps the words of the original, ends are rounded to the least increment (off the path by at most half of it).
-/// Throws Error(argument) if the sections do not cover the path.
+/// Throws Error(argument) if the sections do not cover the path, or one ends within a block that cannot be divided.
 [[nodiscard]] RefedRegion write_feeds(const Program& program, const Region& region,
                                       std::span<const FeedStretch> sections, const FeedWriterOptions& options);
 

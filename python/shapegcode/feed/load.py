@@ -34,7 +34,7 @@ class Load:
     feed_mm_per_min: Vector  # largest on the interval before the station
     time_s: Vector  # on that interval
     mean_resultant_n: Vector  # mean of the XY resultant over one revolution
-    peak_resultant_n: Vector  # largest
+    peak_resultant_n: Vector  # largest XY resultant in that revolution
     peak_torque_nm: Vector  # largest torque
     mean_power_w: Vector  # mean power
     peak_deflection_um: Vector  # largest deflection of the tip

@@ -25,7 +25,7 @@ _TOO_FAST = 1e-4  # relative: rounding of the travel, far below the margin
 _DEEPER_PLUNGE = 0.01  # fraction of the tool's end area in material above which a move is a plunge, not a ramp
 _AIR_MM2 = 1e-9
 _STEEPEST_AIR = 0.7  # least ratio of travel in XY for a move in air that is no plunge
-_MIN_PROGRAMMED = 0.1  # ratio to the programmed feed, without a least chip in the tool file
+_MIN_PROGRAMMED = 0.1  # lowest feed over the programmed one, if the tool file has no least feed per tooth
 _STEP = 0.005  # smaller feed steps are not written, as they gain nothing
 _LIMIT_NAMES = np.array(
     [name for _, name in sorted((limit.value, name) for name, limit in _core.FeedLimit.__members__.items())],
@@ -100,7 +100,7 @@ class FeedPlan:
 
 
 def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:
-    """Combine the limits of tool and machine."""
+    """Combine the limits of tool and machine, less the margin (none for the feed per tooth)."""
     room = 1.0 - margin
 
     def least(*values: float | None) -> float:
@@ -123,7 +123,7 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
                 feed_unit_mm_per_min: float) -> FeedPlan:  # fmt: skip
     """Choose the feeds of a region whose feeds may change.
 
-    Source: this project; the least length of a feed is from Kim and Ko, 2001 (paper 001).
+    Source: this project; the least distance between changes of the feed is from Kim and Ko, 2001 (paper 001).
     """
     tool, track, path, control = surveyed.tool, surveyed.track, surveyed.region.path, machine.feed_control
     assert tool is not None and track is not None
@@ -136,7 +136,7 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
     least = max(chip_mm * teeth_per_min, machine.controller.minimum_feed_mm_per_min)
     kept = _kept_segments(surveyed, programmed, least)
     slowest = np.maximum(least, share * programmed)
-    lowest = (feed_unit_mm_per_min * np.ceil(slowest / feed_unit_mm_per_min - 1e-9))[segment]  # resolution of F
+    lowest = (feed_unit_mm_per_min * np.ceil(slowest / feed_unit_mm_per_min - 1e-9))[segment]  # to the resolution of F
     limit, holds, load = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
     frozen = np.array([bool(reason) for reason in kept])
     at_minimum = (holds == MINIMUM) & ~frozen[segment]
@@ -196,7 +196,7 @@ def _limits_along(
             f"controller.minimum_feed_mm_per_min = {least:g}"
         )
     fastest = min(axes.x.max_feed_mm_per_min, axes.y.max_feed_mm_per_min, most or math.inf)
-    # Without a largest chip the programmed feed is the limit in material.
+    # Without a largest feed (per tooth or in mm/min) in the tool file the programmed feed is the limit in material.
     raised = tool.limits.feed_per_tooth_max_mm is not None or most is not None
     ceiling = np.full(len(programmed), fastest) if raised else np.minimum(programmed, fastest)
     force = tool.force(surveyed.spindle_rev_per_min, surveyed.sense)

@@ -45,7 +45,7 @@ class FeedRange:
 class ResultantForce:
     """Resultant force in the XY plane over an interval."""
 
-    mean: float  # over the time in material, of the mean over a revolution
+    mean: float  # mean over the time in material of the mean over a revolution
     max: float  # largest of the peak in a revolution
 
 
@@ -113,7 +113,7 @@ class FeedSchedule(Result):
         program: name of the program.
         machine: name of the machine.
         tools: names of the tools that cut.
-        margin: safety margin to each limit, as a ratio.
+        margin: safety margin to each limit of the load, as a ratio; none to that of the feed per tooth.
         feed_mm_per_min: range of the written feeds.
         resultant_force_n: resultant along the whole program, cutting moves only.
         peak: largest loads along the program.

@@ -29,7 +29,7 @@ from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.program.compensation import program_for_conversion
 from shapegcode.results.outcome import Pair
 
-MARGIN = 0.015  # safety margin to each limit, for errors of the model and the load's position
+MARGIN = 0.015  # safety margin to each limit of the load, for errors of the model and the load's position
 
 _SWEEPING = 0.5  # fraction of the progress bar
 _PLANNING = 0.7  # fraction of the rest
@@ -58,7 +58,7 @@ def schedule_feed(
         tools: the tool, or several with their T numbers.
         stock: stock before the first block.
         motion: motion at the new feeds; None: the controller's own, as for an ordinary program.
-        margin: safety margin to each limit, as a ratio.
+        margin: safety margin to each limit of the load, as a ratio; none to that of the feed per tooth.
         resolution_mm: grid spacing of the simulated material; None: a hundredth of the smallest tool's diameter.
         on_progress: called with the completed fraction, 0 to 1.
 
@@ -195,7 +195,7 @@ def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index
 
 
 def _read_back(text: bytes, program: Program, first_lines: Sequence[int], machine: Machine) -> Program:
-    """Read the new text back; its regions must match the original's in position, length and end."""
+    """Read the new text back; its regions must match the original's in first line, length and end."""
     try:
         emitted = Program.from_text(
             text, machine, source="the written program", emitted=True,

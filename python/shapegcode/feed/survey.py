@@ -137,7 +137,7 @@ class SurveyedRegion:
 
     region: _core.Region  # region of the program
     index: int  # index of the region
-    tool: Tool | None  # the tool that cuts it; None: one without a tool file
+    tool: Tool | None  # the tool that cuts it; None: without a tool file, or not known
     track: _core.EngagementTrack | None  # engagement; None if unknown
     spindle_rev_per_min: float  # speed of the spindle, 0 if unknown
     sense: _core.SpindleSense  # sense of rotation
@@ -179,7 +179,7 @@ def why_not_swept(region: _core.Region, zero: ZeroPoints) -> str:
 
 
 def _above_overhang(tool: Tool, track: _core.EngagementTrack) -> float:
-    """Height above the tip of a cut above the overhang, mm; 0: none."""
+    """Largest height above the tip at which the tool cuts, mm, if it is above the overhang; else 0."""
     top = float(track.arcs[:, 3].max(initial=0.0)) if len(track.arcs) else 0.0
     return top if top > tool.tool.overhang_mm else 0.0
 
@@ -328,7 +328,7 @@ class Walk:
             )
 
     def sweep_region(self, material: _core.Material, index: int) -> SurveyedRegion:
-        """Sweep a region, and store its engagement."""
+        """Sweep a region, and return its engagement."""
         region = self._program.regions[index]
         tool = self._tool
         kept = why_not_swept(region, self.zero)

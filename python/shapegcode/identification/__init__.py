@@ -1,1 +1,1 @@
-"""Vibration modes from taps, decays, sweeps and captures; SI units throughout: s, N, m/s², kg."""
+"""Vibration modes from taps, decays, sweeps and captures; SI units (s, N, m/s², kg) where a name has no other."""

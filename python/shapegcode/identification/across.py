@@ -71,7 +71,7 @@ def measured(sources: Sequence[Any], options: ReadOptions) -> list[Measured]:
 
 
 def with_moves(found: Identification, others: Sequence[Measured], window_s: float | None = None) -> Identification:
-    """Add the mode shapes along other axes to an identification; `window_s`: exponential window of all `others`."""
+    """Add the mode shapes along other axes to an identification; `window_s`: exponential window of all records."""
     if found.axis is None:
         raise RecordError(f"{found.files[0]} does not say along which axis it was measured: add --axis x, y or z")
     others = [each for each in others if not _is_of_refused(each, found)]
@@ -211,7 +211,7 @@ def _same_file(use: Record, other: Record, files: Sequence[str]) -> bool:
 
 
 def _in_time(use: Usable, record: Record, poles: _Poles) -> _Amplitudes:
-    """Amplitudes at the first sample after impact or stop; divided by the hammer's force at the poles, if measured."""
+    """Amplitudes at the first fitted sample; if the force is measured, divided by its transform at the poles."""
     first, period_s = 0, record.period_s
     if use.hit is not None:
         first = min(use.hit.end + (use.hit.end - use.hit.first) + _LOCAL_LINES, len(record.response) - 1)
@@ -278,7 +278,7 @@ def _solved(columns: FloatArray, goal: FloatArray, modes: int) -> tuple[ComplexA
 
 
 def _local(at: FloatArray, power: FloatArray, poles: _Poles) -> FloatArray:
-    """Residual power around each mode, relative to the mean."""
+    """Residual power around each mode, relative to the mean; 1 if it is smaller."""
     omega, zeta = poles.omega, poles.zeta
     mean, step = max(float(np.mean(power)), 1e-300), float(at[1] - at[0])
     reach = np.maximum(_LOCAL_WIDTHS * zeta * omega, _LOCAL_LINES * step)

@@ -20,8 +20,8 @@ class RecordUse:
 
     source: str  # file, with the number of the impact or the channel
     used: bool  # whether the modes were fitted to it
-    reason: str = ""  # why it is not used; empty: it is
-    samples: int | None = None  # number of recorded samples; null if not used, like the following values
+    reason: str = ""  # why it is not used; empty: it is used
+    samples: int | None = None  # number of samples, of a decay from its start; null if not used, as below
     period_s: float | None = None  # time between two samples
     start_s: float | None = None  # time of the first sample in the file
     quantity: Quantity | None = None  # what the sensor measured
@@ -31,7 +31,7 @@ class RecordUse:
 
     @property
     def duration_s(self) -> float | None:
-        """Duration, s; None if not used."""
+        """Duration, s; None if not used, or of a frequency response."""
         return None if self.samples is None or self.period_s is None else self.samples * self.period_s
 
 
@@ -49,7 +49,7 @@ class Hit:
 
 @dataclass(frozen=True, eq=False)
 class Usable:
-    """A usable record and its noise and pulse; all but the record is None for a free decay."""
+    """A usable record and its noise and pulse, which are None for a free decay."""
 
     record: Record  # without offset; the force is 0 outside the pulse; a free decay from its beginning
     force_noise_n: float | None = None  # RMS noise of the force outside the pulse
@@ -339,7 +339,7 @@ def excited_hz(force_n: FloatArray, period_s: float) -> float:
 def refuse_short(
     record: Record, response: FloatArray, noise: float, band_hz: float | None, warnings: list[str]
 ) -> float:
-    """Refuse a record that is too short, or sampled too slowly for its strongest mode; returns that frequency, Hz."""
+    """Refuse a record too short, or sampled too slowly for its strongest mode; returns that mode's frequency, Hz."""
     half_rate = 0.5 / record.period_s
     if len(response) < _MIN_SAMPLES:
         raise RecordError(
@@ -387,7 +387,7 @@ def refuse_short(
     return frequency
 
 
-_PULSE_ENDS = 0.01  # A pulse ends below this ratio to the peak; a half sine then lacks 0.01 % of its impulse
+_PULSE_ENDS = 0.01  # A pulse ends below this ratio to the peak; a half sine then lacks 0.005 % of its impulse
 _NOISE_ENDS = 3.0  # ... or below this many standard deviations of noise
 _SMALLEST_PULSE = 0.03  # Pulses are searched above this fraction of the largest force
 _SMALLEST_HIT = 0.1  # An impact is above this fraction of the largest force; below, someone touched the hammer
@@ -395,7 +395,7 @@ _PULSE_NOISE = 7.0  # ... and above this many standard deviations, which a milli
 _RINGING_SAMPLES = 8  # A further pulse within this many samples is ringing of the anti-aliasing filter
 _BOUNCE_S = 0.1  # A second impact within this time is a bounce of the hammer
 _RESTED = 0.1  # Before an intended next impact the response has fallen to this fraction of its peak
-_LEAD_SHARE = 0.1  # A record of one impact begins this fraction of the time between impacts before it
+_LEAD_SHARE = 0.1  # A record of one impact begins before it by this fraction of the shortest time between impacts
 _MAD = 1.4826  # Normal noise: standard deviation over median absolute deviation
 
 
@@ -455,7 +455,7 @@ def find_hits(record: Record) -> list[Hit]:
 
 
 def split_hits(record: Record) -> list[Record]:
-    """One record for each impact of a recording, with some time before it; a single impact is returned unchanged."""
+    """One record per impact of a recording, with some time before it; with fewer than two, the recording itself."""
     hits = find_hits(record)
     if len(hits) < 2:
         return [record]

@@ -32,13 +32,13 @@ from shapegcode.io.units import FloatArray
 
 _BESIDE = 0.25  # also fit lines this far outside the requested band, relative to its ends
 _COMMON = 0.5  # least common fraction of the bands of several responses
-_FURTHER = 1.3  # fit lines up to this factor above the excited frequency
+_FURTHER = 1.3  # fit lines up to this factor above the requested band, or the excited frequency
 _SAME_POINT = 0.1  # largest relative difference of responses of one point
 _MIN_WIDTH = 1.0  # least width of a resonance, in line spacings: narrower may be leakage
 _HUM = 0.1  # a mode at a mains harmonic may be hum if it has not decayed to this ratio when the record ends
-_MAINS_HZ, _HARMONICS, _HUM_WIDTH = (50.0, 60.0), 20, 1.5  # width in frequency lines
+_MAINS_HZ, _HARMONICS, _HUM_WIDTH = (50.0, 60.0), 20, 1.5  # distance to a harmonic, in lines
 _MAINS_WIDTH_HZ = 2.0
-_VERY_CLEAR = 6.0  # added evidence needed by a mode without a peak of its own or a stable pole
+_VERY_CLEAR = 6.0  # added evidence needed by a mode unless it has both a peak of its own and a stable pole
 _LOCAL, _LOCAL_WIDTHS = 30.0, 2.0  # % residual; range in half-power widths
 _TURNED = 1.0  # tan of the phase of a residue: beyond, hammer and sensor are at different points
 _ACCEPTED_PERCENT = 50.0  # largest accepted half interval of the damping ratio
@@ -129,7 +129,7 @@ def _height(mode: IdentifiedMode) -> float:
 def _chosen(
     responses: Sequence[FrequencyResponse], band_hz: tuple[float, float] | None
 ) -> tuple[list[FrequencyResponse], bool]:
-    """Lines to fit, and whether they are of one point."""
+    """Responses with the lines to fit, and whether several are of one point."""
     first = responses[0]
     for other in responses[1:]:
         for name in ("quantity", "axis", "scaled"):
@@ -143,7 +143,7 @@ def _chosen(
         lowest, highest = (float(end(each.frequency_hz[i] for each in responses)) for end, i in ((min, 0), (max, -1)))
         if not (band_hz[0] < band_hz[1] and band_hz[0] < highest and band_hz[1] > lowest):
             raise RecordError(
-                f"band of {band_hz[0]:g} to {band_hz[1]:g} Hz: must ascend and lie within the lines, {lowest:g} to "
+                f"band of {band_hz[0]:g} to {band_hz[1]:g} Hz: must ascend and overlap the lines, {lowest:g} to "
                 f"{highest:g} Hz"
             )
         used = [_within(each, (1.0 - _BESIDE) * band_hz[0], (1.0 + _BESIDE) * band_hz[1]) for each in used]
@@ -289,7 +289,7 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
-    """Weight lines by the noise in the model residual: constant, proportional to the model, or half of each."""
+    """Weight lines by the noise in the model residual: like the assumed noise, like the model, or half of each."""
     left = np.abs(lines.response - model) ** 2
     # Lines without a mode nearby have no model: they keep their assumed noise.
     left = np.where(left > 0.0, left, np.log(2.0) / lines.weight**2)
@@ -354,7 +354,7 @@ def doubt_of(found: FrfModes) -> str:
     if found.missing_peak_hz is not None:
         return f"the highest peak of the mobility, at {found.missing_peak_hz:.4g} Hz, belongs to no supported mode"
     if found.fit_percent < 100.0 * (1.0 - POOR):
-        return f"the model explains {found.fit_percent:.0f} % of the response in the band only"
+        return f"the model explains only {found.fit_percent:.0f} % of the response in the band"
     return ""
 
 
@@ -500,7 +500,7 @@ def _excitation_refusal(hertz: float, measured: _Measured) -> str:
     if excitation >= EXCITED:
         return ""
     return (
-        f"the impact excites it at {20.0 * np.log10(max(excitation, 1e-9)):.0f} dB of its largest force only (limit "
+        f"the impact excites it only at {20.0 * np.log10(max(excitation, 1e-9)):.0f} dB of its largest force (limit "
         "-20 dB): take a harder tip"
     )
 
@@ -520,7 +520,7 @@ def _response_refusal(residues: ComplexArray) -> str:
 
 
 def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[StablePole]) -> str:
-    """Refuse a mode without a peak of its own or a stable pole unless the fit without it is clearly worse."""
+    """Refuse a mode unless the fit without it is worse: clearly, if it lacks a peak of its own or a stable pole."""
     fit = window.fit
     omega, zeta = starts_of(fit)[index]
     share = min(lines.independent for lines in window.parts)

@@ -208,7 +208,7 @@ _MOST_STEADY = 12
 
 
 def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, list[float]]:
-    """Steady oscillations (hum, a pump) with their frequencies: equal in both halves of the record's late part."""
+    """Sum of the oscillations (hum, a pump) that do not decay in the record's late part, and their frequencies, Hz."""
     samples = len(response)
     half = int(samples * (1.0 - _LATE)) // 2
     first, second = response[samples - 2 * half : samples - half], response[samples - half :]
@@ -247,8 +247,8 @@ class Hits:
     force: ComplexArray  # (impacts, n)
     response: ComplexArray  # (impacts, n)
     kept: slice  # used lines of the transform
-    starts: tuple[int, ...]  # first sample of each record
-    count: int  # samples per record
+    starts: tuple[int, ...]  # first used sample of each record
+    count: int  # used samples of each record
     period_s: float
     sigma: float  # 1/s: the window of the responses is exp(-sigma t)
     gain_error: FloatArray  # (n,) relative standard error of the force's spectrum: noise of its channel
@@ -264,7 +264,7 @@ class Hits:
 def hits_of(
     usable: Sequence[Usable], responses: Sequence[FloatArray], low_hz: float, high_hz: float, applied_s: float | None
 ) -> Hits:
-    """Lines of all impacts, each from its pulse on; `applied_s`: time constant of a window in the responses.
+    """Lines of all impacts, each from 4 samples before its pulse; `applied_s`: time constant of the responses' window.
 
     With the window exp(-t/tau) the response at jw equals the original one at jw + 1/tau: no damping is added.
     """

@@ -409,7 +409,7 @@ def _twins(fit: ModalFit) -> bool:
 
 
 def _apart(fit: ModalFit) -> Starts:
-    """Modes of a fit; of two that coincide only the stronger."""
+    """Modes of a fit, at least one fewer: of two that coincide only the stronger, else without the weakest."""
     order = np.argsort(np.max(np.abs(fit.residues), axis=0))[::-1]
     kept: list[int] = []
     for index in order:

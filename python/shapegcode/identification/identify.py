@@ -58,21 +58,22 @@ def identify(
     """Identify modes from taps of one point (with force), free decays (without force), sweeps or frequency responses.
 
     Args:
-        source: a file (CSV, UFF, WAV, MATLAB), several files, records or frequency responses; of one point and axis.
-            With `response`: the instants of its samples in s, shape (n,), evenly spaced.
-        response: what a sensor measured at these instants, shape (n,), in the unit of `quantity`. Or else the
-            `options`.
+        source: a file (CSV, UFF, WAV, MATLAB), several files, records or frequency responses; of one axis
+            and one point, frequency responses also of several points. With `response`: the instants of its samples in
+            s, shape (n,), evenly spaced.
+        response: what a sensor measured at these instants, shape (n,), in the unit of `quantity`. A `ReadOptions`
+            here is taken as `options`.
         force: of the hammer at these instants in N, shape (n,); None: a free decay.
         options: information missing in the files.
         quantity: of `response`: "acceleration" in m/s², "velocity" in m/s or "displacement" in m.
-        max_modes: largest number of modes; None: 40 over frequency, 8 over time, 4 in a sweep without force.
+        max_modes: largest number of modes; None: 40 over frequency, 8 over time. A sweep without force: 4 at most.
         modes: number of modes; None: by information criterion.
-        band_hz: lowest and highest frequency of interest; None: all.
+        band_hz: lowest and highest frequency of interest; None: all (a sweep without force: 10 to 130 Hz).
         start_s: time at which a decay begins; None: found automatically.
         stops: the records are of an ordinary run: every stop after which the machine rests is a decay; the 20
             strongest of a record are used. Motion below 10 Hz, or the lower end of `band_hz`, is no vibration.
         accepted_percent: largest accepted half width of the 95 % interval of the damping ratio, in percent (in a fit
-            over time also of the stiffness); None: 5 % over time, 50 % over frequency.
+            over time also of the stiffness); None: 5 % over time, 50 % over frequency. Not for a sweep without force.
         sweep: the program that ran during the record and moves one axis, as from `write_sweep`: its command takes the
             place of the force. The logger's start and clock error are found from the record.
         machine: the machine whose controller ran it.
@@ -86,6 +87,7 @@ def identify(
     Raises:
         ArgumentError: a number of modes outside 1 to 99; a sweep without its machine; options that cannot be combined.
         RecordError: no record can be used; the message says why and what is needed. No response along another axis.
+        MachineError, ProgramError: an invalid machine file, or program of a sweep.
         OSError: a file cannot be read.
 
     Source: Back, Ko and Kim, 2003 (paper 003 in docs/evidence/references.md) for its ARMA models; the fit in
@@ -110,7 +112,7 @@ def identify(
         raise ArgumentError("across: a sweep needs one record of all axes, whose other channels are used")
     options = options or ReadOptions()
     if sweep is not None and (stops or start_s is not None or options.ignore_force):
-        raise ArgumentError("a sweep with its program has neither a start of a decay nor stops: omit them")
+        raise ArgumentError("a sweep with its program has neither force, start of a decay nor stops: omit them")
     found = _identified(
         sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is not False, strict=strict
     )
@@ -188,7 +190,7 @@ def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: 
 
 
 def _turned_if_opposed(ready: Prepared, found: Identification, sought: model_search.Sought) -> Identification:
-    """The modes found; if all are refused, some as opposite to the force, those of responses with reversed sign."""
+    """The modes found; if there are none, but some opposite to the force, those of responses with reversed sign."""
     if found.modes or not any(mode.refusal == model_search.OPPOSED for mode in found.refused):
         return found
     text = f"{ready.records[0].source}: {model_search.TURNED}"
@@ -221,8 +223,9 @@ def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: m
     stops = [stop for record in records for stop in split_stops(record, lowest_hz)]
     if not stops:
         raise RecordError(
-            f"{records[0].source}: no stop after which the machine rests for a third of a second and its vibration "
-            "falls to a third; required: a run with pauses, such as dwells, or the decay after one stop"
+            f"{records[0].source}: no stop after which the machine rests for three cycles of the lowest "
+            "mode (0.3 s at 10 Hz) and its vibration falls to a third; "
+            "required: a run with pauses, such as dwells, or the decay after one stop"
         )
     ready = prepare(stops, band_hz=highest_hz)
     first = ready.usable[: max(_FIRST_STOPS, len(ready.usable) // 3)]
@@ -256,7 +259,7 @@ def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quanti
 
 
 def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
-    """The record of a resonance sweep; None if the file holds anything else."""
+    """The record of Klipper's resonance sweep; None if no file is one."""
     found = []
     for path in [Path(each) for each in sources if isinstance(each, str | Path)]:
         if path.is_file():
@@ -288,7 +291,7 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sou
     windowed = sought.exponential_window_s is not None
     if windowed and problem.forces is None:
         raise RecordError(
-            "an exponential window of a free decay cannot be separated from its damping: state it with the force"
+            "an exponential window of a free decay cannot be separated from its damping; with a force it can"
         )
     if problem.forces is not None and (windowed or (sought.modes is None and not are_pulses(ready))):
         # In the frequency domain all records are cut to the length of the shortest.
@@ -309,7 +312,7 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sou
 
 
 def _few(ready: Prepared, problem: FitProblem, many: FrfModes, narrow: bool) -> int | None:
-    """Number of modes that explain the records down to the noise, if few enough for a fit over time; else None."""
+    """Number of modes for a fit over time, if so few explain the records or `many` supports none; else None."""
     supported = [mode for mode in many.modes if not mode.refusal]
     starts = [(2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in supported]
     power = np.mean([np.mean(record.response**2) for record in ready.records])

@@ -1,7 +1,8 @@
 """Modes from any accelerometer's record during a program with known command.
 
 Apart from a smooth drive lag the sensor shows the commanded acceleration times 1 - sum of G s²/(s² + 2 zeta omega s
-+ omega²). The logger's start and clock and the control's waits are found from the record, part by part.
++ omega²), G: participation of a mode. The logger's start and clock and the control's waits are found from the record,
+part by part.
 """
 
 from collections.abc import Sequence
@@ -46,14 +47,14 @@ _LAG_STEP_S = 5e-4
 _UNLIKELY = 0.3  # cost of the longest lag; a perfect correlation gains 1
 _EXPLAINED = 0.5  # least fraction of a part's power explained by the others
 _FEWEST_PARTS = 2
-_LOWEST_HZ, _NARROWEST = 4.0, 8.0  # lowest line; highest line over it
+_LOWEST_HZ, _NARROWEST = 4.0, 8.0  # lowest line; least ratio of the highest line to it
 _HELD = 0.002  # fraction of samples at a range end with an equal neighbour
 _LOUD, _QUIET, _LEVELLED_HZ = 0.1, 0.01, 1.0  # energy of a used part over the loudest; whitening: floor, width
 _SAME_START_S, _AWAY_S, _STANDS_OUT = 0.15, 0.5, 2.0
 _GAINS_PER_S = np.geomspace(10.0, 200.0, 14)
 _LOWEST_SHARE = 0.15  # the lowest lines, with this fraction of the power of the command, determine the sign
-_CORRELATED = 0.25  # least squared correlation of a part, below 40 Hz
-_OWN = 0.1  # relative to the largest line of a part, in power
+_CORRELATED = 0.25  # minimum of the squared correlation of a part, below 40 Hz
+_OWN = 0.1  # least power of a part's own lines, relative to its largest line
 _LAGS_S = np.arange(-0.1, 0.1, 2.5e-4)
 
 
@@ -74,7 +75,7 @@ class KnownCommand:
 
     @property
     def position(self) -> FloatArray:
-        """(n,) m."""
+        """Position of the next set-point relative to the first, (n,) m."""
         return np.asarray(np.cumsum(np.cumsum(self.kicks)) * self.period_s)
 
 
@@ -104,11 +105,11 @@ def known_command(program: str | Path | Program, machine: Machine | str | Path) 
 def find_modes_of_command(
     command: KnownCommand, sources: Sequence[str | Path | Record], options: ReadOptions, sought: Sought, *, across: bool
 ) -> Identification:
-    """Find the modes in records of a known command; with `across` also shapes along the sensor's other axes."""
+    """Find the modes in records of a known command; with `across` also mode shapes along the sensor's other axes."""
     if options.axis not in (None, command.axis):
         raise RecordError(
             f"axis {options.axis.upper()} is asked for, {command.source} moves {command.axis.upper()}: omit the axis, "
-            "the sensor's is found from the record"
+            "that of the sensor is found from the record"
         )
     options = replace(options, axis=None)
     aligned = [_aligned(command, source, options, sought.band_hz, across=across) for source in sources]
@@ -162,7 +163,7 @@ def _aligned(
 
 
 def _held_at_ends(values: FloatArray) -> bool:
-    """Whether the maximum or minimum is held for several samples, more than once."""
+    """Whether consecutive samples at the maximum, or at the minimum, are more than 0.2 % of all."""
     ends = [end for end in (np.max(values), np.min(values)) if abs(end - np.median(values)) > 0.0]
     beside = (np.diff(np.flatnonzero(values == end)) == 1 for end in ends)
     return any(np.count_nonzero(each) > _HELD * len(values) for each in beside)
@@ -275,7 +276,7 @@ class _Clock:
             rows = np.delete(rows, worst)
         if np.min(explained) < _EXPLAINED:
             percent = 100 * max(np.min(explained), 0.0)
-            raise RecordError(self._no_relation(f"parts of the program explain {percent:.0f} % of another"))
+            raise RecordError(self._no_relation(f"the other parts of the program explain {percent:.0f} % of one"))
         # Keep complete pairs: otherwise ringing is cut off, or belongs to another part.
         alone = len(self.windows) - 1 if len(self.windows) % 2 else -1
         rows = self._recorded(rows[np.isin(rows ^ 1, rows) | (rows == alone)], 1)
@@ -319,7 +320,7 @@ class _Clock:
         rows = np.arange(len(self.windows)) if rows is None else rows
         before = self.places_s * stretch - self.middles  # logger's minus program time of each part
         first = np.ceil((begins + before) / period).astype(int)
-        last = np.append(first[1:], np.ceil((ends[-1] + before[-1]) / period).astype(int))  # a window ends at the next
+        last = np.append(first[1:], np.ceil((ends[-1] + before[-1]) / period).astype(int))  # ends where the next begins
         first, last = np.maximum(first, 0)[rows], np.minimum(last, len(self.values))[rows]
         parts = [self.values[each:end] for each, end in zip(first, last, strict=True)]
         parts = [each - np.mean(each) if len(each) else each for each in parts]
@@ -332,7 +333,7 @@ class _Clock:
     def _clear_parts(self) -> npt.NDArray[np.intp]:
         rows = np.flatnonzero(self.shares >= _CORRELATED)
         if len(rows) < _FEWEST_PARTS:
-            few = f"{len(rows)} of {np.count_nonzero(self.shares)} parts of the program correlate with it, the best by"
+            few = f"{len(rows)} of {np.count_nonzero(self.shares)} parts correlate with the record, the best by"
             best, limit = 100.0 * np.sqrt(np.max(self.shares)), 100.0 * _CORRELATED**0.5
             raise RecordError(self._no_relation(f"{few} {best:.0f} % (limit {limit:.0f} %)"))
         return rows
@@ -364,7 +365,7 @@ class _Clock:
         """Fit the clock error at which neighbouring parts agree best, whatever wait is between them; then that wait."""
         band_hz = _LOWEST_HZ, _CLOCK_HZ
 
-        def shares(rate: float) -> Spectra:  # response times conjugate command, over the power of all parts
+        def shares(rate: float) -> Spectra:  # response times conjugate command, over the root of the power of all
             spectra = self._spectra(band_hz, rate, rows)
             share = np.conj(spectra.command) * spectra.response / np.sqrt(np.maximum(spectra.power, 1e-300))
             return replace(spectra, response=share)
@@ -390,7 +391,7 @@ class _Clock:
         begins_s = self.places_s[first] - self.middles[first] / (1.0 + self.rate)
         waits = np.polyfit(rows, self.places_s[rows] * (1.0 + self.rate) - self.middles[rows], 1)[0]
         notes = [
-            f"the program begins {abs(begins_s):.3f} s {'after' if begins_s >= 0.0 else 'before'} the record; the "
+            f"the program begins {abs(begins_s):.3f} s {'after' if begins_s >= 0.0 else 'before'} the record does; the "
             f"logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
         ]
         if abs(waits) > _REPORTED_WAIT_S:
@@ -398,7 +399,7 @@ class _Clock:
                 f"each part of the program with the rest after it takes {1e3 * abs(waits):.0f} ms "
                 f"{'longer' if waits > 0.0 else 'less'} than simulated: the control's ramps or waits are not those of "
                 "the machine file, which does not affect the modes; or the override was not 100 %, and frequencies are "
-                "wrong by as much"
+                "wrong by its ratio"
             )
         missing = sorted(set(range(len(self.windows))) - set(rows.tolist()))
         if missing:

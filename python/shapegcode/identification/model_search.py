@@ -115,7 +115,7 @@ def chart_of(models: Iterable[tuple[int, Starts]]) -> tuple[ChartPole, ...]:
 
 
 def _pool(problem: FitProblem) -> Starts:
-    """Stabilisation-chart poles in the band, one per mode, from the model of highest order."""
+    """Stabilisation-chart poles in the band, one per mode, from the model of highest order that has it."""
     low, high = problem.band_hz
     kept: Starts = []
     for w, z in reversed([mode for modes in chart_modes(problem) for mode in modes]):
@@ -169,7 +169,7 @@ def _attempt(problem: FitProblem, starts: Starts, **how: Any) -> Fit | None:
     return fit if np.isfinite(fit.sum_of_squares) else None
 
 
-ACCEPTED_PERCENT = 5.0  # Widest accepted half interval of damping ratio and stiffness: 10 % are then 4 sigma
+ACCEPTED_PERCENT = 5.0  # Widest accepted half interval of damping ratio and stiffness: an error of 10 % is then 4 sigma
 _FREQUENCY_PERCENT, _NOT_AT_ALL_PERCENT = 2.0, 1000.0
 _NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode for a shaper
 _LASTING = 0.8  # Not decayed: still above this ratio at the end (mains hum, a pump, a turning spindle)
@@ -177,7 +177,7 @@ _RIVAL_PROBABILITY = 0.05  # Largest probability that a competing model with one
 _UNKNOWN = 7.0  # half width of the logarithm of an unknown value: a factor of a thousand
 SCATTER_PROBABILITY = 0.01  # probability that noise alone makes taps differ as much
 TURNED = (
-    "every mode is opposite to the hammer's force: the sign is reversed, as for a sensor at the same point that points "
+    "modes are opposite to the hammer's force: the sign is reversed, as for a sensor at the same point that points "
     "the other way"
 )
 OPPOSED = "moves opposite to the hammer's force: hammer and sensor are not at the same point, so no mass follows"
@@ -188,9 +188,9 @@ class Doubts:
     """Limits that a mode must meet."""
 
     limit_percent: float  # widest accepted half interval of damping ratio and stiffness
-    band_hz: tuple[float, float]  # frequencies that were searched
+    band_hz: tuple[float, float]  # modes outside are not reported
     record_s: float  # length of the longest record
-    rival: Fit | None  # competing model of nearly the same evidence
+    rival: Fit | None  # competing model with one more mode; see `rival_of`
     aliased: Callable[[float], float]  # fraction of the force at a frequency that may be aliased
     white_share: float  # independent fraction of the samples
     least: tuple[float, float]  # lower limits of the half intervals of ln f and ln zeta
@@ -219,7 +219,7 @@ def _estimates(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Do
 
 
 def mode_estimates(values: FloatArray, spread: FloatArray, refusal: str = "") -> IdentifiedMode:
-    """A mode from logarithms of f (Hz), damping ratio, m, c, k, or f and damping ratio, and half 95 % intervals."""
+    """A mode from logarithms of f (Hz), damping ratio and, if known, m, c, k, and half of their 95 % intervals."""
     estimates = [
         Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
         for value, half in zip(np.exp(values), np.minimum(spread, _UNKNOWN), strict=True)
@@ -235,7 +235,7 @@ LOGARITHMS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, -1], [2, 0, -1]]
 
 @dataclass(frozen=True, eq=False)
 class _Logarithms:
-    """Logarithms of frequency (Hz), damping ratio, mass, viscous damping, stiffness (SI), and their variances."""
+    """Logarithms of frequency (Hz), damping ratio and, with a force, mass, viscous damping, stiffness; variances."""
 
     values: FloatArray
     variance: FloatArray
@@ -348,7 +348,7 @@ def interval_refusal(mode: IdentifiedMode, limit_percent: float, folded_percent:
         known = f"{name} is known only to {estimate.uncertainty_percent:.2g} % (limit {limit:g} %)"
         if name == "stiffness" and folded_percent > 0.5 * limit:
             return (
-                f"{known}: the pulse has few samples, and without an anti-aliasing filter do not determine the force "
+                f"{known}: the pulse has few samples, which without an anti-aliasing filter do not determine the force "
                 "at this frequency; sample faster or take a softer tip"
             )
         if estimate.uncertainty_percent > _NOT_AT_ALL_PERCENT:

@@ -165,8 +165,8 @@ def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
     if machine is None:
         recordings: tuple[AxisRecording, ...] = (recording_for("X Y Z", ()),)
         about = (
-            f"No machine file is given: lengths are for modes from {usual}, in which the motion of its axes excites a "
-            f"machining centre, rates for modes up to {_LOOK_LEAST_HZ:g} Hz. With -m MACHINE they follow from its "
+            f"No machine file is given: lengths are for modes from {usual}, the range that a machining centre's own "
+            f"motion excites, rates for modes up to {_LOOK_LEAST_HZ:g} Hz. With -m MACHINE they follow from its "
             "modes."
         )
     else:

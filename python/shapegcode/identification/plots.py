@@ -168,10 +168,10 @@ def plot_stabilisation(found: Identification, ax: Axes | None = None) -> Axes:
 
 
 def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
-    """Envelope of each mode's band of the first record while it decays, measured and of the model.
+    """Envelope of the first record in the band of each mode, of four at most, measured and of the model.
 
-    The model is drawn down to the noise, its residual in the band. Below it the curve would show the ringing of the
-    band's filter.
+    The model is drawn down to three times the noise, which is its residual in the band: below, the curve would show
+    the ringing of the band's filter.
 
     Args:
         found: an identification with a mode or more.
@@ -269,7 +269,7 @@ def _as_fitted(found: Identification) -> list[Record]:
 
 
 def _spectrum(found: Identification) -> tuple[FloatArray, FloatArray]:
-    """Frequencies and root mean square over the records of their amplitude spectra, 2/n |FFT|."""
+    """Frequencies; RMS of the records' amplitude spectra (2/n |FFT|), or magnitude of the first frequency response."""
     if found.responses:
         return found.responses[0].frequency_hz, np.abs(found.responses[0].response)
     parts = [record.response for record in found.fitted_records]

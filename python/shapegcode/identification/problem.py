@@ -29,7 +29,7 @@ class Thinned:
     forces: list[FloatArray]  # (n,) each, force band-limited between samples, as from a recorder
     straight: list[FloatArray]  # (n,) each, force linear between samples
     period_s: float  # time between two samples
-    # power of white noise after the filter, relative to the band up to half the new rate
+    # power of white noise after the filter, relative to its power below half the new rate
     white_share: float
     noise_correlation: float  # correlation of consecutive samples of filtered white noise
     # noise of a sample of the pulse relative to the original, so that its impulse is as uncertain as before
@@ -47,10 +47,10 @@ class FitProblem:
     band_hz: tuple[float, float]  # searched band
     widened: float  # factor on intervals; see `Record`
     quantity: str = "acceleration"  # what the sensor measured; any for decays, whose amplitudes are fitted
-    force_noise_n: float = 0.0  # RMS of the force outside the pulse
+    force_noise_n: float = 0.0  # RMS noise of a sample of the pulse; measured outside it, less if decimated
     hold: str = "band_limited"  # force between samples: "band_limited", "linear" or "impulse"
     thinned: Thinned | None = None  # decimated records; None: every sample is fitted
-    starts_in_pulse: bool = False  # the record begins within the pulse
+    starts_in_pulse: bool = False  # any record begins within its pulse
 
     def fit(self, starts: Starts, *, left_by: Fit | None = None, coloured: bool = False, quick: bool = False) -> Fit:
         """Fit a model, started at these modes, to the responses or to the residual of another; *quick*: few steps."""
@@ -68,7 +68,7 @@ class FitProblem:
         )  # fmt: skip
 
     def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
-        """Indices of the first `kept` candidates, and of the one that explains most in addition to them."""
+        """Indices of the first `kept` candidates, and of the one, if any, that explains most in addition."""
         omega, zeta = np.array(candidates).T
         records = self.responses, self.period_s
         ranking = _core.rank_modes(*records, omega, zeta, kept + 1, self.forces, self.quantity, kept)
@@ -91,7 +91,7 @@ class FitProblem:
 
     @property
     def white_share(self) -> float:
-        """Fraction of white noise that passes the filter, which is the independent fraction of the samples."""
+        """Independent fraction of the samples: below 1 if decimated (filtered noise) or resampled from uneven times."""
         return (1.0 if self.thinned is None else self.thinned.white_share) / self.widened**2
 
     @property
@@ -106,7 +106,7 @@ class FitProblem:
         return [response - np.real(model) for response, model in zip(self.responses, last.fitted, strict=True)]
 
     def peaks_left(self, last: Fit | None) -> list[float]:
-        """Frequencies (rad/s) of the highest peaks within the band of a model's residual, the highest first."""
+        """Angular frequencies (rad/s) of the two highest peaks of the residual's spectrum in the band, descending."""
         residuals = self.left(last)
         length = 2 * max(map(len, residuals))
         power = np.zeros(length // 2 + 1)
@@ -181,7 +181,7 @@ _GRID = 8  # points of the filter's transform per coefficient
 
 
 def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
-    """Highest frequency to keep in an impact, Hz: that of the band and of response peaks above it."""
+    """Highest frequency to keep in taps, Hz: the end of the band, or above it the highest response peak with margin."""
     excited = max(each.excited_hz or 0.0 for each in ready.usable)
     margin = _MARGIN
     if are_pulses(ready):  # short pulses excite all frequencies up to half the rate
@@ -196,7 +196,7 @@ def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
 
 
 def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
-    """Decimate to the rate that the band needs, with one linear-phase filter for force and response."""
+    """Decimate to the rate needed, with one linear-phase filter for force and response; None: no decimation."""
     period = ready.records[0].period_s
     factor = int(_BAND / (highest_hz * period)) if highest_hz > 0.0 else 1
     longest = max(len(record.response) for record in ready.records)

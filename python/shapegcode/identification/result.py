@@ -64,12 +64,12 @@ class IdentifiedMode:
     Attributes:
         frequency_hz: undamped natural frequency.
         damping_ratio: 1 = critically damped.
-        mass_kg: equivalent (modal) mass at the point of the tap; None for a free decay.
-        damping_n_s_per_m: equivalent viscous damping; None for a free decay.
-        stiffness_n_per_m: equivalent stiffness; None for a free decay.
+        mass_kg: equivalent (modal) mass at the point of the tap; None without a measured force.
+        damping_n_s_per_m: equivalent viscous damping; None without a measured force.
+        stiffness_n_per_m: equivalent stiffness; None without a measured force.
         refusal: why the data do not support this mode; empty: they do.
         left_out: refused without a fault of the test: beyond the excited band or the requested number, or with a
-            peak below 2 % of the highest one; in a sweep or capture also narrower than the line spacing.
+            peak below 2 % of the highest supported one; in a sweep or capture also narrower than the line spacing.
         moves: mode shape: motion along X, Y and Z relative to that along the axis of the test; null for an
             axis that was not measured. Only if other axes were measured too.
     """
@@ -102,7 +102,7 @@ def mode_line(mode: IdentifiedMode) -> str:
 
 
 def estimate_cell(estimate: Estimate | None, factor: float) -> str:
-    """An estimate times a factor, ``46.02 ± 0.05``, with the significant digits; both ends if it is skewed."""
+    """An estimate times a factor, ``46.02 ± 0.58``, to two digits of the interval; both ends if it is skewed."""
     if estimate is None:
         return ""
     value, low, high = (factor * each for each in (estimate.value, estimate.low, estimate.high))
@@ -139,7 +139,7 @@ class MassCheck:
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Spectrum and fit of a sweep without force."""
+    """Spectrum and fit of a sweep without force, or of a capture of command and encoder."""
 
     source: str  # of the record
     axis: str | None  # "x", "y" or "z"; None: not known
@@ -170,24 +170,25 @@ class Identification(Result):
         modes: those that the data support, by ascending frequency.
         refused: those above the noise that are not supported, each with its refusal.
         order: number of modes of the chosen model; 0: no mode.
-        evidence: information criterion (lower is better) by number of modes.
+        evidence: information criterion (lower is better) by number of modes; empty for a fit to frequency
+            responses, given or of many modes.
         fit_percent: 100 * (1 - |measured - fitted| / |measured|), over all records together; null without a model.
         noise_rms: RMS measurement noise of the response in the fitted band, in the unit of the records; null
-            without a model.
-        mass_check: check of the equivalent mass, if the model has one mode.
+            if not known.
+        mass_check: check of the equivalent mass from taps, if the model has one mode; else null.
         reason: why there is no mode; empty: there are modes.
         doubt: why the modes found should not be used; empty: usable.
         machine_file: where the modes were written; null: nowhere.
         warnings: of the records and of the result.
         notes: remarks, such as on ignored parts of the files.
-        prepared: used and refused records; None: the files contain no usable record.
+        prepared: used and refused taps or decays; None: no usable one, frequency responses, or a sweep.
         chart: poles of the stabilisation chart.
-        sweep: spectrum of a sweep without force; None: no sweep.
+        sweep: spectrum of a sweep or capture; None: neither.
         responses: frequency responses without time record, in the fitted band.
-        turned: whether the responses' sign was reversed.
+        turned: whether the sign of the frequency responses was reversed.
         options: command-line options that the next step repeats.
         fitted_lines: model response at the lines of each frequency response, (n,) complex.
-        fitted_records: the records as they were fitted, decimated for the band.
+        fitted_records: the records as they were fitted, decimated if the band allows it.
         fitted: model response per record, (n,), at the fitted samples.
     """
 
@@ -245,7 +246,7 @@ class Identification(Result):
 
     @property
     def decay(self) -> bool:
-        """Whether no force was measured."""
+        """Whether the modes are from free decays."""
         return bool(self.taps) and self.taps[0].force_n is None
 
     @property
@@ -265,7 +266,7 @@ class Identification(Result):
 
     @property
     def records(self) -> tuple[RecordUse, ...]:
-        """Each tap or decay: used ones, then refused ones."""
+        """Each tap or decay, first the used ones; or each frequency response; or the sweep."""
         if self.sweep is not None:
             sweep = self.sweep
             return (RecordUse(sweep.source, True, "", sweep.samples, sweep.period_s, quantity="acceleration"),)
@@ -320,7 +321,7 @@ class Identification(Result):
 
     @property
     def next_step(self) -> str:
-        """Next command: repeat the test, or write the machine file."""
+        """Next command: repeat the test, write the machine file, or choose a shaper."""
         if self.sweep is not None and self.sweep.command and (self._unsupported or self.doubt or not self.modes):
             return "sweep again, for longer or with more acceleration (shapegcode sweep), or tap"
         if not self.modes:
@@ -342,7 +343,7 @@ class Identification(Result):
         return "\n".join(lines)
 
     def tables(self) -> list[Table]:
-        """Tables of modes with intervals; refused modes; records."""
+        """Tables of modes with intervals, mode shapes, refused modes, records; without empty ones."""
         check, caption = self.mass_check, ""
         if check is not None:
             caption = (

@@ -27,7 +27,7 @@ _BAND_ORDER = 2
 
 
 def frf(records: Sequence[Record]) -> FrequencyResponse:
-    """Frequency response above 0 Hz, averaged over taps (H1); coherence None for a single tap (always 1)."""
+    """Frequency response above 0 Hz, averaged over taps (H1); coherence None for a single tap (it would be 1)."""
     if not records:
         raise RecordError("no record: an FRF needs at least one tap")
     period = records[0].period_s
@@ -37,7 +37,9 @@ def frf(records: Sequence[Record]) -> FrequencyResponse:
         if record.force_n is None:
             raise RecordError(f"{record.source}: no force: an FRF needs it")
         if not np.isclose(record.period_s, period, rtol=1e-5):
-            raise RecordError(f"{record.source}: a sample every {record.period_s:g} s, the first has {period:g} s")
+            raise RecordError(
+                f"{record.source}: a sample every {record.period_s:g} s, but every {period:g} s in the first record"
+            )
         forces.append(fft.rfft(record.force_n, count)[1:] * period)
         responses.append(fft.rfft(record.response, count)[1:] * period)
     force, response = np.array(forces), np.array(responses)
@@ -167,7 +169,7 @@ class Spectra:
         )
 
     def coherent(self) -> tuple[npt.NDArray[np.bool_], FloatArray]:
-        """Excited lines from the first to the last on which the parts agree, and coherence of all."""
+        """Mask of the excited lines from first to last on which the parts agree, and the coherence of all lines."""
         ratio, power = self.ratio(), self.power
         left = np.sum(np.abs(self.response - ratio * self.command) ** 2, axis=0) / max(len(self.command) - 1, 1)
         noise = uniform_filter1d(left, _SMOOTH_LINES) / np.maximum(power, 1e-300)
@@ -210,10 +212,10 @@ _TAIL = 0.3  # The tail of a decay, without command, begins after this fraction 
 _MIN_TAIL = 16  # Least samples of a tail to find a frequency
 _MODE_SHARE = 0.2  # Modes are peaks above this fraction of the tail's largest; slower motion is of the axis
 # A window of one period with this fraction of the largest RMS begins at most half a period early, so the decay
-# begins this fraction of a period later.
+# has begun this fraction of a period later.
 _ONSET = 0.7
 _SLOWER = 0.8  # Vibration below this fraction of the slowest mode's frequency is motion of the axis
-_MOTION_SHARE = 0.4  # The axis moves if the mean over a period of the lowest mode exceeds this fraction of the envelope
+_MOTION_SHARE = 0.4  # The axis moves if the mean over the slowest mode's period exceeds this fraction of the amplitude
 _FEWEST_PERIODS = 3.0  # of the strongest frequency in the record
 _STOP_PERIODS, _STOP_FALLS = 3.0, 0.3  # periods of the lowest frequency after a stop; ratio to which the envelope falls
 _LOWEST_HZ = 10.0  # lowest mode in an ordinary run; slower is motion
@@ -281,7 +283,7 @@ def _longest(envelope: FloatArray) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class _Scales:
-    """Periods of the modes in the tail of a decay, in samples."""
+    """Periods of the modes of a decay, in samples."""
 
     slowest: float  # period of the slowest mode
     strongest: float  # period of the strongest
@@ -303,7 +305,7 @@ def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_sample
 
 
 def _onset(quiet: FloatArray, scales: _Scales, start: int, end: int) -> int:
-    """First sample where one period of the strongest vibration has half of the full power: it has started."""
+    """First sample from which a period of the strongest vibration has half of the full power, plus 0.7 periods."""
     last = min(end, start + max(2, round(scales.window)))
     one = max(2, round(scales.strongest))
     short = _forward_rms(quiet[start : min(end, last + one)], one)
@@ -312,7 +314,7 @@ def _onset(quiet: FloatArray, scales: _Scales, start: int, end: int) -> int:
 
 
 def _rest_after_motion(quiet: FloatArray, period_samples: float, level: float, start: int, end: int) -> int:
-    """First sample after which the axis is at rest for a period of the slowest mode."""
+    """First sample from which the axis is at rest for a period of the slowest mode; without one, `start`."""
     moving = np.abs(_mean_over(quiet, period_samples)[start:end]) > _MOTION_SHARE * np.sqrt(2.0) * level
     window = max(1, round(period_samples))
     ahead = maximum_filter1d(moving.astype(np.uint8), window, mode="nearest", origin=-(window // 2))
@@ -358,7 +360,7 @@ def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
 
 
 def find_decay(record: Record, start_s: float | None = None) -> Record:
-    """Find the free decay in a record without force."""
+    """Find the free decay in a record without force: the longest one, or that which begins at `start_s`."""
     response = record.response
     last_s = record.start_s + record.period_s * (len(response) - 1)
     if start_s is not None and not record.start_s <= start_s < last_s:

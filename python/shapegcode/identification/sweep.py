@@ -180,7 +180,7 @@ def _checked_mode(best: _Model, other: _Model, index: int, bins: int) -> Identif
     ):
         if not refusal and not estimate.uncertainty_percent <= limit:
             refusal = (
-                f"{name} is known only to {estimate.uncertainty_percent:.2g} % (limit {limit:g} % of a sweep): a "
+                f"{name} is known only to {estimate.uncertainty_percent:.2g} % (limit {limit:g} % in a sweep): a "
                 "slower sweep, more acceleration, or a tap"
             )
     return replace(mode, refusal=refusal)
@@ -188,7 +188,7 @@ def _checked_mode(best: _Model, other: _Model, index: int, bins: int) -> Identif
 
 _LOWEST_HZ, _OVER_HALF = 4.0, 2.5  # lowest line; samples per cycle of the highest line
 _WINDOW_S = 8.0  # of a motion without rests
-_AFTER_S = 1.0  # of the decay after the last part
+_AFTER_S = 1.0  # of the decay after each part, at most
 _FEWEST_PARTS = 2
 
 

@@ -144,7 +144,8 @@ def write_sweep(
         file: program file to write.
         machine: the machine whose controller runs it.
         axis: axis to shake.
-        band_hz: lowest and highest frequency of the moves; None: from 8 Hz to the highest that the control reaches.
+        band_hz: lowest and highest frequency of the moves; None: from 8 Hz to the highest that the control reaches,
+            200 Hz at most.
         travel_mm: longest move, from the start point in the positive direction.
         acceleration_share: largest amplitude relative to the axis' largest acceleration.
         seconds: approximate duration of all moves.
@@ -154,7 +155,8 @@ def write_sweep(
         The band reached, its limit, and the excitation of each part, simulated from the written program.
 
     Raises:
-        ArgumentError: the control does not reach the band within these limits; the message gives what it reaches.
+        ArgumentError: a value outside its range, or the control does not reach the band within these limits; the
+            message gives what it reaches.
         OSError: the file cannot be written.
     """
     found, text = plan_sweep(file, machine, axis, band_hz, travel_mm, acceleration_share, seconds, number)

@@ -1,4 +1,4 @@
-"""Writes identified modes of one axis into a machine file; everything else stays byte for byte."""
+"""Writes identified modes of one axis, and decisions on the others, into a machine file; the rest is not changed."""
 
 import copy
 import math
@@ -65,7 +65,7 @@ def update_machine(path: str | Path, found: Identification, *, keep_modes: str =
         The text to write, its machine, and notes of the changes.
 
     Raises:
-        ArgumentError: no axis, no supported mode, or a built-in machine.
+        ArgumentError: no axis, no supported mode, a built-in machine, or undecided modes of other axes.
         MachineError: the file is invalid, or would become so.
         OSError: it cannot be read.
     """
@@ -102,9 +102,9 @@ def update_modes(
 ) -> MachineUpdate:
     """Replace the modes of one axis in the text of a machine file by identified ones; idempotent.
 
-    A mode within 10 % of one in the file overwrites its table; unmeasured keys stay. A mode that appears in the
-    test but is refused stays unchanged. The axis' remaining tables are deleted;
-    identified modes without a table get new ones.
+    A mode within 10 % of one in the file overwrites its table; unmeasured keys stay, except a mass. A mode of the
+    file within 10 % of a refused one stays unchanged. The axis' remaining tables are deleted; identified modes
+    without a table get new ones.
     """
     if axis not in ("x", "y", "z"):
         raise ArgumentError(f"axis {axis!r}: must be x, y or z")
@@ -392,8 +392,8 @@ class ModeTables:
         values = self._values(mode) | {"participation": (share, f"{meaning}, not measured")}
         self.expected.append({key: value for key, (value, _) in values.items()})
         self.notes.append(
-            f"{toml(values['frequency_hz'][0])} Hz is new: participation {share:g} ({meaning}); the ratio of the "
-            "axis' motion in it was not measured"
+            f"{toml(values['frequency_hz'][0])} Hz is new: participation {share:g} ({meaning}); how much of the "
+            "axis' motion excites it was not measured"
         )
         lines = ["[[modes]]", *(_line(key, value, remark) for key, (value, remark) in values.items())]
         (_, tables), *_ = tomlkit.parse("".join(line + self.newline for line in lines)).body

@@ -27,7 +27,7 @@ class Sides(Generic[T]):
 
 @dataclass(frozen=True)
 class SidedError:
-    """Deviation of a track from the programmed path, µm; vertical deviations are above or below, not left or right."""
+    """Deviation of a track from the programmed path, µm: left or right; above or below if it is more along Z."""
 
     max: float  # distance, any side
     rms: float  # root mean square over the time in which the command moves
@@ -38,7 +38,7 @@ class SidedError:
 
     @classmethod
     def of(cls, stats: Sequence[_core.DeviationStats], sides: Sequence[_core.SideFigures]) -> Self:
-        """Combine the core's figures (mm) of one or several runs; all zero without any."""
+        """Combine the core's figures (mm) of one or several sections or regions; all zero without any."""
         whole = ContourError.of(stats)
         names = ("left_mm", "right_mm", "above_mm", "below_mm")
         largest = (max((getattr(each, name) for each in sides), default=0.0) * 1e3 for name in names)
@@ -75,7 +75,7 @@ class MeasuredArc:
     response: FittedCircle | None  # through the table's positions, likewise
     inside_wall: FittedCircle | None  # through the wall towards the centre; None: no wall
     outside_wall: FittedCircle | None  # through the other wall, likewise
-    orbit_error_percent: Tracks[float | None]  # area between track and arc over the sector; None: unknown
+    orbit_error_percent: Tracks[float | None]  # area between track and arc over that of the sector; None: unknown
 
     @classmethod
     def of(cls, figures: _core.SectionFigures, tool_diameter_mm: float) -> Self:
@@ -167,7 +167,7 @@ class MeasuredSection:
     length_mm: float  # of the section
     time_s: float  # motion time of the command in it
     peak_vibration_um: Xyz[float]  # largest |response - command| of each axis while the command moves
-    residual_vibration_um: Xyz[float] | None  # the same after its stop; None: no stop here
+    residual_vibration_um: Xyz[float] | None  # the same after its worst stop, or the region's end; None: no stop
     # time from that stop until the axis stays within the band; None for an axis: not observed; None: no stop
     settling_time_s: Xyz[float | None] | None
     observed_rest_s: float | None  # observed time after the stop; None: no stop

@@ -180,7 +180,7 @@ def measure_samples(
         path: the programmed path.
         period_s: time between two samples.
         tool_diameter_mm: diameter of the disc swept along the response.
-        lines: first and last of the path in its program, for reports.
+        lines: first and last line of the path in its program, for reports.
         band_um: settled means within this distance of the command.
         station_spacing_mm: see `measure`.
         cutoff_mm: see `measure`.
@@ -252,11 +252,11 @@ class Job:
     nominal: _core.Region
     path: _core.Path
     sections: list[_core.PathSection]
-    joined_mm: float = 0.0  # shorter sequences are joined to curves, as there were too many; 0: default
+    joined_mm: float = 0.0  # shorter sections are joined to curves, as there were too many; 0: the usual length
 
 
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:
-    """Pairs of regions to measure: those with sections."""
+    """Pairs of simulated and nominal region to measure, with sections; regions without any are left out."""
     pairs = [pair for pair in paired_regions(program, nominal) if pair[1].path.length_mm > 0.0]
     blocks = _BLOCKS_PER_CURVE * machine.controller.block_time_s
     blocks = blocks if program.shaped_regions > 0 and nominal is program else 0.0

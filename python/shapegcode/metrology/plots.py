@@ -26,7 +26,7 @@ def plots_of(measurement: Measurement) -> dict[str, Plot]:
 
 
 def plot_part(measurement: Measurement, ax: Axes | None = None, *, region: int | None = None) -> Axes:
-    """Plot the slot from above: nominal walls in grey, those of each program magnified.
+    """Plot the slot from above: nominal walls in grey, those of each program with magnified deviation.
 
     Args:
         measurement: the measurement.
@@ -67,7 +67,7 @@ def plot_part(measurement: Measurement, ax: Axes | None = None, *, region: int |
 
 
 def plot_walls(measurement: Measurement, ax: Axes | None = None, *, region: int | None = None) -> Axes:
-    """Plot left wall, right wall and width along the path; the borders of a few sections are marked.
+    """Plot left wall, right wall and width along the path; borders of sections are marked if there are at most 12.
 
     Args:
         measurement: the measurement.

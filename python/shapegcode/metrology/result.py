@@ -250,7 +250,7 @@ class MeasuredRegion:
     """One cutting region of a program, measured."""
 
     lines: tuple[int, int]  # first and last line of the program against which it is measured, from 1
-    path: _core.Path  # its path
+    path: _core.Path  # path of that program in the region
     figures: _core.TrackFigures  # measured by the core
     sections: tuple[MeasuredSection, ...]  # sections of the path, in order
     station_spacing_mm: float  # largest distance between two measured stations of walls
@@ -260,13 +260,13 @@ class MeasuredRegion:
 class MeasuredProgram:
     """One program, measured."""
 
-    program: str  # its name
-    shaped: bool  # simulated as an emitted program: block by block at its feed
-    measured_against: str  # name of the program whose path is the nominal one; its own name for its own path
+    program: str  # its file as named, or other source
+    shaped: bool  # whether it has shaped cuts, which are simulated block by block at their feed
+    measured_against: str  # file of the program whose path is the nominal one; its own file for its own path
     ok: bool | None  # the response is within the tolerance of the path; None: not judged
     cutting_time_s: float  # of all regions, until the set-points rest
     contour_error_um: Tracks[SidedError]  # of all regions, including corners
-    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis at the stops
+    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis after the stop at each region's end
     sections: tuple[MeasuredSection, ...]  # of all regions, in order
     warnings: tuple[str, ...]  # on the program and the machine
     regions: tuple[MeasuredRegion, ...] = field(metadata=hidden())  # in order

@@ -1,6 +1,6 @@
-"""Core model of a machine, made once from the machine file and used by every simulation.
+"""Core model of a machine, made from the machine file and used by every simulation.
 
-Whether a path is planned or simulated block by block is decided in `SimulatedController` alone.
+`SimulatedController` plans a path or simulates it block by block; shaped blocks are planned only if `always_plans`.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def fanuc_model(
 
 
 def planner_rules(machine: Machine) -> _core.PlannerRules:
-    """Planner rules of a control other than FANUC."""
+    """Rules of the planner of a control; for FANUC only the kind and the period are set."""
     controller, rules = machine.controller, _core.PlannerRules()
     rules.kind = getattr(_core.ControllerKind, controller.kind)
     rules.period_s = controller.interpolation_period_s
@@ -111,13 +111,13 @@ def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.Mot
     controller = machine.controller
     axes = machine.axes.as_tuple()
     limits.law, limits.arc_feed_ratio = getattr(_core.AccelerationLaw, controller.law), arc_feed_ratio
-    # A ramp of one interpolation period stands for "no ramp": zero time has no acceleration.
+    # A ramp of one interpolation period stands for "no ramp": zero time would need an infinite acceleration.
     limits.time_constant_s = max(controller.time_constant_s, controller.interpolation_period_s)
     limits.jerk_time_s = controller.bell_time_s
     limits.max_feed_mm_per_s = [axis.max_feed_mm_per_min / 60.0 for axis in axes]
     limits.max_acceleration_mm_per_s2 = [axis.max_acceleration_mm_s2 for axis in axes]
     limits.max_jerk_mm_per_s3 = [_limit(axis.max_jerk_mm_s3) for axis in axes]
-    # 0 means a stop at every corner; the planner needs a speed, and this one is practically a stop.
+    # A speed difference of 0 means a stop at every corner; the planner needs one above 0: 1e-3 mm/s is almost a stop.
     rule, along = controller.corner_rule, controller.polyline_acceleration_mm_s2
     if rule == "speed_difference":
         steps = controller.corner_speed_difference_mm_per_min.as_tuple()
@@ -141,7 +141,7 @@ def _limit(value: float | None) -> float:
 
 BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)  # both rules of block timing
 PLANTS = ("modal", "feed-drive")  # ideal servo followed by modes; motor, ball screw and table with their servo loops
-_DRIVE_REST_S = 0.5  # time after a stop in which the error of feed drives is evaluated
+_DRIVE_REST_S = 0.5  # time after a stop in which the residual vibration of feed drives is evaluated
 _LEAST_DECAY_PER_S = 0.01  # below it a mode counts as undamped
 
 
@@ -201,7 +201,7 @@ class SimulatedController:
         return _core.simulate_blocks(path, against or path, block_end or self.model.block_end, self._override, options)
 
     def stream(self, path: _core.Path, options: _core.SimulationOptions, rest_s: float) -> _core.SimulationStream:
-        """Simulate the motion of `simulate` piece by piece, and the plant for a while after its end."""
+        """Simulate the motion of `simulate` piece by piece, and the plant for `rest_s` after its end."""
         options.axis_filters = self.filters
         planned = self._planned(path)
         if planned is not None:
@@ -209,7 +209,7 @@ class SimulatedController:
         return _core.SimulationStream.of_blocks(path, self.model.block_end, self._override, options, rest_s)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: FloatArray, window_s: float) -> _core.Travel:
-        """Speed along a path."""
+        """Simulate `path`; return its speed at stations along `along`, mean over the window."""
         period_s, planned = self.model.period_s, self._planned(path)
         if planned is not None:
             return _core.travel_path(*planned, along, stations_mm, period_s, self.filters, window_s)
@@ -281,13 +281,14 @@ class MachineModel:
 
     @cached_property
     def bounds_deviations(self) -> bool:
-        """True if override deviations are cheap to bound: no drive, filter, planner, moving mode, material side."""
+        """True if a cheap bound of deviations at overrides exists: no feed drive, filter, planner or moving mode, no
+        material side."""
         moves = modes.moving_axis(self.machine) is not None
         plain = self.machine.verdict.plant == "modal" and not self.shaped.filters and not moves
         return plain and not self.always_plans and self.machine.input.material_side is None
 
     def limits(self, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
-        """A copy of the look-ahead limits."""
+        """Look-ahead limits, a new object at each call."""
         return motion_limits(self.machine, arc_feed_ratio=arc_feed_ratio)
 
     def offset(self, region: _core.Region) -> Offset:
@@ -398,15 +399,15 @@ class MachineModel:
 
 RAMP_FREQUENCY_HZ = 10_000.0  # no emitted block is a ramp at this frequency
 _CORNER_RAD = 0.1  # from this turn of the path LinuxCNC blends or stops
-_MOST_KINK_RATIO = 0.7  # LinuxCNC limits more to 0.7071
+_MOST_KINK_RATIO = 0.7  # LinuxCNC reduces larger values to 0.7071
 _KINK_MARGIN = 1.25
-_STEPS = 20.0  # rounding steps of a kink ratio of 1
+_STEPS = 20.0  # a kink ratio is rounded up to a multiple of 1/20
 
 
 def ini_lines(
     paths: Iterable[_core.Path], machine: Machine
 ) -> Iterator[tuple[Literal["kink_ratio", "ramp_frequency"], int, str]]:
-    """LinuxCNC settings to change: key, line of the worst case, sentence; empty for another control."""
+    """LinuxCNC settings to change: key, line of the worst kink (0 for ramps), sentence; none for another control."""
     if machine.controller.kind != "linuxcnc":
         return
     model = fanuc_model(machine)
@@ -427,5 +428,5 @@ def ini_lines(
         yield "ramp_frequency", 0, (
             f"LinuxCNC stretches {ramps} of {blocks} shaped blocks, as it ramps the speed over each that takes "
             f"less than {1e3 / rules.ramp_frequency_hz:g} ms; INI file: [TRAJ] ARC_BLEND_RAMP_FREQ = "
-            f"{RAMP_FREQUENCY_HZ:.0f}, and it is {rules.ramp_frequency_hz:g}"
+            f"{RAMP_FREQUENCY_HZ:.0f} (now {rules.ramp_frequency_hz:g})"
         )  # fmt: skip

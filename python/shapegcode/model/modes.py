@@ -41,10 +41,11 @@ Pairs = list[tuple[_core.Mode, _core.ModeTable]]
 def moving_modes(
     machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET, only: str | None = None
 ) -> list[Pairs]:
-    """Core modes at X, Y, Z, each with its variation over the commanded position.
+    """Modes that move X, Y, Z, each with its variation over the commanded position.
 
-    Each is shifted by `shift` times its stated uncertainty, damping at its low end. A table over the part's mass is
-    evaluated; for one over a position the nominal frequency is used. A mode of several axes is listed at each.
+    Each frequency is shifted by `shift` times its uncertainty, damping lowered by |`shift`| times its own. A table over
+    the part's mass is evaluated; for one over a position the mode is the nominal one. A mode of several axes is listed
+    at each.
     """
     found: list[Pairs] = [[], [], []]
     for name, axis, mode in numbered_modes(machine):
@@ -118,8 +119,8 @@ def slowest_mode(mode: AxisMode) -> tuple[float, float]:
 def damping_scale(mode: AxisMode, shift: float) -> float:
     """Factor on a mode's damping ratio if its frequency is shifted by `shift` of its uncertainty.
 
-    Either sign of `shift` lowers the damping. A shaper's residual is the same at either end to first order, as it
-    depends on the pole's distance |dw/w + i dzeta|; to second order it is larger at lower damping.
+    Either sign of `shift` lowers the damping. To first order a shaper's residual is the same at higher and lower
+    damping, as it depends on the pole's distance |dw/w + i dzeta|; to second order it is larger at lower damping.
     """
     return 1.0 - abs(shift) * (mode.damping_uncertainty_percent or 0.0) / 100.0
 
@@ -203,7 +204,7 @@ def region_range_warnings(regions: Sequence[_core.Region], machine: Machine) -> 
 
 
 def position_table(mode: AxisMode, shift: float = 0.0, offset: Offset = NO_OFFSET) -> _core.ModeTable:
-    """Variation of a mode with the commanded position; no rows for a constant mode."""
+    """Variation of a mode with the commanded position; no rows if it is constant, or the position is unknown."""
     over = mode.frequency_over
     if over is None or over.axis is None:
         return _core.ModeTable()
@@ -242,13 +243,13 @@ def drive_parameters(
 ) -> list[_core.FeedDriveParameters]:
     """Feed drives of X, Y and Z, referred to table travel.
 
-    Position gain and feed-forward are those of the controller; the axes' modes are attached to the tables, with the
-    nominal frequency where it varies with a position.
+    Position gain and velocity feed-forward are those of the controller. Modes that only their own axis excites are
+    attached to its table, with the nominal frequency where it varies with a position.
 
     Args:
-        machine: with a key table ``[axes.x.drive]``, and likewise for y and z.
-        shift: shift of each mode, as a ratio to its stated uncertainty; see `axis_modes`.
-        only: the one mode to shift; None: all.
+        machine: with a table ``[axes.x.drive]``, and likewise for y and z.
+        shift: shift of each mode's frequency, as a ratio to its stated uncertainty.
+        only: the one mode to shift, such as "x.1"; None: all.
 
     Returns:
         Parameters of X, Y and Z, in SI units.
@@ -329,15 +330,15 @@ def plant_response(
 
     Args:
         command_mm: set-points in mm, shape (n_samples, n_axes), one per period.
-        modes: for each axis core or machine-file modes; none: the axis follows its command. A machine
-            gives those of X, Y, Z, as many as the command has axes. Modes with tables over a position are nominal.
+        modes: for each axis core or machine-file modes; none: the axis follows its command. A machine gives those
+            of X, Y, Z, or of the first axes if the command has fewer. Modes with tables over a position are nominal.
         period_s: time between samples in s, above 0.
 
     Returns:
         Positions of the table in mm at the same instants, (n_samples, n_axes), in the memory order of the command.
 
     Raises:
-        ArgumentError: number of mode lists other than of axes, a non-finite command, an invalid mode or period.
+        ArgumentError: not one list of modes per axis, a non-finite command, an invalid mode or period.
     """
     if isinstance(modes, Machine):
         command_mm = np.asarray(command_mm, dtype=np.float64)

@@ -65,7 +65,7 @@ def stamp_of_machine(machine: Machine, *, version: str = "") -> Stamp:
 
 
 def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]:
-    """Why the verdict in the header of an emitted program is not valid here."""
+    """Why the verdict in the header of an emitted program is not valid here: key and sentence of each reason."""
     stamp = program.stamp
     if stamp is None:
         return []
@@ -112,5 +112,5 @@ def shaped_note(program: Program) -> str:
     if not shaped:
         return ""
     others = "" if shaped == whole else f"; the other {whole - shaped} as in an ordinary program"
-    how = f"{shaped} of {whole} regions are simulated block by block at their feed"
+    how = f"{shaped} of {whole} regions are simulated as shaped blocks"
     return f"its header marks it as shaped: {how}{others}"

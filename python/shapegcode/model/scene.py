@@ -138,7 +138,7 @@ class _Blocks:
         self._rank = -1
 
     def add(self, chunk: Chunk) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.intp]]:
-        """Rank of each sample's block, (k,), and the rows at which blocks begin."""
+        """Number of each sample's block, (k,), and the rows at which blocks begin."""
         line = chunk.line.astype(np.int64)
         begins = np.diff(line, prepend=self._last_line) != 0
         rank = self._rank + np.cumsum(begins)

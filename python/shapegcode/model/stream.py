@@ -33,7 +33,7 @@ class Chunk:
     sample: npt.NDArray[np.int64]  # number of each row since the start of the program, (k,)
     time_s: FloatArray  # since the start of the program, (k,)
     line: npt.NDArray[np.uint32]  # of the block that is being interpolated, (k,)
-    # kind of that block, (k,): a rank in `KINDS`. Waits for in-position belong to the block before them
+    # kind of that block, (k,): an index into `KINDS`. Waits for in-position belong to the block before them
     kind: npt.NDArray[np.uint8]
     command_mm: FloatArray  # set-points after all filters, (k, 3)
     response_mm: FloatArray  # the table, (k, 3)
@@ -59,7 +59,7 @@ class Chunk:
         return named
 
     def rows(self, wanted: npt.NDArray[np.bool_]) -> Chunk:
-        """Select rows, (k,)."""
+        """Select the rows where the mask `wanted`, (k,), is true."""
         if wanted.all():
             return self
         values = {field.name: getattr(self, field.name) for field in fields(self)}
@@ -71,7 +71,7 @@ class Chunk:
 
 
 def cuts_of_lines(cuts: Sequence[_core.Region], lines: npt.NDArray[np.integer]) -> npt.NDArray[np.int64]:
-    """Rank of the cut that contains each line, (k,), -1 outside cuts; cuts are in line order."""
+    """Index of the cut that contains each line, (k,), -1 outside cuts; cuts are in line order."""
     firsts = np.array([cut.first_line for cut in cuts], dtype=np.int64)
     lasts = np.array([cut.last_line for cut in cuts] or [0], dtype=np.int64)
     found = np.searchsorted(firsts, lines, side="right") - 1
@@ -109,7 +109,7 @@ def stream(
     Raises:
         ProgramError, OSError: the file cannot be read.
         ArgumentError: an invalid plant, line range, chunk size or controller value.
-        MachineError: the machine has no feed drives.
+        MachineError: the machine file is invalid, or its feed drives are missing or unstable.
         NumericError: while yielding: the integrator of a feed drive fails.
     """
     machine = Machine.of(machine)

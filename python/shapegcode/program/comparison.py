@@ -130,7 +130,7 @@ class KindCount:
     """Counts of one kind.
 
     Attributes:
-        kind: name in `shapegcode.program.comparison.KINDS`.
+        kind: one of `shapegcode.program.comparison.KINDS`, or "emission": lines of emission.* at cuts.
         original: number in the original.
         emitted: number in the other program.
         unchanged: number equal in both, in the same order.
@@ -191,8 +191,8 @@ class Comparison(Result):
         emitted: name of the second program.
         machine: name of the machine whose controller read them.
         counts: counts of each kind that occurs in one of them.
-        path_um: largest distance of the paths of a common cut, in both directions, µm.
-        differences: all differences, in the order of the original.
+        path_um: largest distance between the two paths of a cut that both programs have, in either direction, µm.
+        differences: all differences; those of compensation and of a missing end come last.
         allow: allowed differences, in the form for `shapegcode.program.comparison.Allowed.of`.
         warnings: none.
     """
@@ -378,7 +378,7 @@ def _name(kind: _core.ComparedKind) -> str:
 
 
 def _read(program: Program | str | Path, machine: Machine) -> tuple[Program, bool]:
-    """Read a program; returns also whether it is truncated: without end, or within its last line."""
+    """Read a program; returns also whether it is truncated: after a whole line, or within one."""
     if isinstance(program, Program):
         program.require_machine(machine)
         return program, False
@@ -397,7 +397,7 @@ def _read(program: Program | str | Path, machine: Machine) -> tuple[Program, boo
 
 
 def _compensation(first: Program, second: Program, allowed: Allowed) -> Iterator[ProgramDifference]:
-    """Cutter compensation that only one of the programs still has, by offset number."""
+    """Differences of expanded cutter compensation, by offset number."""
     radii = [program.core.expanded_radii_mm for program in (first, second)]
     for number in sorted(radii[0].keys() | radii[1].keys()):
         if radii[0].get(number) == radii[1].get(number):

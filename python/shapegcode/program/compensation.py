@@ -22,7 +22,7 @@ RADIUS_NOT_KNOWN = "the radius of offset D"
 _ZERO_RADIUS = re.compile(r"offset D(\d+) has a radius of 0\b")
 _KEPT = "cutter compensation is on and not expanded"
 _MEMORY_PER_BLOCK = 100  # bytes of memory per emitted block (docs/evidence/benchmarks.md)
-_SLACK_MM = 0.0005  # largest difference of equal radii
+_SLACK_MM = 0.0005  # radii that differ by no more count as equal
 
 
 def read_for_conversion(path: str | Path, machine: Machine, *, program_number: int | str | None = None) -> Program:
@@ -33,7 +33,7 @@ def read_for_conversion(path: str | Path, machine: Machine, *, program_number: i
     period_s = machine.emission.block_period_s or machine.controller.block_time_s
     if period_s > 0.0:
         blocks = round(program.core.least_time_s / period_s)
-        sentence = f"up to {blocks} blocks are to be written"
+        sentence = f"about {blocks} blocks are to be written"
         require_memory(program.source, blocks * _MEMORY_PER_BLOCK, sentence)
     return program
 
@@ -71,7 +71,7 @@ def require_decision(program: Program, machine: Machine) -> None:
 
 
 def refuse_zero_radius(program: Program) -> None:
-    """Refuse a program whose compensation was expanded with a radius of 0: the tool would cut on its contour."""
+    """Refuse a program whose compensation was expanded with radius 0: the tool centre would be on the contour."""
     for line, _, _, message, file in program.core.warnings:
         if found := _ZERO_RADIUS.match(message):
             number = found[1]
@@ -101,7 +101,7 @@ def header_lines(radii_mm: Mapping[int, float]) -> list[str]:
 
 
 def guard_lines(radii_mm: Mapping[int, float], machine: Machine) -> list[str]:
-    """Program lines that stop the control if its offset differs from the expanded one.
+    """Program lines that stop the control if its offset differs from the expanded radius.
 
     Offsets set by the program (G10) need no check. Where IF cannot run (drip feed, no macros, another dialect), and
     with emission.compensation_guard = "stop", the program stops with M00, and the operator compares.
@@ -132,7 +132,7 @@ _SAME_PLACE_MM = 0.005
 
 
 def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.Region, _core.Region]]:
-    """Yield pairs of regions of a program and the nominal one, matched by start and end."""
+    """Yield pairs of a region of a program and that of the nominal program, matched by start and end."""
     if program is nominal:
         yield from ((region, region) for region in program.regions)
         return

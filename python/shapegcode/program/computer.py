@@ -24,7 +24,7 @@ def cores() -> int:
 
 
 def available_bytes() -> int | None:
-    """Memory available to this process, bytes: the least by computer, control group and own limits; None: unknown."""
+    """Memory available to this process within computer, control group and its own limits, bytes; None: unknown."""
     found = [_kilobytes("/proc/meminfo", "MemAvailable"), *_of_groups(), *_of_own_limits()]
     known = [value for value in found if value is not None]
     return max(0, min(known)) if known else None

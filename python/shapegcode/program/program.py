@@ -39,7 +39,7 @@ class Program:
         source: name for messages.
         reading: reading settings, including the machine.
         unexpanded: the text read, if the core's is the expanded program.
-        folder: folder to search called programs.
+        folder: folder in which called programs are looked for.
         number: program of the text, as requested; None: the first.
         foreign: expanded FANUC form, if the text is for another control.
     """
@@ -64,7 +64,7 @@ class Program:
     ) -> Program:
         """Read a program file like the controller of `machine` (None: of the built-in ``vx500``).
 
-        Called programs are searched in the file, in its folder, and in `input.program_folders`.
+        Called programs are looked for in the file, in its folder, and in `input.program_folders`.
 
         Args:
             path: the file; a string of several lines is the program's text itself.
@@ -110,19 +110,19 @@ class Program:
     ) -> Program:
         """Read a program text; `source` names it in messages.
 
-        Called programs are searched in the text, in `folder` and in `input.program_folders`.
+        Called programs are looked for in the text, in `folder` and in `input.program_folders`.
 
         Args:
             text: the program.
             machine: whose controller reads it; None: the built-in ``vx500``.
             source: names the text in messages.
-            emitted: the text was written by shapegcode, which does not limit its number of moves.
+            emitted: the text was written by shapegcode: its number of moves and its time are not limited.
             probe_lines: ascending line numbers after which the modal state is stored.
             program_number: program of a multi-program text: its O number, or an address as in
                 `shapegcode.program.reading.ProgramPlace`; None: the first.
             expand_compensation: G41/G42 become plain moves; False: they are kept unchanged.
             collect_alarms: continue after an alarm and collect all in `core.alarms`.
-            folder: folder to search called programs; None: only the text and the machine's folders.
+            folder: folder in which called programs are looked for; None: only the text and the machine's folders.
             absolute_arc_centres: I, J, K are positions; None: as `input.arc_centre` says, and never in emitted text.
 
         Returns:
@@ -179,7 +179,7 @@ class Program:
         return _read, (self.text, self.source, self.reading, self.folder, self.number, self.foreign)
 
     def __eq__(self, other: object) -> bool:
-        """Whether it is the same program, read with the same settings."""
+        """Whether text, name, program number and settings of reading are equal."""
         if not isinstance(other, Program):
             return NotImplemented
         mine, others = ((each.source, each.number, each.reading, each.size) for each in (self, other))
@@ -243,7 +243,7 @@ class Program:
         return self.core.slice(begin, end) if self.unexpanded is None else self.unexpanded[begin:end]
 
     def with_verdict(self, *, good: bool, better: bool = False) -> Program:
-        """Write verdict and checksum into the header; a long text is changed in place, not copied.
+        """Write verdict and checksum into the header, in place if the program was not expanded.
 
         Args:
             good: False: the program should not be run.
@@ -277,7 +277,7 @@ class Program:
 
     @cached_property
     def kept_calls(self) -> tuple[ProgramPlace, ...]:
-        """Programs of its file that the expanded program still calls; empty if the whole file was read."""
+        """Programs of its file that the expanded program still calls; empty if nothing was expanded."""
         kept = {int(match[1]) for warning in self.core.warnings if (match := _KEPT_CALL.match(warning[3]))}
         if self.unexpanded is None or self.foreign is not None or not kept:
             return ()
@@ -373,7 +373,7 @@ class Program:
             data: bytes from which it was read.
 
         Returns:
-            The value of `input.arc_centre` with which the whole program is readable; empty: neither.
+            The value of `input.arc_centre` with which the whole program is readable; empty if it is not.
         """
         if self.foreign is not None:
             return ""

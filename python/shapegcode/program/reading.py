@@ -259,7 +259,7 @@ def _apply(foreign: ForeignSettings, options: _core.ReaderOptions) -> None:
 
 
 def is_program_text(given: object) -> bool:
-    """Whether a string is the text of a program and not a file name: it has several lines."""
+    """Whether a string is the text of a program and not a file name: it contains a line end."""
     return isinstance(given, str) and ("\n" in given or "\r" in given)
 
 

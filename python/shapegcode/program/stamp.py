@@ -111,7 +111,7 @@ _LINE_HEAD = re.compile(rb"(\n(?:/\d?)?)(?:N\d+(?:[O:]\d+)?|[O:]\d+)")
 
 @dataclass(frozen=True)
 class Stamp:
-    """Data in the header of an emitted program; all text is in characters that a comment may contain."""
+    """Data in the header of an emitted program; `lines` reduces all text to the characters of a comment."""
 
     version: str  # version of shapegcode
     machine: str  # name of the machine
@@ -141,7 +141,7 @@ class Stamp:
         return [first, _PENDING.decode(), *rest]
 
     def difference(self, other: Stamp) -> str:
-        """What differs in the machine of another header, as text; empty: nothing relevant."""
+        """The first difference from the machine of another header, as text; empty: nothing relevant differs."""
         pairs = (
             ("machine", self.machine, other.machine),
             ("modes", ", ".join(self.modes) or "none", ", ".join(other.modes) or "none"),
@@ -164,7 +164,7 @@ def plain_comment(text: str) -> str:
 
 
 def stamp_of(text: bytes) -> Stamp | None:
-    """Parse the header of an emitted program; None without one."""
+    """Parse the header of an emitted program, without its cautions and notes; None without a header."""
     begin = text.find(STAMP_BEGIN)
     if begin < 0:
         return None

@@ -1,6 +1,6 @@
 """Shapers: modes (`bands`), families (`registry`), their `comparison`, the choice for a conversion (`grid`).
 
-Their names are also available here, each loaded on first use.
+The names in these modules are also available here, each loaded on first use.
 """
 
 from importlib import import_module

@@ -243,7 +243,7 @@ class Design:
 
     @property
     def variance_s2(self) -> float:
-        """Contour cost, s²: dR/R = variance*(v/R)²/2."""
+        """Second central moment of the impulses (contour cost), s²: dR/R = variance*(v/R)²/2."""
         return self.shaper.variance_s2
 
     @property
@@ -290,7 +290,7 @@ class DesignOptions:
     period_s: float | None = None  # grid on which the impulses must lie, s; None: continuous times
     max_duration_s: float = 0.25  # longest shaper, s
     max_abs_sum: float = 10.0  # largest sum of the impulses' magnitudes
-    # residual limit of families with a tolerated residual (EI, SI, robust)
+    # residual limit of families with a tolerated residual (EI, SI, robust, mirrored)
     vibration_limit: float = VIBRATION_LIMIT
     taps: Shaper | None = None  # the shaper of the family `taps`; no other family uses it
 

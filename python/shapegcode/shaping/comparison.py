@@ -36,7 +36,7 @@ from shapegcode.shaping.result import (
 )
 from shapegcode.shaping.robust import least_worst
 
-_SLOWEST_PERIODS = 3.0  # default longest shaper, for the three-hump EI of the slowest mode and of a faster one
+_SLOWEST_PERIODS = 3.0  # default longest shaper in periods of the slowest mode: its three-hump EI and a faster mode's
 _ROBUST = "robust"  # the family whose best design is shown even above the limit
 _OWN_TAPS = "taps"  # the family of the user's impulses
 _MOST_PERIODS = 5000  # periods in the longest shaper: finer grids are as good as continuous times
@@ -71,8 +71,8 @@ def choose_shaper(
         periods_s: grids on which the impulses may lie, s; None among them: also continuous times. None: with a machine
             its block period or the best few, without one continuous times and the best few multiples of 1 ms.
         families: names of the families to compare; None: all.
-        max_duration_s: longest shaper in s; None: three periods of the slowest mode, and the machine's limit if that
-            is too short.
+        max_duration_s: longest shaper in s; None: three periods of the slowest mode; with a machine its
+            `shaping.max_duration_s` if that is shorter, or if no shaper of three periods keeps the limits.
         max_abs_sum: largest sum of the impulses' magnitudes.
         vibration_limit: limit of the worst residual ratio; None: the machine's
             `shaping.vibration_limit`, without a machine 0.05.
@@ -145,7 +145,7 @@ def choose(
     allow_negative: bool = False,
     on_progress: Callable[[float], None] = lambda _: None,
 ) -> Recommendation:
-    """Design every family on each grid and at continuous times, compare, and recommend."""
+    """Design every family on each grid of `periods_s` (None: at continuous times), compare, and recommend."""
     options = options or DesignOptions()
     _check(bands, periods_s, options, objective)
     # The user's impulses only if given.
@@ -234,7 +234,10 @@ def _least_worst(
     options: DesignOptions,
     found: Sequence[Design],
 ) -> list[Design]:
-    """On each grid the longest design, with the smallest worst residual; none if a non-negative one meets the limit."""
+    """On each grid the design of the longest duration with the smallest worst residual.
+
+    None of them if a non-negative design keeps the limit.
+    """
     wanted = any(row.name == _ROBUST for row in rows) and any(band.uncertainty for band in bands)
     if not wanted or any(not each.negative and is_within(each, options.vibration_limit) for each in found):
         return []

@@ -165,7 +165,7 @@ _STEP_RAD = 0.1  # sweep step as phase from the middle of the shaper; peaks are 
 _FEWEST_STEPS = 8
 _MOST_ROUNDS = 60
 _STARTS = 5  # initial frequencies of a band in every search
-_BOUNDS_SHARE = 0.5  # of the worst residual: planes with less were not active
+_BOUNDS_SHARE = 0.5  # of the worst residual: planes whose value is below this fraction count as inactive
 _SAME_VALUE = 1e-6  # relative
 _BESIDE = np.array([-1.0, 0.0, 1.0])
 _QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * math.pi
@@ -193,7 +193,7 @@ class CutPool:
     omegas: list[list[float]]
     directions: list[list[float]]
     starts: int = 0
-    """Number of planes of each band, the first ones, that are never removed."""
+    """This many planes of each band, the first ones, are never removed."""
 
     @classmethod
     def around(cls, bands: Sequence[ModeBand]) -> Self:

@@ -75,7 +75,7 @@ def choose_block_period(
 
     A mode without a band is cancelled exactly; if any has a band, the residual ratio is at most `vibration_limit`
     within the bands. If no period has such a design within `max_duration_s`, the one with the smallest worst residual
-    of that duration is used, and reported in `note`; among worst residuals within 2 % of each other the
+    of that duration is used, and reported in `note`; among worst residuals within 2 % of the smallest the
     longest period wins.
 
     Args:
@@ -228,7 +228,7 @@ def check_block_period(period_s: float, machine: Machine) -> None:
 def candidate_periods(
     bands: Sequence[ModeBand], machine: Machine | None, max_duration_s: float, vibration_limit: float = 0.05
 ) -> list[float]:
-    """Block periods to compare, ascending, s: those with the shortest non-negative shapers."""
+    """Block periods to compare, ascending, s: the machine's, or up to three with the shortest non-negative shapers."""
     from shapegcode.shaping.robust import Task, shortest_below
 
     if machine is not None and machine.emission.block_period_s is not None:
@@ -243,7 +243,7 @@ def candidate_periods(
     every: list[tuple[float, float]] = []  # duration and negative period: of equal durations the longer period first
     for multiple in range(first, last + 1):
         period_s = multiple * interpolation_s
-        # Shapers longer than the worst of the best so far are not searched.
+        # Search up to the third shortest duration so far, at least up to 2 % above the shortest one.
         longest_s = max_duration_s
         if len(every) >= _PERIODS_COMPARED:
             longest_s = min(longest_s, max(every[_PERIODS_COMPARED - 1][0], (1.0 + SAME) * every[0][0]))
@@ -278,7 +278,7 @@ class Grid:
 
     @property
     def shapers(self) -> tuple[_core.Shaper, ...]:
-        """All shapers that may be used."""
+        """All shapers that may be used, without those of `axis_firs`."""
         return (self.shaper, *(node.shaper for node in (self.track.nodes if self.track else ())))
 
     @property
@@ -301,10 +301,10 @@ def choose_grid(
 ) -> Grid:
     """Choose block period and shaper for all modes of a machine, and shapers that follow moving modes.
 
-    With `shaping.family` = "auto" it is the shortest shaper without negative impulses that keeps the residual ratio
-    within `shaping.vibration_limit` over the modes' bands, and at zero for modes without a band. With a named family
-    it is the shortest one of that family. An override-tolerant program (`Machine.bears_override`) gets the period
-    that suits other feed overrides, see `best_for_overrides`.
+    With `shaping.family` = "auto" the shaper is the shortest one without negative impulses whose residual ratio stays
+    within `shaping.vibration_limit` over the modes' bands (else the one with the smallest worst residual), and is zero
+    for modes without a band. With a named family it is the shortest one of that family. An override-tolerant program
+    (`Machine.bears_override`) gets the period that suits other feed overrides, see `best_for_overrides`.
 
     Args:
         machine: modes and controller.
@@ -356,7 +356,7 @@ def choose_grid(
 
 
 def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
-    """Add a shaper for each axis if the machine file requests it; else note its duration."""
+    """Add a shaper for each axis if the machine file requests it; else note their duration if it is shorter."""
     wanted = machine.shaping.per_axis
     possible = exact and grid.track is None and machine.shaping.contour != "off"
     if not possible:

@@ -1,9 +1,10 @@
-"""Shapers on a sample grid: the defining conditions of a family are imposed there, and met by the shortest taps.
+"""Shapers on a sample grid: the shortest taps on the grid that meet the defining conditions of a family.
 
 Rounding the times of a continuous design to a grid destroys its zeros. So a family is given here by its
-defining conditions, and the shortest taps on the grid that meet them are searched: zeros, with their
+defining conditions, and the shortest taps that meet them are searched: zeros, with their
 multiplicity, are at ``z = e^{s*period}`` to rounding; a residual limit is met over its whole band, proven by
-:func:`shapegcode._core.worst_residual`. A zero is linear in the taps; limits on the residual: see `cutting_planes`.
+:func:`shapegcode._core.worst_residual`. A zero is a linear condition on the taps; for a limit
+of the residual see `cutting_planes`.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ RESIDUAL_LIMIT = 1e-10  # largest residual ratio of a returned design; usual val
 _SAME_CONDITION = 1e-13  # relative singular value below which two modes' conditions coincide on this grid
 _SUPPORT_THRESHOLDS = (1e-9, 1e-7, 1e-13)  # smaller magnitudes are no taps; tried in order
 _SAME_OBJECTIVE = 1e-9  # relative to the squared duration
-_LONGER = 4  # times the longest duration: range in which a refusal searches a sufficient duration
-_HINT_PERIODS = 400  # longest grid that a refusal searches, periods
+_LONGER = 4  # for a message of failure a sufficient duration is sought up to this multiple of the longest duration
+_HINT_PERIODS = 400  # and up to this number of periods
 
 
 def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s: float = 0.25) -> Shaper:
@@ -74,8 +75,8 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
 def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: float, *, title: str) -> Shaper:
     """Design the shortest shaper with taps at multiples of a period that meets the conditions.
 
-    Among the shapers of the shortest duration, one without negative impulses has the least second central moment (the
-    contour cost; to 0.1 % if the residual is limited over bands), one with them the least sum of magnitudes.
+    Of the shapers of the shortest duration the one with the least second central moment is chosen (the contour cost; to
+    0.1 % if the residual is limited over bands); if taps may be negative, the one with the least sum of magnitudes.
 
     Source: this project.
     """
@@ -198,7 +199,7 @@ def exact_conditions(
 ) -> tuple[FloatArray, FloatArray]:
     """Matrix and right-hand side of the equality conditions on the taps at 0, 1 ... `last` periods.
 
-    The rows of the modes (residual of each mode, scaled so that no entry exceeds 1) are replaced by an orthonormal
+    The rows of the modes (residual of each mode, scaled so that no entry exceeds 1) are replaced by an orthogonal
     basis of their span: near-equal modes then cost no precision, and equal ones no row. Without modes the sum
     is the only condition. Zeros are simple, or of these multiplicities.
     """
@@ -317,9 +318,9 @@ def polished(
     taps: FloatArray, conditions: tuple[FloatArray, FloatArray], period_s: float, threshold: float,
     largest: float | None = None,
 ) -> Shaper | None:  # fmt: skip
-    """Re-solve the taps above a threshold to round-off accuracy; None if they miss a condition or change sign.
+    """Re-solve the taps above a threshold to round-off accuracy; None if they miss a condition.
 
-    Without a largest magnitude no tap is negative; taps at that magnitude are kept.
+    Without a largest magnitude taps must be above 0 (else None); with one, taps at that magnitude are not changed.
     """
     matrix, right = conditions
     support = np.flatnonzero(np.abs(taps) > threshold)

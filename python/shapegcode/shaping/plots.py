@@ -42,7 +42,7 @@ def plots_of(result: Recommendation) -> dict[str, Plot]:
 
 
 def selected(result: Recommendation) -> list[Design]:
-    """Designs to draw: the recommended one, then one of each family, those on the Pareto front first."""
+    """Designs to draw, at most six: the recommended ones, then one of each other family, first of the Pareto front."""
     indices = list(dict.fromkeys(each for each in (result.recommended, result.recommended_on_grid) if each is not None))
     negative = result.allow_negative or result.design.negative
     shown = [index for index in result.shown() if negative or not result.designs[index].negative]
@@ -262,11 +262,12 @@ def plot_branches(result: Recommendation, ax: Axes | None = None) -> Axes:
         The axes of the plot.
 
     Raises:
-        ValueError: another number of modes, or no minimal shaper within the longest duration.
+        ValueError: another number of modes, or no minimal shaper within the longest duration and a cycle of the
+            slower mode.
     """
     branches = _branches(result)
     if branches is None:
-        raise ValueError(f"{len(result.modes)} modes have no branches: branches exist for two modes")
+        raise ValueError(f"{len(result.modes)} modes: no branches to draw; they need two modes with a minimal shaper")
     return _draw_branches(branches, result, ax)
 
 
@@ -289,14 +290,14 @@ def _draw_branches(branches: MinimalBranches, result: Recommendation, ax: Axes |
 
 
 def _branches(result: Recommendation) -> MinimalBranches | None:
-    """All minimal shapers of two modes for frequency ratios near theirs; None for another number of modes."""
+    """All minimal shapers of two modes for frequency ratios near theirs; None if there are none, or not two modes."""
     if len(result.modes) != 2:
         return None
     slow, fast = sorted((band.mode for band in result.modes), key=lambda mode: mode.frequency_hz)
     ratio = fast.frequency_hz / slow.frequency_hz
     lowest = max(_LEAST_RATIO, 0.6 * ratio)
     ratios = np.arange(lowest, max(1.4 * ratio, lowest + 0.2), _RATIO_STEP)
-    # Limited by the search at the largest ratio, and by the number of curves that can be distinguished.
+    # Two limits besides the option: curves that can be distinguished, and the search (100 periods of the faster mode).
     longest_s = min(result.max_duration_s, _BRANCH_CYCLES / slow.frequency_hz, 99.0 / (ratios[-1] * slow.frequency_hz))
     branches = minimal_branches(slow, fast.damping_ratio, ratios.tolist(), longest_s)
     return branches if np.isfinite(branches.times_s).any() else None
@@ -314,10 +315,10 @@ def _time_unit(longest_s: float) -> tuple[str, float]:
 
 
 def shaped_step(shaper: _core.Shaper, period_s: float, until_s: float) -> FloatArray:
-    """Shaped unit step: staircase of the impulses at 0, one period, ... up to at least `until_s`.
+    """Shaped unit step (staircase of the impulses), sampled at 0, one period, ... up to at least `until_s`.
 
-    Delayed by one period, so that the first sample is at rest. An impulse between two samples is split between them so
-    that its time is kept; its step takes two periods.
+    Each impulse becomes a ramp of two periods, whose middle is one period after the impulse: so the first sample is at
+    rest, and times between samples are kept.
     """
     times_s = np.arange(round(until_s / period_s) + 2) * period_s
     after = (times_s[:, None] - shaper.times_s[None, :]) / period_s

@@ -81,7 +81,7 @@ def repeated(name: str, zeros: int) -> Solve:
 
 
 def hump_ei(name: str, humps: int) -> Solve:
-    """EI with *humps* humps; on a grid from its zeros, and its residual between the outermost ones."""
+    """EI with *humps* humps; on a grid the shortest impulses with its zeros, and its limit between the outer ones."""
 
     def conditions(mode: _core.Mode, options: DesignOptions) -> Conditions:
         zeros_hz = _core.extra_insensitive(mode, options.vibration_limit, humps).zeros_hz
@@ -269,7 +269,7 @@ def _samples(mode: _core.Mode, ratios: tuple[float, ...], period_s: float, steps
 def _other_period(highest_hz: float, period_s: float) -> str:
     if 2.0 * highest_hz * period_s > 1.0:
         return f"a period below {ms(0.5 / highest_hz)} resolves its highest zero, {highest_hz:.4g} Hz"
-    return "it is for modes with less damping"
+    return "this family is for modes with less damping"
 
 
 def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:

@@ -72,8 +72,9 @@ def recommend(
 
     Candidates are the designs without negative impulses (all, with `allow_negative` or if every design has some) with a
     worst residual within the limit; of these, if any, those that cancel the modes without a stated band. The best by
-    the objective is taken; without a candidate, the one with the smallest worst residual. Of equally short designs on
-    grids, to 2 %, the one with the longest period is taken (fewest blocks), then the family that `convert` uses, then
+    the objective is taken; without a candidate, the one with the smallest worst residual. If it is on a grid, and the
+    objective is "shortest" or there is no candidate, of all within 2 % of its duration (without a candidate: residual)
+    the one with the longest period is taken (fewest blocks); of equal ones first the family that `convert` uses, then
     one made for grids.
     """
     if not designs:
@@ -155,7 +156,7 @@ class Recommendation(Result):
 
     Attributes:
         modes: modes to cancel.
-        designs: every design, in the order of the registry and of the periods.
+        designs: every design, in the order of the registry and of the periods; `robust` ones above the limit come last.
         recommended: index of the recommended design.
         reason: reason for the recommendation, in a sentence.
         refused: families without a design.

@@ -35,10 +35,10 @@ from shapegcode.shaping.grid_designs import (
     smallest_enough,
 )
 
-_LONGER = 4  # times the longest duration: range in which a refusal searches a sufficient duration
-_OTHER_PERIODS = (0.5, 0.75, 1.25, 1.5, 2.0)  # other periods tried by a refusal, relative to the refused one
+_LONGER = 4  # for a message of failure a sufficient duration is sought up to this multiple of the longest duration
+_OTHER_PERIODS = (0.5, 0.75, 1.25, 1.5, 2.0)  # other periods tried for that message, relative to the given one
 _HINT_PRECISION = 0.05  # relative precision of the sufficient duration
-_HINT_PERIODS = 500  # longest grid that a refusal searches, periods
+_HINT_PERIODS = 500  # longest grid searched for that message, periods
 _NO_TAP = 1e-9  # smaller amplitudes are the solver's round-off
 _GROWTH = 1.4  # growth factor of the number of periods in the search
 _WHOLE = 1e-3  # tolerance of a whole number of cycles per period
@@ -116,7 +116,7 @@ def _hints(task: Task, limit: float, max_duration_s: float) -> str:
         most = task.periods(max_duration_s)
         reached = best_within(task, most) if task.wide and most else None
         if reached is not None:
-            text += f"; the longest allowed reaches {_percent(reached.worst_residual)}"
+            text += f"; the longest allowed shaper reaches {_percent(reached.worst_residual)}"
         else:
             text += f"; {no_exact(task, most * task.period_s)}"
         longest = min(_LONGER * most, max(_HINT_PERIODS, most))
@@ -282,7 +282,7 @@ def _below(task: Task, last: int, limit: float) -> Bounds | None:
 
 
 def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, precision: float = 0.0) -> int | None:
-    """Smallest number of periods that stays below the limit, or None if it exceeds `most`.
+    """Smallest number of periods of a design below the limit, or None if it exceeds `most`.
 
     Further zero taps keep a design valid, so growing and then bisection finds it. The search starts at the duration
     of the convolved ZV, and above `too_few`, which is known not to suffice. With a relative `precision` the result

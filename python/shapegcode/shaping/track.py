@@ -132,7 +132,7 @@ def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s:
 def taps_of_mean(
     modes: Sequence[Mode], period_s: float, periods: int, mean_s: float
 ) -> tuple[NDArray[np.intp], FloatArray, Shaper] | None:
-    """Delays in periods, taps and shaper of `shaper_of_mean`; the first delay may be above zero, not the shaper's."""
+    """Delays in periods and taps as in `shaper_of_mean`, and the shaper; only the delays may begin above 0."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
     matrix = np.vstack([matrix, steps / periods])
@@ -176,7 +176,7 @@ def _conditions(modes: Sequence[Mode], period_s: float, steps: FloatArray) -> tu
 
 
 def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_s: float) -> list[Shaper]:
-    """One shaper for each set of modes, with mean delays equal, or as close as the grid permits."""
+    """One shaper for each set of modes, all with the same mean delay; without a common one the shortest shapers."""
     shortest = [shortest_non_negative(modes, period_s, max_duration_s) for modes in found]
     fewest = max(round(shaper.duration_s / period_s) for shaper in shortest)
     most = min(whole_periods(max_duration_s, period_s), math.ceil(_LONGER * fewest))
@@ -195,7 +195,7 @@ def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_
 
 
 def mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[float, float]:
-    """Smallest and largest mean delay of non-negative exact shapers, in periods."""
+    """Smallest and largest mean delay of non-negative exact shapers, in periods; (inf, -inf): there are none."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
     least, largest = _vertices(matrix, right, steps / periods, -steps / periods)
@@ -220,10 +220,10 @@ def _worst_between(left: TrackNode, right: TrackNode, modes: Sequence[MovingMode
 
 
 def design_per_axis(axis_modes: Sequence[Sequence[Mode]], period_s: float, max_duration_s: float) -> list[Fir] | None:
-    """Shortest non-negative filters, one for each axis, with a common mean delay, zero residual at the axis' own modes.
+    """Shortest non-negative filters, one per axis, with a common mean delay and zero residual at the axis' own modes.
 
-    The longest of them is as short as the grid permits; of the mean delays possible for all axes, the one with
-    the least sum of second central moments is chosen. An axis without modes is only delayed.
+    The longest of them is as short as the grid permits; of nine mean delays possible for all axes, the one with the
+    least sum of second central moments is chosen. An axis without modes is only delayed. None if none exist.
 
     Source: this project.
     """

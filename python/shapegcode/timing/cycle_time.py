@@ -40,8 +40,8 @@ def cycle_time(
 ) -> CycleTime:
     """Compute the cycle time of a program as it is, without shaping.
 
-    Shaped regions of an emitted program (by its header) are timed block by block at their feed,
-    with the slower rule of block timing, as in `convert`.
+    Shaped regions of an emitted program (by its header) are timed block by block at their feed, with the slower rule
+    of block timing, as in `convert`; by the control's planner if it has one of its own.
 
     For moves of an axis with unknown position (before its first absolute word, after M06, G28, G53)
     only the known part counts, and `times.unknown_move_s`.
@@ -63,6 +63,7 @@ def cycle_time(
     Raises:
         ArgumentError: an invalid controller value, an override at which full interpolation would take the
             program beyond `controller.max_program_s`, or `log_next` with an uncalibrated machine.
+        ProgramError, OSError: a program cannot be read.
     """
     machine = Machine.of(machine)
     program = given_program(program, machine)
@@ -220,7 +221,7 @@ class TimeInterval:
         return _half(self.steps.values(), self.scatters.values())
 
     def parts(self) -> tuple[OpenPart, ...]:
-        """Its components, the largest first."""
+        """Components of the interval, the largest first."""
         found: dict[str, float] = defaultdict(float)
         for name, value in (*self.steps.items(), *self.scatters.items()):
             found[_KIND if name.startswith(_KIND) else name] += value**2
@@ -229,7 +230,7 @@ class TimeInterval:
         return tuple(sorted(parts, key=lambda part: -part.share))
 
     def narrowed_by(self) -> str:
-        """What a program must contain so that its log narrows the interval; no log narrows the scatter between runs."""
+        """What a program must contain for its log to narrow the interval, apart from scatter between cuts or runs."""
         name = next((part.name for part in self.parts() if part.name not in (BETWEEN, RUNS)), CUTS)
         text = next(
             (text for word, text in _REMEDIES.items() if word in name), f"a program in which {name} occurs alone"

@@ -29,7 +29,7 @@ class TimeParts:
     # time added by acceleration to cutting blocks and rapids; with look-ahead also by the limits at corners and on arcs
     acceleration_s: float
     tool_change_s: float  # M06
-    function_s: float  # every other M code
+    function_s: float  # other M codes; also start of the program, waits for the spindle, rapids of unknown travel
 
 
 PARTS = tuple(field.name for field in fields(TimeParts))  # names of the parts, in display order
@@ -53,7 +53,7 @@ class RegionTime:
     start_s: float  # since the start of the program
     duration_s: float  # from rest to rest, including the wait of an exact stop at its end
     programmed_s: float  # length over programmed feeds and override, without rounding or limits
-    cutting_s: float  # blocks at their feed, in whole interpolation periods
+    cutting_s: float  # blocks at their feed; without look-ahead in the periods of block timing (`block_end`)
     acceleration_s: float  # time added by acceleration
     in_position_s: float  # in-position wait of an exact stop at its end
     length_mm: float  # length of its path
@@ -66,7 +66,8 @@ class BlockTime:
     line: int  # from 1
     kind: str  # "cutting", "rapid", "dwell", "tool_change" or "function"
     start_s: float  # since the start of the program
-    duration_s: float  # until the next one starts; a region's acceleration and wait count for its last block
+    # until the next one starts; the last block before a rest includes the wait, and without look-ahead the acceleration
+    duration_s: float
     length_mm: float  # 0 without motion
     programmed_feed_mm_per_min: float | None  # programmed F; None except for cutting blocks
     mean_feed_mm_per_min: float  # length over duration
@@ -79,7 +80,7 @@ class OpenPart:
 
     name: str  # a parameter, the kind of look-ahead, or a scatter
     half_width_s: float  # half of the 95 % interval from this source alone, s
-    share: float  # ratio of the variance, 0 to 1
+    share: float  # fraction of the variance, 0 to 1
 
 
 @dataclass(frozen=True)
@@ -238,7 +239,7 @@ class CycleTime(TimeParts, Result):
         return tuple(Figure(name, "s", None, getattr(self, key), 2, key_after=key) for key, name in shown.items())
 
     def tables(self) -> list[Table]:
-        """Tables of parts, tools, the slowest cuts and blocks."""
+        """Tables of parts, tools, the slowest cuts and blocks, and of the interval if it is known."""
         found = [self._parts_table()]
         if self.tools:
             found.append(self._tools_table())

@@ -52,7 +52,8 @@ struct Arma {
 ///
 /// The numerator has 2n+1 terms: with a force linear between samples the acceleration responds without delay. Throws
 /// Error(argument), naming record and sample, if there is no record, a value is not finite, force and response differ
-/// in length or a force is zero throughout; on n_modes outside 1 ... 50, or fewer samples than terms.
+/// in length or a force is zero throughout; on n_modes outside 1 ... 50, or fewer than 8 n_modes + 8 samples;
+/// Error(numeric) if the coefficients are not finite.
 [[nodiscard]] Arma arma_driven(std::span<const TapSignals> taps, int n_modes, bool plain = false);
 
 /// Joint model of several free decays: the same with a unit impulse at the first sample as force; poles are common,

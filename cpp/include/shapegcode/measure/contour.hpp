@@ -46,9 +46,10 @@ enum class PathSide : std::uint8_t {
 
 /// True distance of a moving point to the programmed path (not the tracking error in time), following the path forward.
 /// Positive on the left of the direction of travel seen along the tool axis (+Z looking down), negative on the right; a
-/// deviation along Z only, or from a travel along Z only, is positive above. Amortised O(1) per sample, no allocation
-/// after construction; a step examines the segments of the path that may be nearest and skips others in groups, so that
-/// its work is bounded only by the number of equally near segments. Shares the path's data: it stores no copy.
+/// deviation along Z only, or from a travel along Z only, is negative if the point is below its foot, else positive.
+/// Amortised O(1) per sample, no allocation after construction; a step examines the segments of the path that may be
+/// nearest and skips others in groups, so that its work is bounded only by the number of equally near segments. Shares
+/// the path's data: it stores no copy.
 ///
 /// The foot point is searched within an arc length given by the last step and the last deviation, so that another pass
 /// of the path nearby is not taken for the present one. On a path that reverses, the outward and the return leg are
@@ -233,7 +234,7 @@ class CornerReach {
   /// Search range for the nearest track point, along the path on both sides of a corner.
   static constexpr double window_mm = 1.0;
   /// On a reversal, or where the path overlaps itself, the foot may be on a later pass while the point is still before
-  /// the corner. If a corner seems missed by more than `missed_mm`, the search range is extended by `patience_mm`.
+  /// the corner. If a corner seems missed by more than `missed_mm`, it is searched until `patience_mm` after it.
   static constexpr double missed_mm = 0.02;
   static constexpr double patience_mm = 20.0;
 
@@ -246,8 +247,8 @@ class CornerReach {
 
   /// Corners are junctions at which the direction changes by `min_angle_rad` or more, and the path's end.
   explicit CornerReach(const Path& path, double min_angle_rad = 0.1745);
-  /// Discards the track; the next sample has its foot near `foot_mm`. Corners with a window before it no longer count,
-  /// nor those with a window around it, unless it is the path's start.
+  /// Discards the track; the next sample has its foot near `foot_mm`. Unless it is the path's start, corners up to 1.5
+  /// windows after the foot no longer count.
   void begin_at(double foot_mm, bool from_start) noexcept;
   /// Next sample, and the distance of its foot point along the path (ContourTracker::s_mm()). No allocation.
   void step(const Vector3& p, double foot_mm, std::uint32_t tag = 0) noexcept {

@@ -113,8 +113,9 @@ struct LineRange {
 };
 
 /// The whole path as sections: maximal sequences of lines of one direction (1e-4 rad) and of arcs about one centre (1
-/// µm) with one radius (1 µm) and sense. Successive sequences shorter than `short_mm` (a curve that a CAM system
-/// divided) are one section of the kind `curve`. Throws Error(argument) if `short_mm` is not finite or < 0.
+/// µm) with one radius (1 µm) and sense, which end at an exact stop at the latest. Successive sequences shorter than
+/// `short_mm` (a curve that a CAM system divided) are one section of the kind `curve`. Throws Error(argument) if
+/// `short_mm` is not finite or negative.
 [[nodiscard]] std::vector<PathSection> path_sections(const Path& path, double short_mm = 0.5);
 
 /// The parts of a path that come from given source lines, in the order of the path; a range that the path enters
@@ -228,7 +229,7 @@ struct SectionFigures {
   PathSection section;
   double time_s = 0.0;                ///< in which the command moves with its foot in the section
   Vector3 peak_mm = Vector3::Zero();  ///< largest |response - command| while the command moves
-  std::optional<RestVibration> rest;  ///< the worst stop of the command in it (largest residual)
+  std::optional<RestVibration> rest;  ///< worst stop of the command in it (largest residual); at the end the last one
   DeviationStats command;             ///< signed, from the path; RMS while the command moves
   DeviationStats response;
   SideFigures command_sides;

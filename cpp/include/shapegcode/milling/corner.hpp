@@ -43,7 +43,7 @@ struct CornerEngagement {
   double turned_rad = 0.0;     ///< turned so far on the tool centre's arc, 0 before it
   double from_rad = 0.0;       ///< engaged azimuths from the direction of feed, positive to its left
   double to_rad = 0.0;
-  double radial_depth_mm = 0.0;  ///< from the end on the rough boundary to the finished wall's tangent at the contact
+  double radial_depth_mm = 0.0;  ///< from the engagement's end on the rough boundary to the finished wall's tangent
 };
 
 /// Length of the tool's path, mm.

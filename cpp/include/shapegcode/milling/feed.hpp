@@ -93,8 +93,8 @@ struct FeedStretch {
 [[nodiscard]] std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const FeedStations& stations,
                                                      const FeedScheduleOptions& options);
 
-/// The path with other feeds: segments are divided where a section ends within one. Throws Error(argument) if the
-/// sections do not cover the path.
+/// The path with the feeds of sections that cover it: segments are divided where a section ends within one. Throws
+/// Error(argument) if the last section does not end at the path's end.
 [[nodiscard]] Path with_feeds(const Path& path, std::span<const FeedStretch> sections);
 
 /// Lowers the feeds around each station that is limited by its load, because the motion lags behind a change of feed. A

@@ -104,8 +104,8 @@ struct CuttingCoefficients {
   ChipThickness thickness = ChipThickness::mean;
 };
 
-/// Throws Error(argument) on a value that is not finite, a specific force or edge force below 0, or an exponent at
-/// which the force would not grow with the chip (specific_exponent or its sum with ratio_exponent <= -1).
+/// Throws Error(argument) on a value that is not finite, a specific force, ratio or edge force below 0, or an exponent
+/// at which the force would not grow with the chip (specific_exponent or its sum with ratio_exponent <= -1).
 void check(const CuttingCoefficients& coefficients);
 
 /// Figures over one revolution. Forces on the tool, in N; frame of the tool: x along the feed, y to its left.

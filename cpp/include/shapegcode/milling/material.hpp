@@ -39,7 +39,7 @@ class Material {
   /// Number of layers.
   [[nodiscard]] std::size_t size() const noexcept { return middles_.size(); }
   [[nodiscard]] const MaterialLayer& layer(std::size_t i) const noexcept;
-  /// Distance from the boundary of a layer, positive in material, limited to two nodes of the grid, mm.
+  /// Distance from the boundary of a layer, positive in material, limited to twice the grid spacing, mm.
   [[nodiscard]] double distance_mm(std::size_t layer, double x_mm, double y_mm) const noexcept;
   [[nodiscard]] const std::vector<double>& borders_mm() const noexcept { return borders_; }
   [[nodiscard]] double bottom_mm() const noexcept { return borders_.front(); }
@@ -63,8 +63,9 @@ class Material {
   [[nodiscard]] double volume_in_cylinder_mm3(double x_mm, double y_mm, double radius_mm, double bottom_mm,
                                               double top_mm) const noexcept;
 
-  /// Top of the material over a rectangle, as `rows` rows of `columns` values from the low corner on, the outer ones on
-  /// its edges; NaN where there is no material. Throws Error(argument) on less than one row or column.
+  /// Top of the material over a rectangle, as `rows` rows along Y of `columns` values along X from the low corner on,
+  /// the outer ones on its edges; NaN where there is no material. Throws Error(argument) on less than one row or
+  /// column.
   [[nodiscard]] Eigen::MatrixXd heights_mm(const Eigen::Vector2d& low_mm, const Eigen::Vector2d& high_mm,
                                            std::ptrdiff_t rows, std::ptrdiff_t columns) const;
 

@@ -1,7 +1,8 @@
 """Models of a position loop, fitted to commands and actual positions of one half of a log and validated on the other.
 
 Servo lag: the command r is delayed by τ; the loop is the core's `ServoLag`, x' = K (r − x) + f r'. So the lag
-at constant speed is τ + (1 − f)/K. A Sinumerik with speed feed-forward compensates it by a dead time (MD32620 = 3, 4).
+at constant speed is τ + (1 − f)/K. A Sinumerik balances its feed-forward by a dead time if MD32620 = 3 (speed) or 4
+(torque).
 Feed drive: a rigid axis of 1 kg, since positions determine only force/mass.
 """
 
@@ -38,8 +39,8 @@ class LoopFit:
     dead_s: float
     gain_per_s: float
     rest: float  # remaining lag ratio 1 − f with feed-forward, 0 to 1
-    offset: float  # encoder offset from the command at rest
-    error: tuple[FloatArray, ...]  # of each section: modelled command minus actual position
+    offset: float  # command minus actual position at rest
+    error: tuple[FloatArray, ...]  # of each section: command minus actual position, as modelled
 
     @property
     def lag_s(self) -> float:
@@ -77,7 +78,10 @@ def delayed(motion: FloatArray, samples: float) -> FloatArray:
 
 
 def lagged_motion(motion: FloatArray, gain_per_s: float, period_s: float, late: float = 0.0) -> FloatArray:
-    """Error of a first-order lag without feed-forward (f = 0), exact for set-points joined by straight lines."""
+    """Error of a first-order lag without feed-forward (f = 0), exact for set-points joined by straight lines.
+
+    `late`: delay of the motion in samples.
+    """
     kept = math.exp(-gain_per_s * period_s)
     share = (1.0 - kept) / (gain_per_s * period_s)  # for a ramp over one period
     first = motion[1] - motion[0]
@@ -213,7 +217,7 @@ _STARTS = ((150.0, 0.02), (40.0, 0.005))  # bandwidth, integral time
 
 
 def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, tell: Callable[[], None]) -> DriveFit:
-    """Fit the drive, started at the best servo lag."""
+    """Fit the drive, started at the fitted servo lag with dead time."""
     top_speed = max(float(np.abs(np.diff(motion)).max()) for motion in trace.command) / period_s
     acceleration = max(float(np.quantile(np.abs(np.diff(motion, 2)), 0.99)) for motion in trace.command) / period_s**2
 
@@ -273,7 +277,7 @@ def _drive_motions(trace: ServoTrace, values: FloatArray, period_s: float, top_s
 
 
 def range_of_three(name: str, values: Sequence[float], unit: str) -> ServoEstimate:
-    """A parameter of the fits to all samples and to the halves: unknown if the halves disagree."""
+    """A parameter of the fits to all samples and to the halves: unknown if one exceeds another by half."""
     low, high = min(values), max(values)
     if high > 1.5 * low:
         return ServoEstimate(name, None, low, high, unit, "the halves disagree")

@@ -9,7 +9,7 @@ from shapegcode.identification.servo.result import ServoFit
 from shapegcode.results import plot
 from shapegcode.results.outcome import Plot
 
-_OWN, _OURS = "control: contour deviation", "residual of our model, not fitted there"
+_OWN, _OURS = "control: contour deviation", "residual of the best model, fitted to the other half"
 
 
 def plots_of(found: ServoFit) -> dict[str, Plot]:
@@ -18,7 +18,7 @@ def plots_of(found: ServoFit) -> dict[str, Plot]:
 
 
 def plot_servo(found: ServoFit, ax: Axes | None = None) -> Axes:
-    """One panel for each axis: the control's contour deviation, and our model's residual where it was not fitted.
+    """One panel per axis: the control's contour deviation, and the best model's residual when fitted to the other half.
 
     Args:
         found: fit of the log.

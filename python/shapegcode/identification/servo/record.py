@@ -140,7 +140,7 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
         command, actual = capture.position(axis.number), capture.position(axis.number, actual=True)
         bad = np.flatnonzero(~np.isfinite(command + actual))
         if bad.size:
-            notes.append(f"{label}: ignored: values are missing from {bad[0]} on")
+            notes.append(f"{label}: ignored: values are missing, first in sample {bad[0]}")
             continue
         ranges = _ranges(command, capture.stretches, capture.cycle_s)
         if len(ranges) > len(capture.stretches):

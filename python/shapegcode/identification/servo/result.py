@@ -21,7 +21,7 @@ class ServoEstimate:
 
     name: str  # of the parameter
     value: float | None  # null if the record does not determine it
-    low: float | None  # lower end of the interval (95 %; of the drive: the range of the fits to the halves and to all)
+    low: float | None  # lower end of the interval (95 %; of drive and torque: the range of the fits to halves and all)
     high: float | None  # upper end
     unit: str  # unit of value and interval
     note: str = ""  # why it is unknown, or its basis
@@ -35,8 +35,8 @@ class ServoModel:
     # RMS of the residual following error in samples to which it was not fitted, mm or degrees
     rest: float
     rest_fitted: float  # RMS residual of the fit to all samples
-    # ratio of the mean square of the control's contour deviation that it explains in samples to which it was not
-    # fitted; null without deviation. Negative: the control's own model is better
+    # part of the mean square of the control's contour deviation that the model explains in samples to which it was
+    # not fitted; null without deviation. Negative: the control's own model is better
     explained_percent: float | None
 
 
@@ -64,7 +64,7 @@ class ServoAxis:
         lag_rms: root mean square of command minus actual position.
         deviation_rms: RMS of the control's contour deviation; null if not recorded.
         models: models compared with the record; none if they cannot be fitted, see `note`.
-        parameters: of the dead time and servo lag, then of the drive and of the torque.
+        parameters: of the dead time and servo lag, then of the torque and of the drive.
         note: undetermined or unexplained behaviour.
         curves: data to plot.
     """
@@ -123,7 +123,7 @@ class ServoFit(Result):
         axes: one for each axis with command and actual position.
         machine: name of the machine that gets the values; empty: none.
         written: keys of the machine file that were set, with their values.
-        warnings: unexplained behaviour, and parts ignored on reading.
+        warnings: values that could not be written, and parts of the log that were not used.
         fitted: the machine with the parameters found; None without a machine.
     """
 
@@ -145,7 +145,7 @@ class ServoFit(Result):
         """Following error of each axis with a model, and the residual of its best model."""
         fitted = [axis for axis in self.axes if axis.models]
         if not fitted:
-            return f"{self.source}: no axis changes its speed: only the lag at constant speed can be found"
+            return f"{self.source}: no model can be fitted to any axis, for the reasons in the last table"
         said = (
             f"{axis.name} {1e3 * axis.lag_rms:.4g} to {1e3 * min(each.rest for each in axis.models):.3g} "
             f"{axis.small_unit}"

@@ -58,7 +58,7 @@ _MACRO = re.compile(r"[ \t]*(?:N[ \t]*\d+[ \t]*)?(?:#|IF|WHILE|END|GOTO|DPRNT|PO
 
 
 def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> ForeignProgram:
-    """Translate a Haas program into FANUC's words: only words with another meaning on a Haas are replaced."""
+    """Translate a Haas program into FANUC's words: only words with another meaning are replaced or left out."""
     notes: dict[str, Note] = {}
     lines, called = _lines(source, file, notes)
     numbers = [*range(1, max(len(lines), 1) + 1)]
@@ -149,7 +149,7 @@ def _plain_line(line: str, code: str, note: Callable[[str, str], None]) -> str:
     if (unread := _UNREAD_M97.search(words)) is not None:
         raise ValueError(f"{unread[0]} takes an N number directly after it (M97 P1000): it is not read otherwise")
     if _M98.search(words) is not None and re.search(r"L[ \t]*[\d#\[]", words, re.IGNORECASE) is None:
-        # Five digits are a program number on a Haas; FANUC would read repetitions and a number of four digits.
+        # Five digits or more are a program number on a Haas; FANUC would read repetitions and a number of four digits.
         words = _PROGRAM.sub(lambda match: f"{match[0]}L1", words)
     words = _with_dwell(words, codes, note)
     if "52" in codes or "92" in codes:

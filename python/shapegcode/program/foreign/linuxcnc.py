@@ -69,7 +69,7 @@ def _options(machine: Machine, table: ToolTable | None) -> _core.LinuxcncOptions
 
 
 def _subroutine(name: str, folders: list[Path], machine: Machine) -> tuple[str, bytes] | None:
-    """Name and text of the file of a subroutine."""
+    """Name and text of the file of a subroutine; None if there is none."""
     if _FILE_NAME.fullmatch(name) is None:
         return None
     for path in (folder / (name + suffix) for folder in folders for suffix in (".ngc", ".NGC", ".nc")):
@@ -96,7 +96,10 @@ class ToolTable:
 
 
 def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | None:
-    """Read the tool table of `input.tool_table` (or an INI file there), else `tool.tbl` in the folder; None: none."""
+    """Read the tool table given by `input.tool_table`, directly or by an INI file; else `tool.tbl` in the folder.
+
+    None if there is no such file.
+    """
     if not stated:
         beside = folder / "tool.tbl" if folder is not None else None
         return read_tool_table(beside, unit) if beside is not None and beside.is_file() else None

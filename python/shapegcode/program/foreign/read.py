@@ -1,4 +1,4 @@
-"""Translate a program of any dialect into an expanded program for FANUC: choose the dialect and its reader."""
+"""Translate a program of any dialect into one for FANUC: choose the dialect and its reader."""
 
 from __future__ import annotations
 
@@ -46,14 +46,15 @@ class ForeignSettings:
 
 @dataclass(frozen=True)
 class ForeignProgram:
-    """A program for another control, translated into an expanded program for FANUC.
+    """A program for another control, translated into one for FANUC.
 
-    Its numbers have a point where their unit depends on it (`X10.`), I J K are distances from the start, dwells are
-    `G04 X` in seconds; it begins and ends with a line `%`. Calls of other programs may remain in it.
+    From LinuxCNC and Siemens it is expanded: numbers have a point where their unit depends on it (`X10.`), I J K are
+    distances from the start, dwells are `G04 X` in seconds; it begins and ends with a line `%`. A Haas program keeps
+    its calls and lines, except for replaced words.
     """
 
     dialect: str  # "linuxcnc", "haas", "siemens"
-    text: str  # the expanded program
+    text: str  # the translated program
     lines: Sequence[int]  # for each line of `text`, from 0, the line of the source, from 1
     reason: str = ""  # why it was read in this dialect
     notes: tuple[Note, ...] = ()  # for the user
@@ -190,7 +191,8 @@ class Recognition:
 def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]:
     """The first sign of every control for which a program may be written.
 
-    Only words that a single control knows count; the first 64 KiB are searched, without comments.
+    Words of FANUC are sought only with `of_fanuc`, or if there are signs of another control; a Haas knows them too.
+    The first 64 KiB are searched, without comments, up to the second line `%`.
     """
     code = re.sub(rb";[^\n]*", b"", COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
     ends = [match.end() for match in _PERCENT.finditer(code)] if b"%" in code else []
@@ -215,7 +217,7 @@ def _first_signs(code: bytes, signs: Iterable[_Sign]) -> dict[InputDialect, Reco
 
 
 def doubtful_word(text: bytes) -> tuple[int, str] | None:
-    """Find the first dwell or arc that FANUC allows and LinuxCNC usually reads otherwise: its line, and a warning.
+    """Find the first dwell or arc whose P means something else on LinuxCNC: its line, and a warning; None without one.
 
     A dwell of P1 to P9 is very short in milliseconds; P of an arc is the number of turns on LinuxCNC.
     """
@@ -237,7 +239,7 @@ def doubtful_word(text: bytes) -> tuple[int, str] | None:
 
 
 def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | None) -> ForeignProgram | None:
-    """Read a program for another control as an expanded program; None: it is for FANUC.
+    """Translate a program for another control into one for FANUC; None: it is one already.
 
     The dialect is that of `controller.dialect`; "auto": it is recognized by words that only one control knows; without
     such words it is LinuxCNC's if `controller.kind` is "linuxcnc".

@@ -20,7 +20,7 @@ from shapegcode.program.foreign import read
 def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> read.ForeignProgram:
     """Read a SINUMERIK program in DIN words.
 
-    Subprograms are searched in the text, in `folder` and in `input.program_folders`: NAME.SPF, then NAME.MPF.
+    Subprograms are looked for in the text, in `folder` and in `input.program_folders`: NAME.SPF, then NAME.MPF.
     """
     controller, settings, options = machine.controller, machine.input, _core.SiemensOptions()
     options.file = read.shown_name(file)

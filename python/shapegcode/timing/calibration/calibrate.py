@@ -56,8 +56,8 @@ def calibrate_cycle_time(
     """Calibrate the cycle-time model of a machine from run logs.
 
     Logs are aligned with their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted
-    to the durations between functions, and the one that best predicts programs (or runs, if there is only one program)
-    to which it was not fitted is chosen. Times of tool changes, M codes, spindle and unknown travels follow by
+    to the times of motion between M, S and T words; the one that best predicts programs (or runs, if there is only one
+    program) to which it was not fitted is chosen. Times of tool changes, M codes, spindle and unknown travels follow by
     least squares.
 
     Args:
@@ -70,7 +70,7 @@ def calibrate_cycle_time(
         Parameters with 95 % intervals, the calibrated machine, and each run with its prediction.
 
     Raises:
-        ArgumentError: no run to fit, or an unknown family.
+        ArgumentError: no run to fit, too few readings of lines in cuts, or an unknown family.
         RecordError: a log does not match its program, or cannot be used; with the line.
         ProgramError, RunsFileError: bad input.
         OSError: a file cannot be read.
@@ -274,7 +274,7 @@ def _with_interval(row: result.CalibrationRun, run: logs.ObservedRun, machine: M
 # --- start of each line in a model, and holds ---------------------------------------------
 
 _MIN_HOLD_S = 2.0
-_READING_S = 0.35  # time that two readings may hide
+_READING_S = 0.35  # a time between two readings may be longer by this, as each may be late
 
 
 def _predicted_starts(run: logs.ObservedRun, model: _core.FanucModel) -> FloatArray:
@@ -331,7 +331,7 @@ def _held_rapids(run: logs.ObservedRun) -> list[_Hold]:
 
 
 def _not_covered(run: logs.ObservedRun, starts: FloatArray, hold: _Hold) -> _Hold:
-    """Part of a hold that lengthened the run; during its other part the spindle start or an M code may have run."""
+    """Part of a hold that lengthened the run; during the rest a spindle start or an M code may have been executed."""
     begin, length, why = hold
     plain = np.flatnonzero(~run.timed.function[run.line] & np.isfinite(run.timed.feed_mm_per_s[run.line]))
     before = plain[run.time_s[plain] <= begin]

@@ -192,7 +192,7 @@ class MotionFit:
 
 #: (length of the windows in s, limit of the error in s, weight).
 _SCALES = ((1.0, 0.25, 1.0), (6.0, 0.5, 0.7), (30.0, 1.0, 0.5))
-_SECTION = (2.0, 0.5)  # whole sections: limit of the error in s per half minute, weight
+_SECTION = (2.0, 0.5)  # whole sections: limit of the error in s over the root of their half minutes, weight
 _MIN_READINGS = 10
 
 

@@ -38,16 +38,16 @@ class TimedProgram:
     line_count: int  # of the expanded program
     # (line_count + 2,) programmed feed of a line's last cut, by line number; NaN without a cut
     feed_mm_per_s: FloatArray
-    # (line_count + 2,) radius of a line's arc, if it turns by more than a sixth of a circle and is long enough to
-    # reach a steady speed; else infinity
+    # (line_count + 2,) radius of a line's arc, if it turns by more than 1 rad and is longer than 0.5 mm (to reach a
+    # steady speed); else infinity
     arc_radius_mm: FloatArray
-    free: npt.NDArray[np.bool_]  # (line_count + 2,) no arc slows down any machine there
+    free: npt.NDArray[np.bool_]  # (line_count + 2,) no machine slows down there because of an arc
     rapid: npt.NDArray[np.bool_]  # (line_count + 2,) the line moves in rapid
     function: npt.NDArray[np.bool_]  # (line_count + 2,) the line has M, S or T words, or an unknown travel
     sections: tuple[tuple[int, int], ...]  # (first line, last line) of the parts without functions
 
     def starts(self, model: _core.FanucModel) -> FloatArray:
-        """Start times of the lines in a model."""
+        """Start times of the lines in a model, s, (line_count + 2,): NaN without a move; the last one is the end."""
         timed = _core.time_program(self.program.core, model, True)
         found = np.full(self.line_count + 2, np.nan)
         # A line may have several moves: the first one counts.
@@ -133,7 +133,7 @@ class CutSection:
 
     lines: tuple[int, int]  # first and last
     feed_override: float  # override ratio
-    measured: bool  # the override is from the log; else from the run, or 1
+    measured: bool  # the override is from steady cuts of this section; else stated, of the whole run, or 1
 
 
 def line_numbers(log: RunLog, timed: TimedProgram) -> IntArray:
@@ -188,17 +188,17 @@ def feed_unit(entry: RunEntry, log: RunLog, timed: TimedProgram) -> float:
         return units[0] if stated is not None else math.nan
     best = min(units, key=lambda unit: abs(steady + math.log(unit)))
     if abs(steady + math.log(best)) > math.log(2.0):
-        tried = name if stated is not None else f"no unit of {', '.join(_FEED_UNITS)}"
+        tried = name if stated is not None else f"each of {', '.join(_FEED_UNITS)}"
         raise RecordError(
             f"{log.source}: steady feeds of {entry.program.name} are {math.exp(steady):.4g} times the programmed ones "
-            f"in mm/s: {tried} would not be an override of 50 to 200 %; the log is of another program, the "
+            f"in mm/s; with {tried} that would not be an override of 50 to 200 %; the log is of another program, the "
             f"program in another unit (G20, G21), or feed_unit must be stated{' otherwise' if stated else ''}"
         )
     return best
 
 
 def steady_value(values: FloatArray) -> float | None:
-    """Most frequent value, or None."""
+    """Most frequent value; None: no value is frequent enough."""
     ordered = np.sort(values)
     count = np.searchsorted(ordered, ordered + _FEED_BIN, side="right") - np.arange(len(ordered))
     most = int(count.max())
@@ -262,9 +262,9 @@ class ObservedRun:
     log: RunLog
     entry: RunEntry  # its entry in the file of runs
     time_s: FloatArray  # (n,) time since the start at which a line was first reported
-    line: IntArray  # (n,) reported lines, never descending
+    line: IntArray  # (n,) reported lines, strictly ascending
     cut_sections: tuple[CutSection, ...]  # sections with their feed overrides
-    rapid_override: float  # ratio of the rapid rates
+    rapid_override: float  # ratio of the rapid rates; NaN: neither stated nor logged, before `with_override`
     feed_unit_mm_per_s: float  # one unit of the logged feed; NaN without a feed
     notes: tuple[str, ...]  # findings and gaps
     whole: bool = True  # the log begins with the program
@@ -296,7 +296,7 @@ def observe(entry: RunEntry, log: RunLog, timed: TimedProgram, machine: Machine)
 
 
 def _lines(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) -> tuple[FloatArray, IntArray]:
-    """Line numbers reported in the log, made non-descending, and their times."""
+    """Times and numbers of the lines in the log, each at its first report; lines out of order are left out."""
     line = line_numbers(log, timed)
     time_s = log.block.time_s
     within = (line >= 1) & (line <= timed.line_count)
@@ -435,7 +435,7 @@ def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
 
 
 def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
-    """Rapid rate of the machine, and the runs with their overrides, from the logged feeds of rapids."""
+    """Rapid rate, mm/s (NaN: unknown), by the logged feeds of rapids, and the runs with their overrides."""
     shown = {id(run): _shown_rate(run) for run in runs}
     plateaus = [plateau for plateau, _ in shown.values() if math.isfinite(plateau)]
     if not plateaus:

@@ -1,8 +1,8 @@
 """Directions of a calibrated cycle-time model that run logs do not determine, as rows for the machine file.
 
-Each row is a step of one standard deviation, independent of the others. The directions are those of the symmetric root
-of the covariance, each nearest to one parameter (Zuber and Strimmer, 2011, "CAR scores"): so the squares
-are the contributions of the parameters.
+Each row is a step of one standard deviation, or of a part of it with more weight, independent of the others. The
+directions are those of the symmetric root of the covariance, each nearest to one parameter (Zuber and Strimmer, 2011,
+"CAR scores"): so the squared changes of a time are the contributions of the parameters to its variance.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def kind_weights(scores: Sequence[float], best: int) -> list[float]:
 
 
 def motion_rows(fit: MotionFit, covariance: FloatArray, runs: Sequence[ObservedRun], machine: Machine) -> list[_Row]:
-    """A row for each parameter of the motion, and one for a block time if the model has none."""
+    """A row for each parameter of the motion, and for look-ahead without a block time one for that."""
     base, parameters = fit.file_values(), fit.family.parameters
     rows = []
     for index, step in enumerate(_symmetric_root(covariance).T):

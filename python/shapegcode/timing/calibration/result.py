@@ -22,8 +22,8 @@ class FamilyScore(OldNames):
     Attributes:
         name: its name.
         meaning: description.
-        fitted_s: error of its times in the logs used for the fit, s (weighted root mean square over
-            windows of seconds to minutes).
+        fitted_s: error of its times in the logs used for the fit, s (weighted sum of root mean squares over
+            windows of 1, 6 and 30 s and over whole sections).
         cross_validated_s: error in runs not used for the fit, s; null: too few runs for cross-validation.
     """
 
@@ -64,7 +64,7 @@ class CycleTimePart:
     """A part of a run: a tool, or a kind of motion.
 
     Attributes:
-        name: "T3", "cuts", "between cuts".
+        name: "T3", "no tool", "cuts" or "between cuts".
         measured_s: time in the log, without holds.
         predicted_s: time of the calibrated model.
     """
@@ -98,7 +98,7 @@ class CalibrationRun(OldNames):
         tools: times by tool.
         kinds: times of cuts, and between cuts.
         holds: descriptions of its holds.
-        notes: gaps in the log.
+        notes: findings and gaps of the log.
     """
 
     program: str
@@ -182,7 +182,7 @@ class CycleTimeCalibration(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether the error of every run is within 2 %."""
+        """Whether the error of every complete run is within 2 %; False without a complete run."""
         largest = self.largest_error_percent
         return largest is not None and largest <= TOLERANCE_PERCENT
 
@@ -201,7 +201,7 @@ class CycleTimeCalibration(Result):
 
     @property
     def next_step(self) -> str:
-        """Use the machine file, or add runs."""
+        """What to do next, in one sentence."""
         if self.ok:
             return "write it with -o FILE; shapegcode time part.nc -m FILE gives the time of other programs"
         return "add runs of other programs, or state what the operator had set (override_percent in RUNS.toml)"
@@ -252,7 +252,7 @@ _FAMILIES = (
     Column("description", value="meaning", text=True),
 )
 _NUMBERS = (
-    Column("number", value="meaning", text=True),
+    Column("parameter", value="meaning", text=True),
     Column("value", value=lambda number: f"{number.value:.4g} {number.unit}"),
     Column(
         "95 % interval",

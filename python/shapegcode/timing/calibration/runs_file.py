@@ -40,7 +40,7 @@ class RunEntry:
         use: "fit", or "test": predicted only, never fitted.
         feed_unit: unit of the feed in the logs; None: found from the data.
         items: (role, name in the log) of the named items.
-        format: format of the logs; None: by content.
+        format: format of the logs; None: recognized by content.
         override_percent: feed override set by the operator, if a log does not contain it; None: unknown.
         rapid_override_percent: rapid override likewise.
         leave_out: reason not to use the entry; None: used.
@@ -80,7 +80,7 @@ class RunEntry:
 
         Raises:
             RecordError: a log cannot be used.
-            OSError: a log cannot be read.
+            OSError: a log or the program cannot be read.
         """
         found: list[RunLog] = []
         for log in self.logs:
@@ -122,10 +122,10 @@ class _RunsRow(TomlTable):
     logs: Annotated[tuple[_Path, ...], Field(min_length=1)] | None = key(
         "several logs, or patterns, in place of log", default=None
     )
-    use: Use = key('"fit": calibrated with; "test": predicted only', default="fit")
-    feed_unit: Text | None = key("unit of the feed in the logs; left out: by the data", default=None)
+    use: Use = key('"fit": used for the calibration; "test": predicted only', default="fit")
+    feed_unit: Text | None = key("unit of the feed in the logs; left out: found from the data", default=None)
     items: dict[Text, Text] | None = key("names of the items in the logs by role", default=None)
-    format: LogFormat | None = key("format of the logs; left out: by their content", default=None)
+    format: LogFormat | None = key("format of the logs; left out: recognized by their content", default=None)
     override_percent: _Percent | None = key(
         "feed override set by the operator, if the log does not contain it", default=None
     )
