@@ -1,4 +1,4 @@
-"""shapegcode: CNC programs whose motion no longer excites the machine.
+"""shapegcode: CNC programs whose motion no longer excites the machine's vibration modes.
 
 >>> import shapegcode as sg
 >>> machine = sg.Machine.load("vx500")

@@ -1,4 +1,4 @@
-"""The public names of shapegcode and their homes: the one list, which type checkers and `__init__.py` read."""
+"""The public names of shapegcode and their modules: the only list, read by type checkers and `__init__.py`."""
 
 from shapegcode._core import (
     AccelerationLaw as AccelerationLaw,

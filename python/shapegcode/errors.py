@@ -1,8 +1,8 @@
 """Errors of shapegcode, derived from :class:`ShapegcodeError`; the user can correct all but :class:`RoundTripError`.
 
 From the core: :class:`ArgumentError`, :class:`DesignError`, :class:`NumericError`, :class:`ProgramError`. From settings
-files: :class:`MachineError`, :class:`ToolError`, :class:`StockError`, :class:`RunsFileError`. From measured
-records: :class:`RecordError`. Files that cannot be read or written raise Python's :class:`OSError`.
+files: :class:`FileError` and its subclasses, such as :class:`MachineError`. From measured records:
+:class:`RecordError`. Files that cannot be read or written raise Python's :class:`OSError`.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ class Problem:
 
 
 class FileError(ShapegcodeError, ValueError):
-    """A settings file that cannot be used; the message lists every problem, one line each.
+    """A settings file that cannot be used; the message lists its problems, at most 100, one line each.
 
     Attributes:
         file: name of the file (or of the built-in data).
-        problems: all errors, in the order of the keys.
+        problems: the listed ones, in the order of the keys; one more states how many are not listed.
     """
 
     def __init__(self, file: str, problems: tuple[Problem, ...]) -> None:

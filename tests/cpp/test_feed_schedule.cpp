@@ -200,5 +200,10 @@ TEST_CASE("bad feed schedules are refused") {
   CHECK(refusal(blocks, stations, {1e-300, infinity, 0.1}) ==
         "a quarter of the least length of 2.5e-301 mm cuts 2 mm into 8e+300 pieces, limit 1e+09");
   CHECK(refusal({{1e-7, 0.0, true}}, {{1e-5}, {100.0}}, {}) == "the stations end at 1e-05 mm, the blocks at 1e-07 mm");
-  CHECK_THROWS_AS((void)with_feeds(Path({make_line({0, 0, 0}, {2, 0, 0}, 1.0)}), std::vector<FeedStretch>{}), Error);
+  const Path line({make_line({0, 0, 0}, {2, 0, 0}, 1.0)});
+  using Sections = std::vector<FeedStretch>;
+  for (const Sections& sections : {Sections{}, Sections{{1.0, 2.0, 60.0}}, Sections{{0.0, 1.0, 60.0}},
+                                   Sections{{0.0, 0.5, 60.0}, {1.0, 2.0, 60.0}}, Sections{{0.0, -infinity, 60.0}}}) {
+    CHECK_THROWS_AS((void)with_feeds(line, sections), Error);
+  }
 }

@@ -449,6 +449,12 @@ def test_a_feed_that_convert_does_not_write_is_noted() -> None:
     assert told(checked("G1X0.01F0.001\n", minimum_feed_mm_per_min=0.001), "reader") == []
 
 
+def test_the_next_step_is_for_the_warning_that_there_is() -> None:
+    without_end = checked("G1X10.F1000.\n", end="%\n")
+    assert without_end.warnings and "words that stop" not in without_end.next_step
+    assert "words that stop" in checked(_CUTS.format("M50"), no_buffer_m_codes=[50]).next_step
+
+
 def test_a_shaped_program_that_is_too_large_is_told_to_convert_smaller(tmp_path: Path) -> None:
     (tmp_path / "part.nc").write_text(HEAD + "G1X40.F4000.\nY40.\nX0\nG0Z5.\n" + END)
     small = machine(program_memory_bytes=1000)

@@ -159,6 +159,13 @@ def test_what_people_see(capsys: pytest.CaptureFixture[str], taps: list[str]) ->
     assert f"next: shapegcode identify {' '.join(taps)} --axis x --update mine.toml" in out
 
 
+def test_the_next_command_finds_the_same_modes(capsys: pytest.CaptureFixture[str], taps: list[str]) -> None:
+    determining = ["--response-scale=1.5", "--freq", "20:400", "--max-modes", "3"]
+    assert main(["identify", "--quiet", *determining, taps[0], "--json", "-"]) == 0
+    said = json.loads(capsys.readouterr().out)["next_step"]
+    assert f"identify {taps[0]} --axis x {' '.join(determining)} --update mine.toml" in said
+
+
 def test_one_mode_has_the_check_of_the_paper(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     result = asked(capsys, str(write_tap(tmp_path / "one.csv", TWO[:1])))
     (mode,) = result["modes"]

@@ -38,14 +38,20 @@ def simulated(way: FloatArray, dead_s: float, gain: float, forward: float) -> Fl
     return np.asarray(lsim(system, late - way[0], time)[1]) + way[0]
 
 
-def capture(path: Path, axes: dict[int, tuple[FloatArray, FloatArray]], noise: float = 0.0) -> Path:
+def capture(
+    path: Path, axes: dict[int, tuple[FloatArray, FloatArray]], noise: float = 0.0, lost_at: int | None = None
+) -> Path:
+    """Write a capture; at sample `lost_at` five cycles are missing."""
     every = round(PERIOD_S / 1e-4)
     rng = np.random.default_rng(7)
     columns = {}
     for number, (command, actual) in axes.items():
         columns[f"DES_POS|{number}"] = command[::every]
         columns[f"ENC_POS|{number}"] = actual[::every] + noise * rng.standard_normal(len(actual[::every]))
-    return write_edge(path, edge_document(columns))
+    counter = None
+    if lost_at is not None:
+        counter = [row + (5 if row >= lost_at else 0) for row in range(len(next(iter(columns.values()))))]
+    return write_edge(path, edge_document(columns, first=0, counter=counter))
 
 
 def test_the_lag_on_a_ramp_is_its_closed_form_and_that_of_the_core() -> None:
@@ -216,14 +222,17 @@ def test_a_command_that_jumps_is_divided_there(tmp_path: Path) -> None:
     """Other coordinates in mid-motion, by more than half a turn: neither a turn nor a motion."""
     way = moves(6, 200.0, 1500.0)
     loop = simulated(way, 0.006, 40.0, 0.5)
-    jump = np.where(np.arange(len(way)) >= len(way) // 2 + 13, 321.0, 0.0)
-    found = sg.fit_servo(capture(tmp_path / "a.json", {1: (way + jump, loop + jump)}))
+    every = round(PERIOD_S / 1e-4)
+    step = len(way) // 2 // every
+    jump = np.where(np.arange(len(way)) >= step * every, 321.0, 0.0)
+    found = sg.fit_servo(capture(tmp_path / "a.json", {1: (way + jump, loop + jump)}, lost_at=step // 2))
     (axis,) = found.axes
     assert axis.unit == "mm"
     assert axis.top_speed == pytest.approx(200.0, rel=0.01)
     gain = axis.parameter("position gain")
     assert gain.value == pytest.approx(40.0, rel=0.02)
-    assert any("its command has a step, first at" in warning for warning in found.warnings)
+    at_s = (step + 5) * PERIOD_S
+    assert any(f"its command has a step, first at {at_s:.3f} s" in warning for warning in found.warnings)
 
 
 @pytest.mark.slow

@@ -194,6 +194,8 @@ def test_every_and_lines_choose_rows_of_the_whole_motion(folder: Path) -> None:
         archive = np.load(folder / "m.npz")
         return {name: archive[name] for name in archive if name != "kind_names"}
 
+    with pytest.raises(sg.ArgumentError, match="every = 0"):
+        sg.simulate_motion(folder / "part.nc", "vx500", every=0)
     whole, tenth = columns(), columns("--every", "10")
     for name, column in whole.items():
         np.testing.assert_array_equal(tenth[name], column[::10])

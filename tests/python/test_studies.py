@@ -555,8 +555,10 @@ def test_more_choices_than_conversions_are_searched() -> None:
         "shaping.arc_feed_ratio": [1.0, 0.9, 0.8],
     }  # fmt: skip
     ask = partial(sg.optimize, path_program(200, VX500), VX500, {X_HZ: sg.normal(46, 1)}, n=8)
-    found = ask(choose=choose, most=10)
+    progress: list[float] = []
+    found = ask(choose=choose, most=10, on_progress=progress.append)
     assert (len(found.candidates), found.combinations) == (10, 36)
+    assert progress == pytest.approx([0.1 * (k + 1) for k in range(10)])
     assert found.best is not None and found.best.time_s == min(each.time_s for each in found.candidates if each.time_s)
     assert ask(choose=choose, most=10).values == found.values
     for options, said in (

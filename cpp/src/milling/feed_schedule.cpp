@@ -219,8 +219,17 @@ std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const 
   return merged;
 }
 
+bool covers(std::span<const FeedStretch> sections, double length_mm) {
+  double at = 0.0;
+  for (const FeedStretch& section : sections) {
+    if (!(std::abs(section.begin_mm - at) <= same_position_mm && section.end_mm >= section.begin_mm)) return false;
+    at = section.end_mm;
+  }
+  return !sections.empty() && std::abs(at - length_mm) <= same_position_mm;
+}
+
 Path with_feeds(const Path& path, std::span<const FeedStretch> sections) {
-  if (sections.empty() || std::abs(sections.back().end_mm - path.length_mm()) > same_position_mm) {
+  if (!covers(sections, path.length_mm())) {
     refuse("the sections of a feed schedule must cover the path of {} mm", path.length_mm());
   }
   std::vector<Segment> pieces;

@@ -371,8 +371,7 @@ std::vector<bool> divisible_segments(const Program& program, const Region& regio
 
 RefedRegion write_feeds(const Program& program, const Region& region, std::span<const FeedStretch> sections,
                         const FeedWriterOptions& options) {
-  if (sections.empty() || sections.front().begin_mm > same_position_mm ||
-      std::abs(sections.back().end_mm - region.path->length_mm()) > same_position_mm) {
+  if (!covers(sections, region.path->length_mm())) {
     throw Error(ErrorKind::argument,
                 fmt::format("the sections of a feed schedule must cover the region's path of {:g} mm",
                             region.path->length_mm()));

@@ -337,7 +337,7 @@ def batch(
         jobs: parallel processes; 0: one per processor.
         cluster: run on Dask instead; None: on this machine.
         resume: run only what is missing, failed or changed.
-        html: folder for a page of each run, and an index; None: no pages.
+        html: folder for a page of each run; None: no pages.
         time_limit_s: time limit of a run; 0: none.
         memory_limit_bytes: memory limit of a run, beyond what shapegcode itself needs; 0: none.
         on_progress: called with the finished fraction and a text.

@@ -122,7 +122,7 @@ def _only_returns(path: str) -> bool:
 
 
 def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterator[tuple[str, str]]:
-    """Names and paths of programs that one may call, recursively: any number after P in a program with calls."""
+    """Names and paths of the files a program may call, recursively: any number after P in a program with calls."""
     beside = Path(path).parent
     folders = [beside, *(Path(base, Path(name).expanduser()) for name in machine.input.program_folders)]
     load = program_loader(folders, machine.controller.max_program_bytes)

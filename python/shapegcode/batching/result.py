@@ -1,4 +1,4 @@
-"""Result of a batch: a row for each run, sorted by gain and by problem; the next step."""
+"""Result of a batch: a row for each run, tables by problem and by gain, the next step."""
 
 from __future__ import annotations
 
@@ -144,14 +144,14 @@ class Batch(Result):
     Attributes:
         command: the command.
         output: folder of the results.
-        rows: one for each program on each machine, in the given order.
+        rows: one for each finished run, machine by machine, programs in the order found.
         summary: CSV file with all rows.
         not_done: runs not started or not finished because the batch was stopped.
         stopped: reason for the stop; empty: not stopped.
         warnings: why the batch was stopped, and subprograms that were not run on their own.
         wall_s: elapsed time of the batch.
         processes: number of parallel processes.
-        html: folder of the pages; empty: none.
+        html: folder of the pages, for the index that the command writes; empty: no index.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "counts": dict[str, int]}
@@ -188,7 +188,7 @@ class Batch(Result):
         """Number of runs that are ok and of the others, and the elapsed time."""
         counts, whole = self.counts, len(self.rows) + self.not_done
         trouble = [f"{count} {name}" for name, count in counts.items() if count and name != "ok"]
-        trouble += [f"{self.not_done} not started"] if self.not_done else []
+        trouble += [f"{self.not_done} not done"] if self.not_done else []
         earlier = self._tally["earlier"]
         before = f", {earlier} of them by an earlier batch" if earlier else ""
         tail = f"; {', '.join(trouble)}" if trouble else ""

@@ -134,7 +134,7 @@ def check(test: AirTest, box: AirBox) -> None:
 
 _FEEDS = (3000.0, 1200.0, 600.0, 300.0, 120.0, 60.0)  # mm/min: at each, 1 µm takes a round time, from 0.02 to 1 ms
 _FIRST_NUMBER = 7001  # 8000 and 9000 are often locked
-_STOP_S, _STOP_DWELL_S = 0.032, 0.008  # multiples of every usual interpolation period
+_STOP_S, _STOP_DWELL_S = 0.032, 0.008  # multiples of 1, 2, 4 and 8 ms, the most usual interpolation periods
 _LOG_STOP_S, _LOG_DWELL_S, _LOG_PAUSE_S = 0.160, 0.096, 0.5
 _STEPS_MOVE_S = 0.8  # at full feed: longer than the ramps at both ends
 _LOG_RATIOS = (1.0, 0.5, 0.25, 0.1, 0.05)

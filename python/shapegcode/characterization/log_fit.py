@@ -57,7 +57,7 @@ def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list
 def _period(
     facts: LogFacts, logs: Mapping[str, ServoLog], stops: list[moves.PartLog], run: list[moves.PartLog], bend: int
 ) -> None:
-    """Interpolation period: from a command held constant, else from moves just below and just above whole periods."""
+    """Interpolation period: from steps or bends of the command, else from moves just below and above whole periods."""
     name, key = "interpolation period", "controller.interpolation_period_s"
     count, sampling = min((moves.held_samples(log)[0], log.sampling_s) for log in logs.values())
     facts.sampling = sampling
@@ -110,7 +110,7 @@ def _period_of_run(run: list[moves.PartLog], sampling: float) -> tuple[float, fl
 
 
 def _dwells(facts: LogFacts, part: moves.PartLog) -> float:
-    """Find the in-position wait before a dwell; returns the pitch of the moves without the dwell."""
+    """Find whether a dwell waits for in-position; returns the pitch of the moves without the dwell."""
     pitch, half = part.pitch_s()
     moving = pitch - whole_periods(part.part.dwell_s, facts.tick)
     if facts.stop_s is not None:
@@ -216,7 +216,7 @@ def _feed_steps(facts: LogFacts, parts: list[moves.PartLog]) -> None:
 
 
 def _followed_share(log: moves.PartLog) -> float | None:
-    """Ratio of the speed step that is reached; None if no part of the move has a constant speed."""
+    """Ratio of the speed step that is reached; None if nothing remains between the ramps at start and reversal."""
     part = log.part
     top = int(np.argmax(log.travel_mm))  # the reversal, which smoothing shortens
     begin = log.times_s[int(np.argmax(log.travel_mm > max(0.02, 5 * log.noise_mm)))]

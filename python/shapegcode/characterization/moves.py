@@ -21,7 +21,7 @@ _HOLD_SHARE, _BEND_SHARE, _LONGEST_HOLD = 0.9, 0.85, 64
 
 
 def held_samples(log: ServoLog) -> tuple[int, int]:
-    """Number of samples with constant command, and the index of a first one; 1 if it is not held constant."""
+    """Number of samples for which the command is held, and index of the first of them; (1, 0): it is not held."""
     command = np.nan_to_num(log.command_mm)
     increments = np.diff(command, axis=0)
     noise = np.maximum(command[: max(3, round(0.1 / log.sampling_s))].std(axis=0), 5e-4)

@@ -127,7 +127,7 @@ class CharacterisationTests(Result):
         machine: name of the machine.
         folder: folder of the programs, with ``README.txt`` and ``RESULTS.toml``.
         box: range of the moves, mm from the start point, "X0:X1,Y0:Y1,Z0:Z1".
-        tests: in the order of the folder; several may share a program.
+        tests: in the order of their programs; several may share one.
         warnings: none.
     """
 

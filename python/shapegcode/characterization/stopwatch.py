@@ -141,7 +141,7 @@ def _least_squares(rows: Sequence[TimedTest], period: float, end: air_tests.Bloc
 
 
 def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
-    """Time constant of an exponential, whose deceleration takes longer from a higher feed; 0 if it does not."""
+    """Time constant of an exponential filter, whose stops take longer from a higher feed; 0 if none was found."""
     fast = rows.get("stop_below")
     slow = [rows[name] for name in _SLOW if name in rows]
     name = "cutting acceleration shape"
@@ -224,7 +224,7 @@ def _block_time(best: _Fit, tiny: TimedTest | None, facts: WatchFacts) -> None:
 def _override(best: _Fit, rows: dict[str, TimedTest], facts: WatchFacts) -> None:
     for row in [row for name, row in rows.items() if name.startswith("override")]:
         part = row.test.parts[0]
-        # without block overlap there is one ramp at any override
+        # the blocks follow each other without stops: there is one ramp, at any override
         moving = max(row.time_s - best.get("overhead")[0] - best.get("cutting")[0], 1e-3)
         seen = 100.0 * part.count * part.duration_s / moving
         half = 1.96 * seen * row.sigma_s / moving

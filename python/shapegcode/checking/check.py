@@ -54,7 +54,7 @@ def check(
         The findings, and the effect of short blocks and serial line.
 
     Raises:
-        ProgramError: it cannot be read at all, without a position to report.
+        ProgramError: it is too large, or it cannot be read at all, without a position to report.
         OSError: the file cannot be read.
     """
     machine = Machine.of(machine)
@@ -89,7 +89,7 @@ def check_text(
         The findings, and the effect of short blocks and serial line.
 
     Raises:
-        ProgramError: it cannot be read at all, without a position to report.
+        ProgramError: it is too large, or it cannot be read at all, without a position to report.
     """
     machine = Machine.of(machine)
     data = text.encode() if isinstance(text, str) else text

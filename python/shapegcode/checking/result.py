@@ -202,8 +202,10 @@ class Check(Result):
             return f"post longer blocks, or lower the feed, in {stretches} with short blocks (controller.block_time_s)."
         if "axis_feed" in worst:
             return "lower F to the limits of the axes: the control does so anyway."
-        if worst:
+        if "look_ahead_breaker" in worst:
             return "move the words that stop the control out of the cut."
+        if worst:
+            return "correct what the warnings name, and check again."
         return "shapegcode time predicts its cycle time, shapegcode simulate its vibration."
 
     def tables(self) -> list[Table]:
@@ -220,7 +222,7 @@ class Check(Result):
         for finding in self.findings:
             kind = (finding.severity, finding.code, finding.alarm)
             seen[kind] += 1
-            # Alarms are always listed.
+            # Of alarms more are listed.
             if seen[kind] <= (_SHOWN_ALARMS if finding.severity == "alarm" else _SHOWN_ALIKE):
                 shown.append(finding)
         listed = Counter(finding.code for finding in shown)

@@ -62,7 +62,7 @@ class Command:
 
 
 def command_in(words: Iterable[str]) -> str | None:
-    """The first word that names a command."""
+    """The first word that names a command; None: there is none."""
     return next((word for word in words if word in {command.name for command in COMMANDS}), None)
 
 
@@ -108,7 +108,7 @@ def parser_of(selected: str | None) -> argparse.ArgumentParser:
     """The parser with the arguments of the selected command; the others have only a name and a help line."""
     parser = CommandParser(
         prog="shapegcode",
-        description="Converts CNC programs into input-shaped FANUC programs that vibrate less.",
+        description="Converts CNC programs into input-shaped FANUC programs that excite less vibration.",
         epilog="exit codes: 0 done and within tolerance; 1 done but out of tolerance; 2 bad input. "
         "`shapegcode COMMAND --help` explains a command. NO_COLOR=1 turns colours off.",
     )
@@ -126,7 +126,7 @@ def parser_of(selected: str | None) -> argparse.ArgumentParser:
 
 
 def _expected(error: Exception) -> bool:
-    """True for errors of the input or the file system, which need no traceback."""
+    """True for errors that need no traceback: of the input, of the file system, or matplotlib is missing."""
     if isinstance(error, ModuleNotFoundError):
         return error.name == "matplotlib"
     # If the error is one of shapegcode, its core is loaded already: no import is needed.

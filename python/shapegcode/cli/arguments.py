@@ -287,7 +287,7 @@ class OldName:
 class Interface:
     """Description, options and function of a command or of one of its actions."""
 
-    description: str  # for the help; if empty, the line in the list of commands
+    description: str  # for the help; if empty, a command shows its line in the list of commands, an action nothing
     options: tuple[Row | OneOf | OldName, ...] = ()
     run: Callable[[argparse.Namespace], int] | None = None
     # actions by name, each with its line in the list of actions

@@ -58,8 +58,8 @@ def _batch(args: argparse.Namespace) -> int:
 BATCH = Interface(
     "Runs a command over many programs and machines, each run in a separate process. Options of the command come "
     "after --. Results, each complete or absent, go into the folder of -o, with batch.jsonl (finished runs) "
-    "and summary.csv (all rows). Exit code 0 if all are within tolerance, 1 if some are not or were refused, 2 if "
-    "none could be started.",
+    "and summary.csv (all rows). Exit code 0 if all are within tolerance, 1 if some are not, were refused or failed, 2 "
+    "if none could be started.",
     (
         ("programs", "PROGRAMS", {"nargs": "+"},
          "files, folders (with subfolders), patterns in quotes ('parts/**/*.nc'), or @LIST: a file with one of "
@@ -120,7 +120,7 @@ def _study(args: argparse.Namespace) -> int:
 
 
 STUDY = Interface(
-    "Converts a program once and simulates it on sampled machines (Monte Carlo): probability of staying "
+    "Converts a program and simulates it on sampled machines (Monte Carlo): probability of staying "
     "within tolerance, quantiles, most influential value. Exit code 1 if the probability is below the file's at_least.",
     (
         *_study_options("program, machine, varied parameters", "number of samples"),

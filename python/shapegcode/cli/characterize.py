@@ -103,7 +103,7 @@ CHARACTERIZE = Interface(
             ("--write", "DIR", None, "write the test programs, RESULTS.toml to fill in, and README.txt"),
             ("--fit", "RESULTS", None, "fit a filled-in RESULTS.toml, a folder with it and logs, or one log"),
             ("--servo", "LOG", None,
-             "fit the position loops to one half of a log and validate them with the other: a capture of a Sinumerik "
+             "fit the position loops to a log, and validate fits to each half with the other: a capture of a Sinumerik "
              "control (JSON, gzip, zip), or a CSV with columns of commands and actual positions"),
             ("--runs", "RUNS.toml", None,
              "calibrate the cycle-time model from programs and the logs of their runs (SHDR text, MTConnect streams, "
@@ -115,7 +115,7 @@ CHARACTERIZE = Interface(
          "all; the one that predicts left-out runs best is chosen)"),
         ("-o --output", "FILE", None, "with --fit, --servo, --runs: machine file to write, with the measured values"),
         ("--axes", "X=1,Y=6,Z=2", None, "with --servo: axes of the log used as X, Y, Z (default: by their names)"),
-        ("--drive", None, bool, "with --servo: fit a drive with friction too, some ten seconds for each axis"),
+        ("--drive", None, bool, "with --servo: also fit a drive with friction; takes some 20 s per axis"),
         plots("with --servo, --runs: write the pictures (PNG and SVG) into this folder"),
         ("--units", "TIME,LENGTH", None,
          "with --fit, --servo: units of CSV logs, for example ms,um (default: from their headers)"),
@@ -234,7 +234,7 @@ _INTERVAL = (
 )
 _FIT = (
     ("files", "CSV", {"nargs": "+"},
-     "record of a pass with a header, time_s or position_mm, fx_n, fy_n; 2=FILE sets the pass"),
+     "record of a pass: columns time_s, position_mm or radial_depth_mm, and fx_n, fy_n; 2=FILE sets the pass"),
     ("--cut", "OUT.json", None, "side file of the test cut", NEEDED),
     ("--forces-on", None, ("workpiece", "tool"),
      "body on which the measured forces act; a dynamometer measures those on the workpiece (default: %(default)s)",
@@ -263,13 +263,13 @@ TESTCUT = Interface(
             "a corner mapped to a straight edge: constant feed, then modified (figure 7)",
             Interface(
                 "Mills an edge on which a straight pass meets the radial depth of a corner, and cuts it with "
-                "constant feed, then at constant mean resultant.", (*_CUT, *_SHAPE, *_CORNER, *_END), _write_cut,
+                "constant feed, then with the feed of equation 7.", (*_CUT, *_SHAPE, *_CORNER, *_END), _write_cut,
             ),
         ),
         "interval": (
             "feeds that change every 0.2, 0.4 and 0.6 mm: shortest interval that the control follows (figure 8)",
             Interface(
-                "Passes of constant radial depth whose feed changes as in a corner, each at other intervals.",
+                "Makes passes of constant radial depth; the feed changes as in a corner, at another interval in each.",
                 (*_CUT, *_SHAPE, *_INTERVAL, *_END), _write_cut,
             ),
         ),

@@ -142,12 +142,14 @@ CONVERT = Interface(
          "shape every cut whose time stays within --max-time-increase and --max-cut-time-increase, even if it gains "
          "less than shaping.least_gain_um, gets worse, or the program is within tolerance; by default such cuts stay "
          "unchanged"),
-        ("--only", "A-B,...", line_ranges, "shape nothing but the cuts in these lines of IN, for example 12-80,95-240"),
-        ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines of IN unchanged", ()),
+        ("--only", "A-B,...", line_ranges,
+         "shape nothing but the cuts in these lines, numbered as by `shapegcode expand`, for example 12-80,95-240"),
+        ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines unchanged, numbered likewise", ()),
         ("--tolerance-curve", None, {"action": argparse.BooleanOptionalAction},
          "compute the cycle time at other contour tolerances (default: %(default)s)", True),
         ("--block-period", "TIME", seconds,
-         "duration of the shortest block, for example 5ms (default: chosen for the modes)"),
+         "duration of the shortest block, for example 5ms (default: emission.block_period_s of the machine file, else "
+         "chosen for the modes)"),
         ("--max-bytes", "N[k|M]", size,
          "largest size of the emitted program, for example 256k; to keep it, the cuts that gain least are left "
          "unchanged"),

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,6 +37,10 @@ _OF_FILES = (
      "time constant of an exponential window that the analyser applied to the response, such as 50ms"),
     ("--response-first", None, bool, "in a WAV file the response is the first channel, not the force"),
 )  # fmt: skip
+_DETERMINING = {
+    "--across", "--modes", "--max-modes", "--most-modes", "--frequencies", "--decay", "--ignore-force", "--stops",
+    "--start", *(name for names, *_ in _OF_FILES for name in names.split()),
+}  # fmt: skip
 
 
 def _identify(args: argparse.Namespace) -> int:
@@ -89,11 +94,15 @@ def _fit(args: argparse.Namespace) -> int:
 
 
 def _said_again(args: argparse.Namespace) -> tuple[str, ...]:
-    """The options that determine which modes are found."""
-    said = ["--decay"] * args.ignore_force + ["--stops"] * args.stops
-    said += ["--frequencies {:g}:{:g}".format(*args.frequencies)] if args.frequencies is not None else []
-    said += [f"--modes {args.modes}"] if args.modes is not None else []
-    return (*said, *(["--across", *args.across] if args.across is not None else []))
+    """Options that determine which modes are found, as typed: the command of the next step repeats them."""
+    said, repeats = [], False
+    for word in args.typed[1:]:
+        if word.startswith("--"):
+            name = word.partition("=")[0]
+            repeats = name != "--force" and any(each.startswith(name) for each in _DETERMINING)
+        if repeats and word not in args.files:
+            said.append(shlex.quote(word))
+    return tuple(said)
 
 
 def _decide(args: argparse.Namespace, machine: Machine, axis: str | None) -> None:
@@ -159,7 +168,7 @@ def _sweep(args: argparse.Namespace) -> int:
 SWEEP = arguments.Interface(
     "Writes a program that shakes one axis: moves back and forth whose frequency rises and falls, band by band, "
     "with pauses. Reports the band that the control can reach and the acceleration of each part, simulated from "
-    "the emitted program. Any logger records accelerations while it runs; `identify --sweep` finds the "
+    "the emitted program. Record the acceleration with any logger while it runs; `identify --sweep` finds the "
     "modes. Exit code 0; 2: bad input, or a band that the control does not reach.",
     (
         *options.MACHINE,

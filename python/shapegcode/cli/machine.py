@@ -179,7 +179,7 @@ _INIT_ACTION = Interface(
     (
         ("name", "NAME", {"nargs": "?"}, "built-in machine to start from (default: %(default)s)", "vx500"),
         ("-o --output", "FILE", None, "file to write (default: %(default)s); - for standard output", _DEFAULT_FILE),
-        ("--full", None, bool, "every key with its meaning (600 lines), not only values that differ from a default"),
+        ("--full", None, bool, "every key with its meaning, not only values that differ from a default"),
         _FORCE,
         QUIET,
     ),

@@ -54,7 +54,7 @@ def program_input(metavar: str = "IN") -> tuple[Row, ...]:
     return ("input", metavar, None, "CNC program"), *MACHINE, PROGRAM
 
 
-def plots(what: str = "write pictures (PNG and SVG) of the cut that vibrates most into this folder") -> Row:
+def plots(what: str = "write pictures (PNG and SVG) into this folder: cut that vibrates most, tolerance curve") -> Row:
     """``--plots DIR`` with the help *what*."""
     return "--plots", "DIR", None, what
 
@@ -88,13 +88,13 @@ def cutting(*, required: bool) -> tuple[Row, ...]:
     """Options of a feed schedule: tool, stock, margin, resolution."""
     return (
         ("--tool", "T.toml", {"action": "append", "required": required},
-         "tool file: end mill, cutting force, limits (docs/reference/tool_files.md); repeated, each file needs its T "
-         "number"),
+         "tool file: end mill, cutting force, limits (docs/reference/tool_files.md); may be repeated if each file "
+         "has a T number"),
         ("--stock", "S.toml", {"required": required},
          "stock file: shape of the workpiece before the first block (docs/reference/tool_files.md)"),
         ("--margin", "RATIO", share, "safety margin kept to each limit of the tool, for example 3%% (default: 1.5%%)"),
         ("--resolution", "LENGTH", micrometres,
-         "grid spacing of the simulated material, for example 50um (default: a hundredth of the tool's diameter)"),
+         "grid spacing of the simulated material, for example 50um (default: 1 %% of the smallest tool's diameter)"),
     )  # fmt: skip
 
 

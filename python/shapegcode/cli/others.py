@@ -1,4 +1,4 @@
-"""Commands that read no program: shaper, report, demo, completion."""
+"""The commands shaper, report, demo and completion."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ SHAPER = Interface(
         ("--uncertainty", "RATIO", share,
          "uncertainty of the frequency of modes given without a band, for example 5%% (default: 0)", 0.0),
         ("--block-period", "TIME", [seconds],
-         "block period on which the impulses must lie, such as 5ms; may be repeated (default: the machine's, or the "
-         "best few)", []),
+         "block period: the times of the impulses are multiples of it, such as 5ms; may be repeated (default: the "
+         "machine's, or the best few)", []),
         ("--continuous", None, bool,
          "also design shapers whose impulses may lie at any time (continuous time); without --block-period only "
          "these are designed. Default without -m and --block-period: continuous time and the best few periods"),
@@ -71,8 +71,8 @@ SHAPER = Interface(
          f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"),
         ("--list-families", None, bool, "list the families with meaning and source, and exit"),
         ("--max-duration", "TIME", seconds,
-         "longest shaper, for example 50ms (default: three periods of the slowest mode; with -m, if no such shaper is "
-         "good enough, shaping.max_duration_s of the machine)"),
+         "longest shaper, for example 50ms (default: three periods of the slowest mode; with -m at most "
+         "shaping.max_duration_s, which applies also if no shorter shaper is good enough)"),
         ("--max-abs-sum", "N", positive, "largest sum of the impulses' magnitudes (default: %(default)g)", 10.0),
         ("--vibration-limit", "RATIO", ratio,
          "maximum residual ratio within the bands (default: the machine's "
@@ -191,7 +191,8 @@ def _demo(args: argparse.Namespace) -> int:
 
 DEMO = Interface(
     "Reproduces the figures of a paper with this program's models, and shows both. Other papers are pages of the "
-    "documentation: docs/evidence/figures.md. Exit code 1 if a statement of the paper differs for an unknown reason.",
+    "documentation: docs/evidence/figures.md. Exit code 1 if a statement of the paper differs for an unknown reason, "
+    "or an emitted program is out of tolerance.",
     (
         ("name", "NAME", {"type": _name, "choices": ("path",)},
          "path: line, arc, line, at two feeds and two feed reductions: Ko, Lim and Hong, 2023 (paper 000)"),

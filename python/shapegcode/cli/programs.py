@@ -40,17 +40,17 @@ def _simulate(args: argparse.Namespace) -> int:
 
 
 SIMULATE = Interface(
-    "Simulates a program: the controller's model, then the machine's plant. For each cut: time, "
-    "residual and peak vibration, settling time, contour error of command and response. For the whole program with "
-    "its rapids, dwells and waits: the motion of the axes in time, as table, files and pictures.",
+    "Simulates a program: the controller's model, then the machine's plant. Reports the time of the cuts, their "
+    "largest residual and peak vibration, settling time, contour error of command and response; and for the whole "
+    "program with its rapids, dwells and waits the motion of the axes in time, as table, files and pictures.",
     (
         *options.program_input(),
         ("--shaped", None, bool,
          "simulate every cut as shaped blocks: at their feed, without look-ahead; needed only if the header of a "
          "shaped program, which marks its shaped cuts, is missing"),
         ("--against", "ORIGINAL", None,
-         "measure the contour error against the path of this program, such as the original of a shaped one (default: "
-         "IN's own path)"),
+         "measure the contour error against the path of this program, such as the original of a shaped one, and give "
+         "the verdict of `convert` (default: IN's own path, no verdict)"),
         ("--plant", None, ("modal", "feed-drive"),
          "modal: ideal servo followed by vibration modes; feed-drive: motor, ball screw, table, friction and servo "
          "loops of [axes.x.drive] (default: %(default)s)", "modal"),
@@ -165,7 +165,8 @@ MEASURE = Interface(
          "measure against the path of this program (default: the first one if shapegcode wrote the others, else each "
          "program's own path)"),
         ("--lines", "A-B", [line_range],
-         "measure the cut of these lines as one section; may be repeated (default: every line and arc)"),
+         "measure the cut of these lines, numbered as by `shapegcode expand`, as one section; may be repeated "
+         "(default: every straight line and every arc)"),
         ("--settling-band", "LENGTH", micrometres, "vibration within it counts as settled (default: 1um)", 1.0),
         ("--station", "LENGTH", micrometres, "spacing of the points along a wall at which it is measured (default: "
          "0.05mm)", 50.0),
@@ -220,8 +221,8 @@ def _time(args: argparse.Namespace) -> int:
 
 
 TIME = Interface(
-    "Predicts the cycle time of an unchanged program in closed form, and checks it by computing every set-point. "
-    "Reports cutting, rapids, in-position, dwells, acceleration, tool changes; by tool; slowest cuts and blocks. "
+    "Predicts the cycle time of a program in closed form, and checks it by computing every set-point. Reports the "
+    "time of cutting, rapids, in-position waits, dwells, acceleration, tool changes; by tool; slowest cuts and blocks. "
     "For a machine calibrated with run logs also the 95 % interval, and which log would narrow it. "
     "Exit code 0; 1: closed form and full interpolation differ by more than 0.5 %; 2: bad input.",
     (

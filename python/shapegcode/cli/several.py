@@ -135,7 +135,7 @@ class Gathered:
         return self.places[self.at].address
 
     def add(self, report: dict[str, Any], output: tuple[Path | str, bytes | memoryview] | None) -> None:
-        """Collect the output of a run."""
+        """Collect the report of a run and its emitted program, if any."""
         self.reports.append({**report, "program_address": self.address})
         if output is not None:
             self.written[self.at] = output[0], bytes(output[1])

@@ -70,7 +70,7 @@ class Allowance(Upright):
 
 
 class Solid(TomlTable):
-    """A shape: one of the two."""
+    """A solid: a box or a polygon."""
 
     box: Box | None = key("a block", default=None)
     polygon: Polygon | None = key("a prism over a polygon", default=None)
@@ -158,7 +158,7 @@ class Stock(TomlTable):
             name: name in the file.
 
         Returns:
-            The path, relative to the folder of this file.
+            The path; a relative name is taken from the folder of this file.
         """
         return self._folder / name
 

@@ -540,8 +540,10 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
     needed = 0.0 if peak and stable else _VERY_CLEAR
     if gain >= needed:
         return ""
+    if peak and stable:
+        return f"the fit without it is better (information criterion {gain:.1f}, limit 0)"
     return (
-        f"no {'peak of its own' if not peak else 'pole stable over model orders'} at {hertz:.4g} Hz, and the fit "
+        f"no {'pole stable over model orders' if peak else 'peak of its own'} at {hertz:.4g} Hz, and the fit "
         f"without it is hardly worse (information criterion {gain:.1f}, limit {needed:g})"
     )
 

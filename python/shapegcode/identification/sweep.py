@@ -234,7 +234,7 @@ def _response(
     if len(windows) < _FEWEST_PARTS:
         raise RecordError(
             f"{source}: {trace.name} moves in {len(windows)} part{'' if len(windows) == 1 else 's'}; required: two "
-            f"between rests of half a second, or {1.5 * _WINDOW_S:g} s of motion"
+            f"between rests of half a second, or more than {2 * _WINDOW_S:g} s of motion"
         )
     low, high = band_hz or (_LOWEST_HZ, np.inf)
     high = min(high, 1.0 / (_OVER_HALF * period_s))

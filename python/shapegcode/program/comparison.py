@@ -408,6 +408,6 @@ def _compensation(first: Program, second: Program, allowed: Allowed) -> Iterator
             if number in radii[at]:
                 found = _COMPENSATED.search(program.text)
                 lines[at] = None if found is None else 1 + program.text.count(b"\n", 0, found.start())
-                texts[at] = f"G41 or G42 with D{number}"
+                texts[at] = f"G41 or G42 with D{number}, radius {radii[at][number]:g} mm"
         is_allowed = allowed.covers("compensation")
         yield ProgramDifference("compensation", lines[0], lines[1], texts[0], texts[1], is_allowed)

@@ -108,7 +108,7 @@ def is_mode(answer: str) -> bool:
 
 
 def mode_of(answer: str) -> tuple[float, float]:
-    """An answer that `is_mode` as frequency in Hz and damping ratio, 0.02 if none is given."""
+    """Frequency in Hz and damping ratio, 0.02 if none is given, of an answer for which `is_mode` is true."""
     frequency, _, damping = answer.partition(":")
     return float(frequency), float(damping) if damping.strip() else _USUAL_DAMPING
 
@@ -196,7 +196,7 @@ EXPLAINED: Mapping[str, Callable[[Any], str]] = {
     "max_acceleration_mm_s2": lambda answer: (
         "It determines the speed in corners and how much vibration is excited."
         if answer
-        else "0.3 g is assumed, as usual for a machining centre: measure it with `shapegcode characterize`."
+        else "0.3 g is assumed, as usual for a machining centre: measure it with `shapegcode characterize --runs`."
     ),
     "least_increment_mm": lambda answer: (
         "Block ends are rounded to it: a finer one gives better shaping." if answer else "0.001 mm is assumed (IS-B)."

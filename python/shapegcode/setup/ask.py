@@ -27,7 +27,7 @@ _TITLES = {
     "G08": "G08 P1 (advanced preview control)",
 }
 _UNITS = {"m/min": ("mm/min", 1000.0), "m/s²": ("mm/s²", 1000.0), "MB": ("kB", 1024.0), "mm": ("µm", 1000.0)}
-"""Usual spellings of units, with their factors."""
+"""Other usual units: for each the unit into which it is converted, and the factor."""
 _OF_AXES = ("rapid_mm_per_min", "max_feed_mm_per_min", "max_acceleration_mm_s2")
 _FILES = {
     "dump": "parameter file, such as CNC-PARA.TXT, or LinuxCNC's INI file",

@@ -33,7 +33,7 @@ def set_up(answers: Answers) -> MachineSetup:
 
     Raises:
         MachineError: a value that is invalid in a machine file, or a dump that cannot be read.
-        ArgumentError, RecordError: a tap test without a supported mode.
+        ArgumentError, RecordError: a tap test without a supported mode, or a dump from which nothing was read.
         OSError: a file cannot be read.
     """
     machine, notes = _started(answers)

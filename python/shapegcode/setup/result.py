@@ -13,7 +13,7 @@ class OpenQuestion:
     """A value that is not known yet."""
 
     key: str  # key of the machine file
-    value: str  # value used until then, with its unit
+    value: str  # value used until it is known, with its unit
     why: str  # its origin
     command: str  # command that determines it; empty: none
 

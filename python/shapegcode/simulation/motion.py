@@ -27,7 +27,7 @@ class MotionEnvelope:
     """Minimum and maximum of several curves over equal intervals, as short as the limit of their number allows."""
 
     def __init__(self, most: int = _BUCKETS) -> None:
-        """Create an envelope of at most *most* intervals, 2 or more."""
+        """Create an envelope of at most *most* whole intervals, 2 or more; the last samples may form one more."""
         self._most = most
         self._low = self._high = self._rest = np.empty((0, 0))
         self.samples_per_bucket = 1

@@ -29,7 +29,7 @@ _NAMES = {"modal": ("residual vibration", "peak vibration"), "feed-drive": ("err
 class RegionRun:
     """One cutting region simulated."""
 
-    lines: tuple[int, int]  # first and last line of the program, from 1
+    lines: tuple[int, int]  # first and last line of the expanded program, from 1
     shaped: bool  # simulated as shaped blocks
     was_rapid: bool  # shaped blocks in place of a rapid
     time_s: float  # until the set-points rest
@@ -70,7 +70,7 @@ class Motion:
     """Motion of a whole program, or some of its lines: largest values, and curves as envelopes.
 
     Attributes:
-        lines: first and last line shown; None: all.
+        lines: first and last line shown, of the expanded program; None: all.
         every: the files have every *every*-th sample.
         samples: number of samples.
         end_s: time of the last sample.
@@ -131,7 +131,7 @@ class Simulation(Result):
         plant: "modal" or "feed-drive".
         shaped: some regions were simulated block by block at their feed, as in an emitted program.
         measured_against: the program whose path the contour error is measured against; its own name for its own path.
-        cycle_time_s: whole program: regions, rapids with in-position wait, dwells, drilling cycles.
+        cycle_time_s: whole program: regions, rapids, in-position waits, dwells, drilling cycles, tool changes, M codes.
         cutting_time_s: regions only, until the set-points rest.
         residual_vibration_um: largest |response - command| of each axis once the set-points rest.
         peak_vibration_um: the same while the set-points move.

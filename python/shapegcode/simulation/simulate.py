@@ -171,10 +171,12 @@ def simulate_motion(
     Raises:
         ProgramError: the program cannot be read.
         OSError: a file cannot be read or written; an existing file remains.
-        ArgumentError: an invalid plant or line range, or lines without motion.
+        ArgumentError: an invalid plant or line range, `every` below 1, or lines without motion.
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
+    if every < 1:
+        raise _core.ArgumentError(f"every = {every}: must be 1 or more")
     machine = Machine.of(machine)
     program = given_program(program, machine)
     model = MachineModel(machine)

@@ -29,7 +29,7 @@ from shapegcode.studies.study import check_ends, check_probability, within
 USUAL_DRAWS = 256  # Default number of machines per combination
 USUAL_CONVERSIONS = 300  # Default maximum of conversions
 
-_FRESH = 4  # new samples that confirm a choice, per sample before: the best of many may be best by chance
+_FRESH = 4  # new samples that confirm a choice, per earlier sample: the best of many may be best by chance
 _UNLIKELY_S = 1e6  # cost of a candidate with too low a probability, above any cycle time
 _NO_TEXT_S = 1e9
 
@@ -95,11 +95,14 @@ def optimize(
     if isinstance(program, Program):
         program.require_machine(machine)
     source = str(program) if isinstance(program, Path) else program
-    run = _Choosing(source, machine, choices, rows, probability, shape_all)
     combinations = math.prod(len(values) for values in choices.values())
+
+    def on_conversion(finished: int) -> None:
+        on_progress(min(1.0, finished / min(most, combinations)))
+
+    run = _Choosing(source, machine, choices, rows, probability, shape_all, on_conversion)
     for ranks in search(choices, most, seed, run.cost):
         run.converted(ranks)
-        on_progress(min(1.0, len(run.candidates) / min(most, combinations)))
     best = run.best()
     name = program.source if isinstance(program, Program) else str(program)
     ranked = sorted(run.candidates.values(), key=lambda each: math.inf if each.time_s is None else each.time_s)
@@ -123,10 +126,11 @@ class _Choosing:
     def __init__(
         self, program: Program | str, machine: Machine, choices: Choices,
         rows: Sequence[tuple[Mapping[str, object], ...]], probability: float, shape_all: bool,
+        on_conversion: Callable[[int], None],
     ) -> None:  # fmt: skip
         # No limit on the price: the shortest time is searched for.
         self._program, self._machine, self._choices, self._rows = program, machine.with_values(ANY_PRICE), choices, rows
-        self._probability, self._shape_all = probability, shape_all
+        self._probability, self._shape_all, self._on_conversion = probability, shape_all, on_conversion
         self._replays: dict[Ranks, Replay] = {}
         self.candidates: dict[Ranks, Candidate] = {}
 
@@ -141,6 +145,7 @@ class _Choosing:
                 self.candidates[ranks] = Candidate(chosen, replay.time_s)
             except (ArgumentError, DesignError, MachineError) as no_text:
                 self.candidates[ranks] = Candidate(chosen, None, why=str(no_text))
+            self._on_conversion(len(self.candidates))
         return self.candidates[ranks]
 
     def _share(self, replay: Replay, which: int) -> float:

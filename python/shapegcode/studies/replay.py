@@ -85,7 +85,7 @@ class Replay:
             _SimulatedPart(region, emitted.core.cutting_path(first, last), _core.ContourTracker(region.path), limit)
             for region, (_, first, last), limit in zip(regions, parts, limits, strict=True)
         ]
-        # Part of that cycle time which the model does not compute for the emitted program.
+        # Part of the cycle time that the model does not compute.
         self._beyond_s = time_s - MachineModel(machine).cycle_time_s(emitted.core)
 
     @classmethod
@@ -193,7 +193,7 @@ class SamplesJob:
     rows: tuple[Mapping[str, object], ...]  # values of the simulated machine, by key, one row per sample
     draws: tuple[int, ...]  # numbers of the samples
     wanted: tuple[str, ...]  # measures
-    times: bool  # see `Replay.simulate`
+    times: bool  # whether `time_s` is computed for each machine; False: only if the override differs from 100 %
 
     def simulate(self, replay: Replay) -> list[list[float]]:
         """Simulate the samples; one list of measures per sample."""

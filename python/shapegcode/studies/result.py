@@ -66,7 +66,7 @@ class ParameterInfluence:
     high: float  # largest ratio, likewise
     low_at: str  # value at the smallest ratio
     high_at: str  # value at the largest ratio
-    first: float | None = None  # first-order Sobol index of the ratio; None: not requested
+    first: float | None = None  # first-order Sobol index of the ratio; None: not requested, or not computable
     total: float | None = None  # total Sobol index
     first_error: float | None = None  # half width of the 95 % interval of `first`, by resampling
     total_error: float | None = None  # the same for `total`
@@ -112,7 +112,7 @@ class MachineStudy(Result):
 
     Attributes:
         program: name of the program.
-        machine: the varied machine.
+        machine: name of the varied machine.
         sampling: "sobol", "lhs" or "grid".
         seed: seed of the samples.
         n: number of simulated samples.
@@ -306,8 +306,8 @@ class Candidate:
     Attributes:
         values: the chosen values.
         time_s: cycle time; None: no emitted program.
-        within: ratio of samples within tolerance; None: not simulated, because there is a shorter one.
-        checked: the same for four times as many new samples; None: not simulated.
+        within: ratio of samples within tolerance; None: no emitted program, or a shorter combination is good enough.
+        checked: the same for four times as many new samples; None: `within` is None or below the probability.
         why: reason without an emitted program.
     """
 
@@ -329,7 +329,7 @@ class Optimum(Result):
 
     Attributes:
         program: name of the program.
-        machine: the varied machine.
+        machine: name of the varied machine.
         probability: required probability of staying within tolerance.
         draws: machines on which a candidate is simulated; four times as many new ones confirm it.
         best: the best candidate; None: none has the required probability.

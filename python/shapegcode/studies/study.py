@@ -62,7 +62,7 @@ def study(
         program: the program, or its file.
         machine: the machine, its file, or a built-in name.
         vary: distribution of each key: `normal`, `lognormal`, `uniform`, or a list of values. Modes count from 1.
-        n: number of samples.
+        n: number of samples; a grid has this many at most.
         sampling: "sobol", "lhs" (latin hypercube) or "grid".
         measure: measures, see `shapegcode.studies.replay.MEASURES`.
         seed: equal seeds give equal samples.
@@ -78,6 +78,7 @@ def study(
     Raises:
         ArgumentError: nothing to vary, n below 1, another sampling or measure, or nothing that could be simulated.
         MachineError: an unknown key, or a sampled value that is invalid in a machine file: key, value, limit.
+        DesignError: no shaper exists for the machine file.
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.
     """
@@ -99,7 +100,7 @@ def study(
 
 
 def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> None:
-    """Check the machines with the lowest and the highest, or each listed, value of each key before any conversion."""
+    """Check, before any conversion, the machines with the lowest and highest value of each key, or each of a list."""
     for each, column in zip(varied, columns, strict=True):
         if isinstance(each.distribution, Listed):
             ends = {toml(value): index for index, value in enumerate(column)}.values()
@@ -206,7 +207,7 @@ def _result(
     warnings = [f"{run.count - len(kept)} of {run.count} samples have no program: they count as out of tolerance"]
     warnings += ["no Sobol indices: they need every sample"] if indices else []
     alone = replays.CONTOURS.isdisjoint(run.wanted)
-    alone_warnings = ["no contour is measured: within tolerance means its residual vibration alone"] if alone else []
+    alone_warnings = ["no contour is measured: within tolerance means residual vibration alone"] if alone else []
     shaped = [text.replay for text in texts if text.replay is not None]
     return results.MachineStudy(
         program=run.program.source if isinstance(run.program, Program) else run.program,

@@ -65,7 +65,7 @@ class SampledValue(InlineTable):
     mean: Float | None = key("mean of a normal distribution", default=None)
     sd: Positive | None = key("standard deviation, in the unit of the value", default=None)
     percent: Positive | None = key(
-        "standard deviation in percent: of the mean, or factor about the median", default=None
+        "standard deviation in percent of the mean; with a median: increase at one standard deviation", default=None
     )
     median: Positive | None = key("median of a lognormal distribution", default=None)
     low: Float | None = key("lowest value of a uniform distribution", default=None)
@@ -146,7 +146,7 @@ class StudyFile(TomlTable):
     seed: Annotated[int, Strict(), Field(ge=0)] = key("seed of the random numbers", default=0)
     indices: Bool = key("Sobol indices of study; needs shapegcode[study]", default=False)
     at_least: Annotated[Positive, Field(le=1)] = key("required probability of staying within tolerance", default=0.95)
-    shape_all: Bool = key("shape every region, see convert --shape-all", default=False)
+    shape_all: Bool = key("also shape cuts that gain little, as convert --shape-all", default=False)
     most: Annotated[int, Strict(), Field(ge=1, le=_MAX_CONVERSIONS)] = key(
         "maximum number of conversions of optimize", default=USUAL_CONVERSIONS
     )

@@ -38,7 +38,7 @@ _MAX_DEPTH_RATIO = 0.95  # largest radial depth, relative to the radius
 
 @dataclass(frozen=True)
 class CutConditions:
-    """Conditions of every test cut; impossible ones for machine or tool are refused in the design.
+    """Conditions of a test cut; `taper_cut` and the others refuse those that machine or tool do not allow.
 
     Attributes:
         machine: machine whose controller runs the program.
@@ -143,7 +143,8 @@ def taper_cut(
         The design, for `write_test_cut`.
 
     Raises:
-        ArgumentError: beyond the limits of tool or machine.
+        ArgumentError: beyond the limits of tool or machine, depths that do not increase, or a length below five times
+            their difference.
     """
     feeds = feeds_mm_per_min or [given.feed_mm_per_min * share for share in (0.5, 1.0, 2.0)]
     given._check_feeds(feeds)
@@ -183,8 +184,8 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     s, depth = _corner_depth(given, sizes)
     stock = math.ceil(2.0 * straight + float(s[-1]) + radius)
     wanted_edge = cuts.unrolled_edge(s, depth, radius, stock, straight)
-    # The milled edge differs from the wanted one: where that is more sharply concave than the tool, material remains,
-    # and the edge is higher.
+    # The milled edge is higher than the wanted one where the latter is more sharply concave than the tool: material
+    # remains there.
     far = 3.0 * radius
     path = cuts.offset_line(wanted_edge, radius, -far, stock + far)
     edge = cuts.reduced(cuts.offset_line(path, radius, -radius, stock + radius, inwards=True), 1e-4)
@@ -279,7 +280,7 @@ def _measuring_pass(
 
 
 def _corner_feeds(given: CutConditions, radial_depth_mm: FloatArray) -> FloatArray:
-    """Feeds at which the mean resultant is that of the first depth (paper 001, eq. 7), mm/min."""
+    """Feeds in inverse proportion to the mean resultant at the first feed (paper 001, eq. 7), mm/min."""
     tool = given._cut_tool()
     law = ForceLaw(tool, tool.cutting, given.spindle, given.axial_depth_mm)
     met = straight_engagement(tool, radial_depth_mm, up=given.up)

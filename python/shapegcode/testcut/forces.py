@@ -23,8 +23,8 @@ from shapegcode.testcut.cut import CuttingLaw, CutTool, MeasuringPass, TestCut
 class Engagement:
     """Engagement with the tool's axis at each X; azimuths as in ``_core.EngagedArc``."""
 
-    from_rad: FloatArray  # first azimuth in material, from the direction of feed, positive to its left
-    to_rad: FloatArray  # last one; equal to `from_rad` without engagement
+    from_rad: FloatArray  # lowest azimuth in material, from the direction of feed, positive to its left
+    to_rad: FloatArray  # highest one; equal to `from_rad` without engagement
     radial_depth_mm: FloatArray  # distance of the outermost engaged point from the wall
 
     @classmethod
@@ -165,7 +165,7 @@ class MeanForces:
     spindle_rev_per_min: FloatArray  # (n,)
     force_n: FloatArray  # (n, 2) along the feed and to its left
     revolutions: FloatArray  # (n,) number of revolutions of each mean
-    group: npt.NDArray[np.intp]  # (n,) number of the pass or file, in cutting order
+    group: npt.NDArray[np.intp]  # (n,) index of the record, from 0, in the given order
     # n engagements with the tool position shifted by its standard error, equally for all rows of a group;
     # None: the engagements are exact
     displaced: Engagement | None = None
@@ -213,7 +213,7 @@ class ForceModel:
 # --- the coefficients: power laws about the mean chip, where factor and exponent are uncorrelated ---------------------
 
 MIN_CHIP_RATIO = 1.5  # thickest over thinnest mean chip; below it exponents and factors are not distinguishable
-MIN_FEED_RATIO = 1.3  # ratio of the feeds, for edge forces
+MIN_FEED_RATIO = 1.3  # largest over smallest feed; below it edge forces are not distinguishable
 _ROUNDS, _MAX_STEPS, _SETTLED = 6, 40, 1e-4
 _HUBER, _OUTLIER, _MIN_OUTLIER, _LARGEST_SHARE_OUT = 2.5, 4.0, 0.02, 0.25
 # For ln k1, its exponent, ln k2, the exponent of k1 k2, and the edge forces.
@@ -240,7 +240,7 @@ class CoefficientFit:
     coefficients: tuple[Coefficient, ...]  # in the order of `[cutting]`
     thickness: Thickness  # "mean" or "local": chip thickness of the power laws
     middle_chip_mm: float  # geometric mean of the mean chip thicknesses
-    # k1 in N/mm² and k2 there, known much better than the factors, which are for a chip of 1 mm
+    # k1 in N/mm² and k2 at this thickness, known much better than the factors, which are for a chip of 1 mm
     at_chip: tuple[Coefficient, ...]
     chip_mm: FloatArray  # (n,) mean chip thickness of each row
     predicted_n: FloatArray  # (n, 2) mean force of the fit
@@ -293,7 +293,7 @@ def fit_coefficients(
 
 def _outliers(measured: FloatArray, left: FloatArray, noise: FloatArray) -> npt.NDArray[np.bool_]:
     """Mask of rows whose force deviates from the others, (n,)."""
-    # Noise may be below the error of the law itself, which alone makes no outlier.
+    # The noise may be below the error of the law itself, which must not turn a row into an outlier.
     size = np.linalg.norm(measured, axis=1)[:, None]
     outlier = np.any((np.abs(left) > _OUTLIER * noise) & (np.abs(left) > _MIN_OUTLIER * size), axis=1)
     if outlier.mean() > _LARGEST_SHARE_OUT:

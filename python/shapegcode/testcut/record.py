@@ -38,7 +38,7 @@ class ForceRecord:
 
     file: str  # path
     force_n: FloatArray  # (n, 2) along the feed and to its left, in N
-    torque_nm: FloatArray | None = None  # (n,) measured magnitude; None: not recorded
+    torque_nm: FloatArray | None = None  # (n,) as measured, of either sign; None: not recorded
     time_s: FloatArray | None = None  # (n,), evenly spaced; None: not recorded
     position_mm: FloatArray | None = None  # (n,) X of the tool's axis in the program's coordinates; None: not recorded
     radial_depth_mm: FloatArray | None = None  # (n,) for means at known depths; None: from the test cut
@@ -106,7 +106,7 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
 # --- the position of each sample --------------------------------------------------------------------------------------
 
 _PER_MINUTE = 60.0
-MIN_SAMPLES = 6.0  # least samples per revolution of a record; fewer: a table of means
+MIN_SAMPLES = 6.0  # least samples per revolution of a record; a table of means has at most one row
 _MIN_AIR_REVS, _GUARD_REVS = 5, 2
 _FEW_PER_TOOTH, _IN_STEP = 16.0, 0.01
 _REPORTED_SPEED, _REPORTED_FEED = 0.002, 0.005
@@ -187,7 +187,7 @@ def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) 
 
 
 def _spindle_speed(force_n: FloatArray, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
-    """Spindle speed from spectral lines at spindle and tooth frequency and their harmonics; whether one is clear."""
+    """Spindle speed from the clearest line of spindle, teeth or harmonics, and True; without one: commanded, False."""
     count = len(force_n)
     turns = count * period_s * commanded / _PER_MINUTE
     if turns < _MIN_FOR_SPEED:
@@ -263,7 +263,7 @@ def _positions(
     record: ForceRecord, measuring: MeasuringPass, forecast: Expected, size: FloatArray, time: FloatArray,
     moved: FloatArray, contact: tuple[int, int], notes: list[str],
 ) -> FloatArray:  # fmt: skip
-    """X of the axis at each sample: entry and exit of the record aligned with the expected ones."""
+    """X of the axis at each sample, from the entry; at constant feed without recorded positions also from the exit."""
     seen = np.flatnonzero(forecast.mean_n > _ABOVE_SHARE * forecast.mean_n.max())
     wanted, first = (forecast.x_mm[seen[0]], forecast.x_mm[seen[-1]]), contact[0]
     if record.position_mm is None and not measuring.constant_feed:
@@ -335,7 +335,7 @@ class Revolutions:
     peak_n: FloatArray  # (n,) largest magnitude
     # (n,) the force oscillates more, relative to its mean, than in the rest of the pass
     chatter: npt.NDArray[np.bool_]
-    # the feed between entry and exit, from the record; the first one for a pass with changing feeds
+    # mean feed of the pass, from the record; the first commanded one for a pass with changing feeds
     feed_mm_per_min: float
 
 

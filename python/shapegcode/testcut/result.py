@@ -43,7 +43,7 @@ class CutDesign(Result):
         """Kind, passes and duration."""
         cut = self.cut
         seconds = sum(each.duration_s for each in cut.passes)
-        return f"{cut.kind} for {cut.machine}: {len(cut.passes)} measuring passes, {seconds:.0f} s of cutting in them"
+        return f"{cut.kind} for {cut.machine}: {len(cut.passes)} measuring passes, {seconds:.0f} s in total"
 
     @property
     def next_step(self) -> str:
@@ -88,7 +88,7 @@ class TaperPass:
     """Results from the record of one pass."""
 
     file: str  # path
-    feed_mm_per_min: float  # between entry and exit
+    feed_mm_per_min: float  # mean of the pass, from the record
     spindle_rev_per_min: float  # from the record, or as commanded
     offset_n: tuple[float, float]  # force along the feed and to its left shown in air before the cut
     drift_n: tuple[float, float]  # its change until after the cut
@@ -112,9 +112,9 @@ class TaperResult(Result):
         machine: name of the machine.
         cutting: the table ``[cutting]`` for the tool file.
         coefficients: each with its interval; the factors are for a chip 1 mm thick.
-        at_chip: k1 and k2 at the mean measured chip thickness, known much more precisely than the factors.
+        at_chip: k1 and k2 at the chip thickness `chip_mm.middle`, known much more precisely than the factors.
         chip_mm: range of the mean chip thickness.
-        mean_forces: number of mean forces in the fit.
+        mean_forces: number of mean forces, the ignored ones included.
         outliers: number of ignored ones, whose force deviates from the others.
         rms_n: RMS residual of the others, along the feed and to its left.
         rms_percent: RMS residual of both, relative to the resultant.
@@ -239,7 +239,8 @@ class CornerResult(Result):
         machine: name of the machine.
         peaks: largest resultants of the passes, in file order.
         ratio: effect of the modified feed; None: only one of the two passes was recorded.
-        scale: measured over expected mean resultant of the first pass: error of the coefficients.
+        scale: measured over expected mean resultant, in the recorded pass with the lowest number: error of the
+            coefficients.
         warnings: further remarks.
         kind: kind of the test cut.
     """
@@ -261,7 +262,7 @@ class CornerResult(Result):
     @property
     def answer(self) -> str:
         """Scale and ratio."""
-        sentence = f"the measured resultant is {self.scale:.2f} times the expected one at constant feed"
+        sentence = f"the measured resultant is {self.scale:.2f} times the expected one in the first recorded pass"
         if self.ratio is None:
             return sentence
         ratios = f"measured {self.ratio.measured:.2f}, expected {self.ratio.expected:.2f}"
@@ -315,7 +316,7 @@ class IntervalResult(Result):
     Attributes:
         program: program of the test cut.
         machine: name of the machine.
-        interval_mm: shortest interval that is followed, as are all longer ones measured; None: none.
+        interval_mm: shortest interval that is followed, as are all longer ones measured; None: the longest is not.
         lag_interval_mm: travel for 90 % of a step with the median lag, at the largest feed.
         passes: measured passes, by interval.
         warnings: further remarks.
@@ -333,7 +334,7 @@ class IntervalResult(Result):
 
     @property
     def ok(self) -> bool:
-        """True if the control follows one of the intervals."""
+        """True if the control follows the longest interval."""
         return self.interval_mm is not None
 
     @property
@@ -341,7 +342,9 @@ class IntervalResult(Result):
         """The interval, or the travel that a step needs."""
         if self.interval_mm is None:
             needed = f"90 % of a step need about {self.lag_interval_mm:.2f} mm at the largest feed"
-            return f"the control follows none of the measured intervals; {needed}"
+            some = any(each.ok for each in self.passes)
+            follows = "does not follow the longest" if some else "follows none of the"
+            return f"the control {follows} measured interval{'' if some else 's'}; {needed}"
         return f"the control follows feed changes every {self.interval_mm:g} mm or more"
 
     @property

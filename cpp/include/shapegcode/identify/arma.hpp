@@ -40,7 +40,7 @@ struct Arma {
   std::vector<std::complex<double>> poles;  ///< roots lambda
   std::vector<double> residual_rms;         ///< per record: response minus B/A force, in the response's unit
   int iterations = 0;
-  bool converged = false;  ///< phi converged; if not, the result is the best of all iterations
+  bool converged = false;  ///< phi or the residuals converged; the result is the best of all iterations
 };
 
 /// Joint model of several impacts at the same point, from rest at the first sample: iterated least squares, in which

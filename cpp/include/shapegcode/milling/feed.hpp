@@ -93,8 +93,11 @@ struct FeedStretch {
 [[nodiscard]] std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const FeedStations& stations,
                                                      const FeedScheduleOptions& options);
 
+/// Whether sections begin at 0, each at the end of the one before, and end at a length (to 1e-6 mm).
+[[nodiscard]] bool covers(std::span<const FeedStretch> sections, double length_mm);
+
 /// The path with the feeds of sections that cover it: segments are divided where a section ends within one. Throws
-/// Error(argument) if the last section does not end at the path's end.
+/// Error(argument) if they do not cover it.
 [[nodiscard]] Path with_feeds(const Path& path, std::span<const FeedStretch> sections);
 
 /// Lowers the feeds around each station that is limited by its load, because the motion lags behind a change of feed. A

@@ -73,8 +73,8 @@ void Reader::load_main() {
   }
   if (frame.unread_line > 0) {
     program_.warnings.push_back({frame.unread_line,
-                                 "text behind the '%' that ends the program: a control stops reading there, and "
-                                 "neither is it read here",
+                                 "text behind the '%' that ends the program: a control stops reading there, as "
+                                 "shapegcode does",
                                  0, 0, ""});
   }
   program_.header_offset = frame.begin;

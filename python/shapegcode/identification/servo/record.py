@@ -144,7 +144,9 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
             continue
         ranges = _ranges(command, capture.stretches, capture.cycle_s)
         if len(ranges) > len(capture.stretches):
-            where = f"{capture.time_s[ranges[1].start]:.3f} s"
+            gaps = {each.start for each in capture.stretches}
+            first = next(each.start for each in ranges if each.start not in gaps)
+            where = f"{capture.time_s[first]:.3f} s"
             notes.append(f"{label}: its command has a step, first at {where}: split there")
         ranges = tuple(each for each in ranges if each.stop - each.start >= _FEWEST)
         if not ranges:
