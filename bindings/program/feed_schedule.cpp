@@ -106,7 +106,7 @@ void define_schedule(py::module_& module) {
       },
       py::arg("path").none(false), py::arg("stretches"),
       "The path with the feeds of the sections `stretches`: segments are divided where a section ends within one. "
-      "Raises ArgumentError if the last section does not end at the path's end.");
+      "Raises ArgumentError if they do not cover the path.");
   module.def(
       "look_ahead_on_load",
       [](const VectorArray& stations, const VectorArray& feeds, const VectorArray& load, const VectorArray& before_s,

@@ -43,7 +43,7 @@ void register_search(py::module_& m) {
       py::arg("modes"), py::arg("max_duration_s"), py::kw_only(), py::arg("max_abs_sum") = MinimalOptions{}.max_abs_sum,
       py::arg("max_starts") = MinimalOptions{}.max_starts, py::arg("max_boxes") = MinimalOptions{}.max_boxes,
       release_gil(),
-      R"(Minimal multi-mode shapers: n+1 impulses that cancel n = 1 ... 6 modes, damped or not.
+      R"(Minimal multi-mode shapers: n+1 impulses that cancel n modes (one to six), damped or not.
 
 One mode is closed form and two are searched completely. Three and more are searched from many low-discrepancy starts
 and by boxes of times in ascending duration, each proven empty, shrunk to one solution, or unresolved; `complete` and
@@ -104,7 +104,7 @@ void register_branches(py::module_& m) {
          double max_abs_sum) { return minimal_branches(first, second_damping, ratios, max_duration_s, max_abs_sum); },
       py::arg("first"), py::arg("second_damping"), py::arg("ratios"), py::arg("max_duration_s"), py::kw_only(),
       py::arg("max_abs_sum") = MinimalOptions{}.max_abs_sum, release_gil(),
-      R"(All minimal two-mode shapers over the ratio of the frequencies, joined into curves (paper 002, fig. 2 and 3).
+      R"(All minimal two-mode shapers over the ratio of the frequencies, joined into curves (paper 002, figures 2, 3).
 
 At each ratio the list is that of `minimal_two_mode`; curves are followed by continuation, also through gaps, where the
 sum of magnitudes or the duration exceeds its limit. Where two curves touch, their ends may be exchanged.

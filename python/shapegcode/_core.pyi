@@ -21,7 +21,7 @@ class ProgramError(ShapegcodeError):
     line: typing.ClassVar[int] = 0
 class DesignError(ShapegcodeError):
     """
-    The requested shaper does not exist, or not on this grid.
+    The requested shaper does not exist, or not on this grid, or cannot be computed.
     """
 class ArgumentError(ShapegcodeError, ValueError):
     """
@@ -29,7 +29,7 @@ class ArgumentError(ShapegcodeError, ValueError):
     """
 class NumericError(ShapegcodeError):
     """
-    A solver failed; the message carries its flag.
+    A solver failed or did not converge; the message says which.
     """
 class Mode:
     """
@@ -86,7 +86,7 @@ class Mode:
         """
 class Shaper:
     """
-    Input shaper: amplitudes at ascending times that add up to one. Immutable.
+    Input shaper: impulses at ascending times, whose amplitudes add up to one. Immutable.
     
     Args:
         times_s: Times of the impulses in s, shape (n,), n >= 1, strictly ascending from exactly 0.
@@ -129,8 +129,8 @@ class Shaper:
         """
         Residual vibration of a mode after the last impulse, relative to the unshaped one.
         
-        V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation has no effect. Its
-        rounding floor is about 1e-16*(1 + omega*t_N)*abs_sum.
+        V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation has no effect.
+        V has a rounding floor of about 1e-16*(1 + omega*t_N)*abs_sum.
         
         Args:
             mode: The mode that vibrates; it need not be one that the shaper was designed for.
@@ -211,7 +211,7 @@ class WorstResidual:
     @property
     def upper_bound(self) -> float:
         """
-        No frequency of the band has a larger residual ratio; within 1e-6 of residual_ratio, or 1e-12.
+        No frequency of the band has a larger residual ratio; above residual_ratio by at most 1e-6 of it, or 1e-12.
         """
 class FrequencyBand:
     """
@@ -371,9 +371,9 @@ class VaryingFir:
     """
     A set of filters on one grid, with a varying choice among them.
     
-    Each increment of the input is replaced by the whole impulse train of the filter that is valid where it begins (scatter
-    form), so that every increment keeps the zeros of its own filter, however often the filters change. Place k is filter k
-    of the set; place k + w (0 < w < 1) gives the part 1 - w of an increment to filter k and w to filter k + 1.
+    Each increment of the input is replaced by the whole impulse train of the filter that its place selects (scatter form),
+    so that every increment keeps the zeros of its own filter, however often the filters change. Place k is filter k of the
+    set; place k + w (0 < w < 1) gives the part 1 - w of an increment to filter k and w to filter k + 1.
     
     Args:
         set: The filters (Fir), at least one.
@@ -433,8 +433,8 @@ class FollowingFir:
     """
     A set of filters along an axis, whose position selects the filter.
     
-    Filter k of the set is valid where the axis is at position k; in between the increments are divided, beyond the ends the
-    nearest filter is valid. The middle of each increment selects its filter.
+    Filter k of the set is valid where the axis is at position k; between two positions each increment is divided between
+    their filters, beyond the ends the nearest filter is valid. The middle of each increment selects its filter.
     
     Args:
         fir: The set.
@@ -450,7 +450,7 @@ class FollowingFir:
         """
     def apply(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
         """
-        Filter samples (n, n_axes) in mm; the result has fir.duration_samples more rows. Raises ArgumentError on another shape, a value that is not finite, or samples without the axis.
+        Filter samples (n, n_axes) in mm; the result has fir.duration_samples more rows. Raises ArgumentError on another shape, no sample, a value that is not finite, or samples without the axis.
         """
     def on_finer_grid(self, factor: typing.SupportsInt | typing.SupportsIndex) -> FollowingFir:
         """
@@ -532,7 +532,7 @@ class Segment:
     @staticmethod
     def arc(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], centre_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], sweep_rad: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, normal: typing.SupportsInt | typing.SupportsIndex = 2) -> Segment:
         """
-        An arc or helix about the axis `normal` (0 X, 1 Y, 2 Z); `sweep_rad` > 0 turns counter-clockwise seen from its positive end. Raises ArgumentError on a zero radius or sweep.
+        An arc or helix about the axis `normal` (0 X, 1 Y, 2 Z); `sweep_rad` > 0 turns counter-clockwise seen from the positive end of this axis. Raises ArgumentError on a zero radius or sweep.
         """
     @staticmethod
     def line(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex) -> Segment:
@@ -609,7 +609,7 @@ class Path:
         """
     def __init__(self, segments: collections.abc.Sequence[Segment]) -> None:
         """
-        Raises ArgumentError if a segment does not start where its predecessor ends.
+        Raises ArgumentError if a segment does not start where its predecessor ends (1e-6 mm).
         """
     def __len__(self) -> int:
         ...
@@ -619,7 +619,7 @@ class Path:
         """
     def polyline(self, step_rad: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> numpy.ndarray:
         """
-        Points along the path, (n, 3), mm: segment ends, arcs in steps of `step_rad`.
+        Points along the path, (n, 3), mm: its start, segment ends, arcs in steps of at most `step_rad`.
         """
     @property
     def arcs_in_xy(self) -> bool:
@@ -654,7 +654,7 @@ class Path:
     @property
     def programmed_time_s(self) -> float:
         """
-        Time at the programmed feeds without any acceleration, s.
+        Time at the programmed feeds without any acceleration, s; infinity with a rapid.
         """
     @property
     def segment_ends_mm(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -669,12 +669,12 @@ class Path:
     @property
     def segment_lines(self) -> numpy.typing.NDArray[numpy.uint32]:
         """
-        Source line of each segment, (n,), from 1.
+        Source line of each segment, (n,), from 1; 0 if there is none.
         """
     @property
     def slowest_feed_mm_per_s(self) -> float:
         """
-        Smallest programmed feed, mm/s; infinity for an empty path.
+        Smallest programmed feed, mm/s: 0 with a rapid, infinity for an empty path.
         """
     @property
     def start_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -761,7 +761,7 @@ class MotionLimits:
     @property
     def contour_acceleration_mm_per_s2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        Of a change of direction, per axis, on arcs and along polylines, shape (3,).
+        Acceleration of each axis by a change of direction, on arcs and along polylines, shape (3,), mm/s^2.
         """
     @contour_acceleration_mm_per_s2.setter
     def contour_acceleration_mm_per_s2(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
@@ -777,7 +777,7 @@ class MotionLimits:
     @property
     def corner_stop_angle_rad(self) -> float:
         """
-        A corner that turns by as much or more is a stop.
+        A corner that turns by this angle or more is a stop, rad.
         """
     @corner_stop_angle_rad.setter
     def corner_stop_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -817,7 +817,7 @@ class MotionLimits:
     @property
     def junction_deviation_mm(self) -> float:
         """
-        A corner is passed as an arc that cuts it by this distance.
+        A corner is passed as an arc that cuts it by this distance, mm.
         """
     @junction_deviation_mm.setter
     def junction_deviation_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -872,7 +872,7 @@ class MotionLimits:
         ...
 class FilterTolerance:
     """
-    Deviation permitted to a filter after the interpolation at corners and on arcs; with zero variance no limit.
+    Deviation permitted to a filter after the interpolation, at corners and on arcs; none if its variance and mean deviation are 0.
     """
     def __init__(self) -> None:
         ...
@@ -895,7 +895,7 @@ class FilterTolerance:
     @property
     def mean_deviation_s(self) -> float:
         """
-        Its mean absolute deviation, s.
+        Mean absolute deviation of the filter from its mean delay, s.
         """
     @mean_deviation_s.setter
     def mean_deviation_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1022,7 +1022,7 @@ class PlannerRules:
     @property
     def blend_tolerance_mm(self) -> float:
         """
-        linuxcnc: G64 P; 0: half of a segment.
+        linuxcnc: G64 P; 0: only half of a segment limits.
         """
     @blend_tolerance_mm.setter
     def blend_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1054,7 +1054,7 @@ class PlannerRules:
     @property
     def kink_ratio(self) -> float:
         """
-        linuxcnc: ratio of the acceleration for a kink.
+        linuxcnc: part of the acceleration that a kink may take.
         """
     @kink_ratio.setter
     def kink_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1086,7 +1086,7 @@ class PlannerRules:
     @property
     def naive_cam_tolerance_mm(self) -> float:
         """
-        linuxcnc: G64 Q: lines of one feed within it are joined, an arc in XY becomes two lines.
+        linuxcnc: G64 Q: lines of one feed within it are joined, an arc in XY within it becomes two lines.
         """
     @naive_cam_tolerance_mm.setter
     def naive_cam_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1102,7 +1102,7 @@ class PlannerRules:
     @property
     def period_s(self) -> float:
         """
-        linuxcnc: of the servo thread, in which it plans.
+        linuxcnc: period of the servo thread, which plans, s.
         """
     @period_s.setter
     def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1110,7 +1110,7 @@ class PlannerRules:
     @property
     def ramp_frequency_hz(self) -> float:
         """
-        linuxcnc: shorter segments are ramps.
+        linuxcnc: segments that take less than 1/it are ramps.
         """
     @ramp_frequency_hz.setter
     def ramp_frequency_hz(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1118,7 +1118,7 @@ class PlannerRules:
     @property
     def rapid_follows(self) -> bool:
         """
-        linuxcnc: a rapid follows the path; otherwise its last segment has half of the acceleration.
+        linuxcnc: a rapid follows the path; otherwise the path's last segment has half of the acceleration.
         """
     @rapid_follows.setter
     def rapid_follows(self, arg0: bool) -> None:
@@ -1133,7 +1133,7 @@ class PlannerRules:
         ...
 class LinuxcncSlowing:
     """
-    Effect of LinuxCNC's two rules for short segments on a path.
+    Effect of LinuxCNC's rules for short segments (kinks and ramps) on a path.
     """
     @property
     def angle_rad(self) -> float:
@@ -1143,12 +1143,12 @@ class LinuxcncSlowing:
     @property
     def kinks(self) -> int:
         """
-        Junctions that need more than the kink ratio.
+        Junctions that need at least the kink ratio of the acceleration.
         """
     @property
     def largest_ratio(self) -> float:
         """
-        Largest ratio of acceleration at a junction.
+        Largest ratio of the acceleration that a junction needs.
         """
     @property
     def line(self) -> int:
@@ -1262,7 +1262,7 @@ class JogResult:
     
       no_axis : There is no such axis.
     
-      not_finite : A number that is not finite.
+      not_finite : A number that is not finite, or a distance of retrace() below zero.
     
       no_speed : The speed of a jog by a distance is not above zero.
     
@@ -1462,7 +1462,8 @@ class OffsetLimits:
         max_feed: Highest speed in the axis' unit (mm or degrees) per s; 0: no offset.
         max_acceleration: Likewise per s^2.
         max_jerk: Likewise per s^3.
-        backlash: Of the drive, compensated by the offset in negative motion; initially as after positive motion.
+        backlash: Backlash of the drive in the axis' unit, subtracted from its position in negative motion; the control
+            starts as after positive motion.
     """
     def __init__(self, *, max_feed: typing.SupportsFloat | typing.SupportsIndex = 0.0, max_acceleration: typing.SupportsFloat | typing.SupportsIndex = 0.0, max_jerk: typing.SupportsFloat | typing.SupportsIndex = 0.0, backlash: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
@@ -1504,11 +1505,11 @@ class Activity:
     
       held : At rest after hold(), or at a programmed stop.
     
-      starved : Decelerating: the queue ran empty before a segment with `stop_at_end`. Idle when at rest.
+      starved : Decelerating: the queue ran empty, and its last segment has no `stop_at_end`. Idle once at rest.
     
       aborted : At rest after abort() or emergency_stop(); the path is discarded.
     
-      jogging : Away from the position where the path rests, or back to it.
+      jogging : An axis moves away from the position where the path rests, or back to it.
     """
     __members__: typing.ClassVar[dict[str, Activity]]
     aborted: typing.ClassVar[Activity]
@@ -1669,7 +1670,7 @@ class ControllerState:
     @property
     def set_point_distance_mm(self) -> float:
         """
-        `distance_mm` at the last set-point, which smoothing and shaper delay by `delay_periods`, rounded.
+        `distance_mm` at the last set-point, which correction, smoothing and shaper delay by `delay_periods`, rounded.
         """
     @property
     def set_point_line(self) -> int:
@@ -1717,8 +1718,8 @@ class MotionController:
     
     Look-ahead over a window of segments, junctions rounded within the tolerance, motion nearly as fast as the limits of the
     axes allow, one set-point per period through contour correction, smoothing and shaper. The set-points keep every finite
-    limit. One thread may push, one may step, one may plan, any may call the rest except restart(); step(), run() and plan()
-    release the global interpreter lock. The real-time form is the C++ class of the same name.
+    limit. One thread may push and call flushed(), one may step, one may plan, any may call the rest except restart();
+    step(), run() and plan() release the global interpreter lock. The real-time form is the C++ class of the same name.
     
     Args:
         period_s: Time between set-points in s.
@@ -1728,8 +1729,8 @@ class MotionController:
         max_acceleration_mm_per_s2: Likewise.
         max_jerk_mm_per_s3: Likewise; requires an acceleration.
         following: Limits of the axes that follow the path, at most six.
-        contour_tolerance_mm: Permitted deviation from the path by rounded corners, smoothing and shaper. 0: corners are
-            exact stops; inf: neighbouring corners are rounded up to the middle between them.
+        contour_tolerance_mm: Permitted deviation from the path by rounded corners, smoothing and shaper. 0 (only without
+            smoothing and shaper): corners are exact stops; inf: corners are rounded up to the middle between neighbours.
         smoothing_time_s: Duration of each of two moving averages of every axis in s; 0: none.
         shaper: A Shaper on the grid of the period, a Fir, or a Mode (for its ZV on the grid) for all axes; a list with one
             of these for each axis; or a FollowingFir. None: no shaper.
@@ -1739,13 +1740,15 @@ class MotionController:
         lead_periods: Periods by which plan(), called by another thread, is ahead of the motion. None: step() plans when the
             planned motion runs out.
         travel: Travel range of each axis, (low, high); empty: no limits.
-        offset: Limits of the offset of each axis, by which the limits of the path are reduced; empty: no offset.
-        emergency_acceleration: Maximum of each axis, for emergency_stop(); empty: it decelerates as abort() does.
+        offset: Limits of the offset of each axis, by which the limits of the path are reduced; empty: no offset. Not with
+            a FollowingFir.
+        emergency_acceleration: Acceleration of each axis for emergency_stop(), at least its maximum; empty: it decelerates
+            as abort() does.
         spindle_bandwidth_hz: Bandwidth for following a spindle in Hz.
         retrace_periods: Periods of motion stored for retrace().
         other_shapers: Shapers that can replace `shaper` (number 0) in motion, numbers 1 and up: each one for all axes, or a
-            list with one for each.
-        fade_time_s: Duration of an exchange in s. The limits of the path are reduced for it, less for a longer one.
+            list with one for each. Not with a FollowingFir or a contour correction.
+        fade_time_s: Duration of an exchange in s. Exchanges reduce the limits of the path, less if they take longer.
     
     Raises:
         ArgumentError: A value outside its range.
@@ -1876,7 +1879,7 @@ class MotionController:
             PushResult; unless it is `accepted`, nothing has changed.
         
         Raises:
-            ArgumentError: No radius, no sweep, or a number that is not finite.
+            ArgumentError: No radius, no sweep, no such `normal`, or a number that is not finite.
         """
     def push_dwell(self, time_s: typing.SupportsFloat | typing.SupportsIndex) -> PushResult:
         """
@@ -1968,7 +1971,7 @@ class MotionController:
             (n, n_axes), mm or the unit of a following axis.
         
         Raises:
-            ArgumentError: Periods below 0.
+            ArgumentError: `max_periods` below 0.
         """
     def step(self, periods: typing.SupportsInt | typing.SupportsIndex = 1, spindle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -2013,7 +2016,7 @@ class MotionController:
         """
         Sets the travel range of an axis.
         
-        If the planned path would leave it, the control is held, with the planned stop.
+        If the path to be run next would leave it, the control is held and stops where the motion already planned ends.
         
         Args:
             axis: Its index, from 0.
@@ -2031,7 +2034,7 @@ class MotionController:
     @property
     def delay_periods(self) -> float:
         """
-        Mean delay of correction, smoothing and shaper, in periods.
+        Mean delay of correction, smoothing and the shaper requested last, in periods.
         """
     @property
     def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -2385,7 +2388,7 @@ class WorkLimits:
     @property
     def seconds(self) -> float:
         """
-        Minimum time: moves at their feed, and dwells, s.
+        Minimum time: moves at their feed, dwells, tool changes and M codes, s.
         """
     @seconds.setter
     def seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -2583,7 +2586,7 @@ class ReaderOptions:
     @property
     def program_index(self) -> int:
         """
-        Index in `list_programs` of the program, of which alone `text` consists; -1: by number.
+        Index in `list_programs` of the program to read, of which alone `text` then consists; -1: by number.
         """
     @program_index.setter
     def program_index(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2753,7 +2756,7 @@ class ProgramText:
         """
     def find(self, what: bytes, begin: typing.SupportsInt | typing.SupportsIndex = 0) -> int:
         """
-        Index of the first occurrence of bytes in the text, or -1.
+        Index of the first occurrence of bytes in the text from `begin` on, or -1.
         """
     def lead_back(self, source: bytes, lines: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], line_files: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], files: collections.abc.Sequence[str], notes: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, str]]) -> None:
         """
@@ -2765,7 +2768,7 @@ class ProgramText:
         """
     def overwrite(self, begin: typing.SupportsInt | typing.SupportsIndex, what: bytes) -> None:
         """
-        Overwrites as many bytes of the text. Raises ArgumentError beyond the text's end.
+        Overwrites the text from `begin` on with the bytes `what`. Raises ArgumentError beyond the text's end.
         """
     def slice(self, begin: typing.SupportsInt | typing.SupportsIndex, end: typing.SupportsInt | typing.SupportsIndex) -> bytes:
         """
@@ -2828,7 +2831,7 @@ class ProgramText:
     @property
     def least_time_s(self) -> float:
         """
-        Minimum time: moves at their feed within the axis limits, without acceleration, and dwells, s.
+        Minimum time: moves at their feed within the axis limits, without acceleration; dwells, tool changes and M codes, s.
         """
     @property
     def line_count(self) -> int:
@@ -3868,7 +3871,7 @@ class ShapingOptions:
     @property
     def planner(self) -> CommandPlanner:
         """
-        The time-optimal planner needs feed, acceleration and jerk of every axis in `limits`.
+        What plans the command; `time_optimal` needs feed, acceleration and jerk of every axis in `limits`.
         """
     @planner.setter
     def planner(self, arg0: CommandPlanner) -> None:
@@ -3969,18 +3972,19 @@ class RegionShaper:
         Restarts the region from its beginning, with the feed that the search then finds.
         
         Returns:
-            False, and nothing is done, if no part was returned early.
+            False, and nothing is done, if begin_early() was not called or had no effect.
         """
     def begin_early(self) -> None:
         """
-        Call before the first part: returns parts before the search for the feed has ended.
+        Lets next() return parts before the search for the feed has ended; call it before the first part.
         
-        If the region is one motion from rest to rest, next() returns parts while the search measures them, as if its first plan
-        kept the tolerance. If it does not, next() returns None and is_withdrawn is True: all parts returned are invalid.
+        If the region is one motion from rest to rest, with a target, next() returns parts while the search measures them, as if
+        its first plan kept the tolerance. If it does not, next() returns None and is_withdrawn is True: all parts returned are
+        invalid.
         """
     def next(self, periods: typing.SupportsInt | typing.SupportsIndex) -> ShapedCommand | None:
         """
-        Next part of at most `periods` periods, or None after the last.
+        Next part of at most `periods` periods. None: there is none left, or is_withdrawn.
         """
     @property
     def is_slowed(self) -> bool:
@@ -4172,7 +4176,7 @@ class FittedBlocks:
         """
 class BlockMark:
     """
-    An N word and a comment, written before the block that begins there.
+    An N word and a comment, written before the first block that begins at `period` or later.
     """
     def __init__(self, period: typing.SupportsInt | typing.SupportsIndex, n_number: typing.SupportsInt | typing.SupportsIndex = -1, comment: bytes = b'', n_digits: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
@@ -4384,7 +4388,7 @@ class DeviationStats:
         """
 class ContourTracker:
     """
-    Geometry of a path for the distance of a moving point to it.
+    Tracks the distance of a moving point from a path.
     """
     def __init__(self, path: Path) -> None:
         """
@@ -4431,7 +4435,7 @@ class SimulationOptions:
     @property
     def feed_window_s(self) -> float:
         """
-        Averaging time of the largest speed relative to the programmed feed, also with four and sixteen times it, s; 0: not measured.
+        Averaging time of the speed for its largest ratio to the programmed feed, s; four and sixteen times it are used, too; 0: not measured.
         """
     @feed_window_s.setter
     def feed_window_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4595,7 +4599,7 @@ class StarvedFigures:
     @property
     def block(self) -> int:
         """
-        Block after which the set-points wait.
+        Index of the block after which the set-points wait.
         """
     @property
     def command(self) -> DeviationStats:
@@ -4658,7 +4662,7 @@ class SimulationFigures:
     @property
     def orbit_error_percent(self) -> list[float]:
         """
-        Orbit error per arc, in percent.
+        Orbit error of the command per arc of the path, in percent.
         """
     @property
     def other_overrides(self) -> list[OverrideFigures]:
@@ -4703,7 +4707,7 @@ class SimulationFigures:
     @property
     def settling_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        Time from the rest of the set-points until |response - command| stays within the band, (3,), s; inf: not within the limit.
+        Time from the rest of the set-points until |response - command| stays within the band, (3,), s; inf: it leaves the band in the last fifth of `settling_limit_s`.
         """
     @property
     def starved(self) -> list[StarvedFigures]:
@@ -5030,7 +5034,7 @@ class SectionFigures:
     @property
     def rest(self) -> RestVibration | None:
         """
-        Worst stop of the command in it (largest residual), or None.
+        Worst stop of the command in it (largest residual); in the section where the motion ends, its last stop; or None.
         """
     @property
     def right(self) -> WallFigures:
@@ -5203,7 +5207,7 @@ class PathFollower:
         """
     def step(self, command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
-        Takes the next samples of command and response, (k, 3), mm. Returns the vectors from the foot on the path to the response, (k, 3), mm. Raises ArgumentError on other shapes or values that are not finite.
+        Takes the next samples of command and response, (k, 3), mm. Returns the vectors from the foot on the path to the response, (k, 3), mm. Raises ArgumentError on other or unequal shapes, or values that are not finite.
         """
 class MotionKind:
     """
@@ -5258,7 +5262,7 @@ class FilterShape:
     
     Members:
     
-      linear : Moving average of the time constant; with a bell time a second one after it.
+      linear : Moving average over the time constant; with a bell time a second one after it.
     
       exponential : Geometric weights of the time constant.
     """
@@ -5644,7 +5648,7 @@ class FanucModel:
     @property
     def rapid_time_constant_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
-        From rest to the rate, per axis, s, shape (3,) (1620).
+        Ramp from rest to the rate at override 1, per axis, s, shape (3,) (1620).
         """
     @rapid_time_constant_s.setter
     def rapid_time_constant_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
@@ -5766,7 +5770,7 @@ class CircleFigures:
         """
 class BlockKind:
     """
-    Kind of a row of the block table, which contains the number of the kind.
+    Kind of a row of CycleTime.blocks, which has it as a number.
     
     Members:
     
@@ -5847,7 +5851,7 @@ class ToolTime:
     @property
     def function_s(self) -> float:
         """
-        Other M codes, s.
+        Other M codes, start of the program, waits for the spindle, rapids of unknown length, s.
         """
     @property
     def in_position_s(self) -> float:
@@ -5906,7 +5910,7 @@ class CycleTime:
     @property
     def function_s(self) -> float:
         """
-        Other M codes, s.
+        Other M codes, start of the program, waits for the spindle, rapids of unknown length, s.
         """
     @property
     def in_position_s(self) -> float:
@@ -5965,7 +5969,7 @@ class InterpolatedTime:
     @property
     def function_s(self) -> float:
         """
-        s.
+        As in CycleTime, s.
         """
     @property
     def in_position_s(self) -> float:
@@ -6065,7 +6069,7 @@ class SimulationStream:
     @staticmethod
     def of_program(program: ProgramText, model: FanucModel, options: SimulationOptions, region_offsets_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]] = [], rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> SimulationStream:
         """
-        A whole program on one time axis. `region_offsets_mm`: from the positions of each region to machine positions, for modes that vary with them. Raises ArgumentError on an invalid model.
+        A whole program on one time axis. `region_offsets_mm`: from the positions of each region to machine positions, for modes that vary with them. Raises ArgumentError on an invalid model, options with another period, or not one offset per region.
         """
     def read(self, most: typing.SupportsInt | typing.SupportsIndex) -> SimulationChunk:
         """
@@ -6236,11 +6240,11 @@ class Material:
         """
     def distance_mm(self, layer: typing.SupportsInt | typing.SupportsIndex, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
-        Distance from the boundary of a layer, positive in material, limited to two nodes of the grid, mm.
+        Distance from the boundary of a layer, positive in material, limited to twice the grid spacing, mm.
         """
     def heights_mm(self, low_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], high_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], rows: typing.SupportsInt | typing.SupportsIndex, columns: typing.SupportsInt | typing.SupportsIndex) -> numpy.ndarray:
         """
-        Top of the material over a rectangle, (rows, columns), mm, from its low corner on; NaN where there is none. Raises ArgumentError on less than one row or column.
+        Top of the material over a rectangle, rows along Y, columns along X, mm, from its low corner on; NaN where there is none. Raises ArgumentError on less than one row or column.
         """
     def is_material(self, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex, z_mm: typing.SupportsFloat | typing.SupportsIndex) -> bool:
         """
@@ -6364,7 +6368,7 @@ class CornerEngagement:
     @property
     def radial_depth_mm(self) -> float:
         """
-        From the end on the rough boundary to the finished wall's tangent at the contact, mm.
+        Width of cut: from the end of the engagement on the rough boundary to the finished wall's tangent at the contact, mm.
         """
     @property
     def section(self) -> CornerSection:
@@ -6397,11 +6401,11 @@ class CornerCut:
     """
     def __init__(self, tool_radius_mm: typing.SupportsFloat | typing.SupportsIndex, rough_radius_mm: typing.SupportsFloat | typing.SupportsIndex, finish_radius_mm: typing.SupportsFloat | typing.SupportsIndex, allowance_mm: typing.SupportsFloat | typing.SupportsIndex, turn_rad: typing.SupportsFloat | typing.SupportsIndex = 1.5707963267948966, before_mm: typing.SupportsFloat | typing.SupportsIndex = 10.0, after_mm: typing.SupportsFloat | typing.SupportsIndex = 10.0, mirrored: bool = False) -> None:
         """
-        The tool moves along +X with the wall to its right, turns left by `turn_rad` and follows the second wall; the finished walls meet at the origin. `mirrored`: wall to the left. Equal tool and finish radius: the path has a sharp vertex. Raises ArgumentError on corner radii below the tool's or an allowance above it.
+        The tool moves along +X with the wall to its right, turns left by `turn_rad` and follows the second wall; the finished walls meet at the origin. `mirrored`: wall to the left. Equal tool and finish radius: the path has a sharp vertex. Raises ArgumentError on corner radii below the tool's, an allowance above the radius of the tool, or a rough corner that leaves no material.
         """
     def at(self, s_mm: typing.SupportsFloat | typing.SupportsIndex, behind_vertex: bool = False) -> CornerEngagement:
         """
-        Engagement at a distance along the path, in closed form.
+        Engagement at a distance along the path, in closed form; `behind_vertex`: at a sharp vertex, after the turn.
         """
     def path(self, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, z_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Path:
         """
@@ -6516,7 +6520,7 @@ class CuttingCoefficients:
     """
     def __init__(self, specific_n_per_mm2: typing.SupportsFloat | typing.SupportsIndex, specific_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.0, ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, ratio_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.0, tangential_edge_n_per_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0, radial_edge_n_per_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0, thickness: ChipThickness = ChipThickness.mean) -> None:
         """
-        Raises ArgumentError on a value that is not finite, a force below 0, or an exponent (tangential, or sum of both) of -1 or less.
+        Raises ArgumentError on a value that is not finite, a force or ratio below 0, or an exponent (tangential, or sum of both) of -1 or less.
         """
     @property
     def radial_edge_n_per_mm(self) -> float:
@@ -6974,7 +6978,7 @@ class Travel:
     @property
     def highest_mm_per_s(self) -> numpy.ndarray:
         """
-        Largest distance within a window, divided by the window, (n,), mm/s. Only travel in XY in the present direction counts, converted to travel along the path.
+        Largest distance within a window, divided by the window, (n,), mm/s. Except in plunges, only travel in XY in the present direction counts, converted to travel along the path.
         """
     @property
     def time_s(self) -> numpy.ndarray:
@@ -7089,12 +7093,12 @@ class ProgramComparison:
     @property
     def counts(self) -> list:
         """
-        For each kind (ComparedKind, number in the original, in the emitted program, unchanged).
+        For each kind: (ComparedKind, number in the original, in the emitted program, unchanged).
         """
     @property
     def differences(self) -> list:
         """
-        For each difference (ComparedKind, line of the original, line of the emitted program, contents of the original, of the emitted program, distance of the paths in mm); line 0: the program has nothing there.
+        For each difference: (ComparedKind, line of the original, line of the emitted program, contents of the original, of the emitted program, distance of the paths in mm); line 0: the program has nothing there.
         """
     @property
     def path_mm(self) -> float:
@@ -7351,7 +7355,7 @@ class SiemensOptions:
     @property
     def refused(self) -> collections.abc.Callable[[str], str]:
         """
-        Called with a word: why it is refused; empty: not known.
+        Called with a word; returns why it is refused, empty if not known.
         """
     @refused.setter
     def refused(self, arg0: collections.abc.Callable[[str], str]) -> None:
@@ -7430,7 +7434,7 @@ def arma_driven(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.A
     """
 def block_overlap_time_s(lengths_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], model: FanucModel) -> float:
     """
-    Time of a sequence of overlapping cutting blocks, s: sum of ceil(l / (F T)) T plus the length of the filters (paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.
+    Time of a sequence of overlapping cutting blocks, s: sum of ceil(l / (F T)) T (with BlockEnd.carry of l / F) plus the length of the filters (paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.
     """
 def busiest_per_s(durations_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], amounts: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, stretch_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
@@ -7465,7 +7469,7 @@ def convolve(first: Shaper, second: Shaper) -> Shaper:
     """
 def convolved_zv(modes: collections.abc.Sequence[Mode]) -> Shaper:
     """
-    Convolved ZV, the conventional multi-mode shaper: 2^n non-negative impulses.
+    Convolved ZV, the conventional multi-mode shaper: up to 2^n non-negative impulses.
     
     Args:
         modes: The n >= 1 modes to cancel.
@@ -7512,7 +7516,7 @@ def equivalent_mass_bisection(force_n: typing.Annotated[numpy.typing.ArrayLike, 
         The mass, the number of halvings and both RMS.
     
     Raises:
-        ArgumentError: A value outside its range, a response that is zero throughout, or such a force without an impulse.
+        ArgumentError: A value outside its range, a zero response, or a zero force without an impulse.
     
     Source: paper 003, section 2.2, steps 1-7.
     """
@@ -7534,7 +7538,7 @@ def equivalent_mass_closed_form(force_n: typing.Annotated[numpy.typing.ArrayLike
         The mass that makes the RMS of simulated and measured response equal.
     
     Raises:
-        ArgumentError: A value outside its range, a response that is zero throughout, or such a force without an impulse.
+        ArgumentError: A value outside its range, a zero response, or a zero force without an impulse.
     
     Source: paper 003, section 2.2.
     """
@@ -7561,7 +7565,7 @@ def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing
     """
 def fastest_block_ends(blocks: Path) -> list[int]:
     """
-    Blocks after which a stop excites most: for each axis the block with the highest speed at its end, except the last block; ascending, without repetition.
+    Indices of the blocks after which a stop excites most: for each axis the block with the highest speed at its end, except the last block; ascending, without repetition.
     """
 def feeds_per_minute(program: ProgramText, region: Region) -> bool:
     """
@@ -7631,7 +7635,7 @@ def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.Arr
     """
 def for_shaped_blocks(model: FanucModel) -> FanucModel:
     """
-    The same controller while shaped blocks run: block by block at their feed, without look-ahead.
+    The same controller while shaped blocks run: block by block at their feed, without look-ahead (planners other than FANUC's keep it).
     """
 def gaussian_low_pass(profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], spacing_mm: typing.SupportsFloat | typing.SupportsIndex, cutoff_mm: typing.SupportsFloat | typing.SupportsIndex) -> numpy.ndarray:
     """
@@ -7675,7 +7679,7 @@ def insensitive_band(shaper: Shaper, mode: Mode, vibration_limit: typing.Support
         vibration_limit: Residual ratio (no unit), above 0 and below 1.
     
     Returns:
-        The band; of zero width if the limit is exceeded at the mode itself; up to at most ten times its frequency.
+        The band; of zero width if the limit is exceeded at the mode; never beyond ten times the mode's frequency.
     
     Raises:
         ArgumentError: The limit is outside its range.
@@ -7705,11 +7709,11 @@ def interpolate(path: Path, profile: SpeedProfile, period_s: typing.SupportsFloa
     """
 def interpolate_program(program: ProgramText, model: FanucModel) -> InterpolatedTime:
     """
-    Cycle time by full interpolation, set-point by set-point. Raises ArgumentError on an invalid model, or a program of more than 4e9 set-points.
+    Cycle time by full interpolation, set-point by set-point. Raises ArgumentError on an invalid model, a block without a feed, or a program of more than 4e9 set-points.
     """
 def largest_difference_mm(path: Path, blocks: collections.abc.Sequence[LinearBlock], period_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    Largest difference of the joined blocks from the blocks of constant feed at the ends of their periods.
+    Largest distance between the motions of the joined blocks and of the blocks of constant feed, at the ends of the periods, mm.
     """
 def largest_feed(force: MillingForce, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], limits: FeedLimits, lowest: typing.SupportsFloat | typing.SupportsIndex, highest: typing.SupportsFloat | typing.SupportsIndex) -> LimitedFeed:
     """
@@ -7729,7 +7733,7 @@ def line_sections(path: Path, ranges: collections.abc.Sequence[tuple[typing.Supp
     """
 def linear_blocks(path: Path, period_s: typing.SupportsFloat | typing.SupportsIndex, tolerance_mm: typing.SupportsFloat | typing.SupportsIndex, joints: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], modes: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> list[LinearBlock]:
     """
-    Joins blocks of constant feed, each of whole periods, into blocks of linear feed. At the ends of the periods the motion stays within a tolerance of the original motion. A block begins at each of `joints` (ascending); speeds at the end of the path are chosen so that `modes` of X, Y and Z are at rest there.
+    Joins blocks of constant feed, each of whole periods, into blocks of linear feed. At the ends of the periods the motion stays within a tolerance of the original motion. `joints`: ascending indices of blocks that must begin a joined one; speeds at the end of the path are chosen so that `modes` of X, Y and Z are at rest there.
     """
 def linear_distance_mm(length_mm: typing.SupportsFloat | typing.SupportsIndex, start_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, end_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, time_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
@@ -7764,7 +7768,7 @@ def linear_positions_mm(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy
     """
 def linuxcnc_slowing(path: Path, limits: MotionLimits, rules: PlannerRules, corner_rad: typing.SupportsFloat | typing.SupportsIndex) -> LinuxcncSlowing:
     """
-    Effect of LinuxCNC's two rules for short segments on a path at its feeds. Turns above `corner_rad` do not count.
+    Effect of LinuxCNC's rules for short segments (kinks and ramps) on a path at its feeds. Turns above `corner_rad` do not count.
     """
 def list_programs(text: bytes) -> list[ProgramEntry]:
     """
@@ -7792,7 +7796,7 @@ def measure_roughness(profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy
     """
 def minimal_branches(first: Mode, second_damping: typing.SupportsFloat | typing.SupportsIndex, ratios: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> MinimalBranches:
     """
-    All minimal two-mode shapers over the ratio of the frequencies, joined into curves (paper 002, fig. 2 and 3).
+    All minimal two-mode shapers over the ratio of the frequencies, joined into curves (paper 002, figures 2, 3).
     
     At each ratio the list is that of `minimal_two_mode`; curves are followed by continuation, also through gaps, where the
     sum of magnitudes or the duration exceeds its limit. Where two curves touch, their ends may be exchanged.
@@ -7814,12 +7818,12 @@ def minimal_branches(first: Mode, second_damping: typing.SupportsFloat | typing.
     """
 def minimal_shapers(modes: collections.abc.Sequence[Mode], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_starts: typing.SupportsInt | typing.SupportsIndex = 100000, max_boxes: typing.SupportsInt | typing.SupportsIndex = 400000) -> MinimalShapers:
     """
-    Minimal multi-mode shapers: n+1 impulses that cancel n = 1 ... 6 modes, damped or not.
+    Minimal multi-mode shapers: n+1 impulses that cancel n modes (one to six), damped or not.
     
     One mode is closed form and two are searched completely. Three and more are searched from many low-discrepancy starts
-    and by boxes of times in ascending duration, each of which is proven empty or shrunk to one solution; `complete` and
-    `complete_up_to_s` tell what is proven. Shapers with fewer impulses that cancel all modes are listed too; solutions that
-    are not isolated (undamped modes at odd ratios, which one ZV cancels) are not.
+    and by boxes of times in ascending duration, each proven empty, shrunk to one solution, or unresolved; `complete` and
+    `complete_up_to_s` state what is proven. Shapers with fewer impulses that cancel all modes are listed too; families of
+    solutions that are not isolated (with undamped modes at odd ratios, which one ZV cancels) are not.
     
     Args:
         modes: One to six modes, no two poles within 1e-6 of one another (relative).
@@ -7848,14 +7852,14 @@ def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsF
         first: One mode, damped or not.
         second: The other one; either may be the faster.
         max_duration_s: Largest duration in s, above 0, at most 100 periods of the faster mode.
-        max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1. Rounding may exceed 1: use
-            has_negative to select the non-negative ones.
+        max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1. With 1, rounding
+            may exclude non-negative shapers: select those by has_negative instead.
     
     Returns:
         The shapers, residual_ratio of both modes below 1e-13; empty if there is none in the range.
     
     Raises:
-        ArgumentError: The modes' poles agree within 1e-6, or a value is outside its range.
+        ArgumentError: The modes' poles agree within 1e-6 (relative), or a value is outside its range.
     
     Source: paper 002, eq. 12-17; the search is this project's.
     """
@@ -7924,7 +7928,7 @@ def negative_zv(mode: Mode) -> Shaper:
     """
 def path_sections(path: Path, short_mm: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> list[PathSection]:
     """
-    The whole path as sections: sequences of lines of one direction and of arcs about one centre. Successive sequences shorter than `short_mm` are one section of the kind `curve`.
+    The whole path as sections: sequences of lines of one direction and of arcs about one centre, which end at an exact stop at the latest. Successive sequences shorter than `short_mm` are one section of the kind `curve`.
     """
 def plan_speed(path: Path, limits: MotionLimits, tolerance: FilterTolerance = ...) -> SpeedProfile:
     """
@@ -8079,7 +8083,7 @@ def simulate_blocks(blocks: Path, path: Path, block_end: BlockEnd, override_rati
     """
 def simulate_circle(radius_mm: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, model: FanucModel) -> CircleFigures:
     """
-    Run circles in XY at a constant feed and measure the mean radius over whole turns. Raises ArgumentError on a radius or feed <= 0.
+    Run circles in XY at a constant feed and measure the mean radius over one turn. Raises ArgumentError on a radius or feed <= 0.
     """
 def simulate_path(path: Path, profile: SpeedProfile, options: SimulationOptions, programmed: Path = None) -> SimulationFigures:
     """
@@ -8123,7 +8127,7 @@ def sweep(material: Material, path: Path, tool_diameter_mm: typing.SupportsFloat
     """
 def thin_curves(times: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], values: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.f_contiguous"], tolerances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> numpy.typing.NDArray[numpy.int64]:
     """
-    Selects samples of curves over time that look the same (Douglas and Peucker 1973, distance along the value).
+    Selects the samples needed for curves to look the same (Douglas and Peucker 1973, distance along the value).
     
     Args:
         times: Times of the rows, (n,), rising.
@@ -8140,8 +8144,8 @@ def time_optimal_trajectory(path: Path | typing.Annotated[numpy.typing.ArrayLike
     """
     Set-points of a whole path from rest to rest, nearly as fast as the limits of every axis allow.
     
-    Junctions are rounded within the tolerance, jerk is limited, and the motion rests at segments with `stop_at_end`. The
-    differences of the set-points keep the limits to a factor of 1.001, and the programmed feeds. Bit for bit those of a
+    Junctions are rounded within the tolerance, jerk is limited, and the motion rests at exact stops. The differences of the
+    set-points keep the limits to a factor of 1.001, and the programmed feeds. The set-points are bit for bit those of a
     `MotionController` without filters that is given all segments at once. See docs/concepts/time_optimal.md.
     
     Args:
@@ -8154,7 +8158,7 @@ def time_optimal_trajectory(path: Path | typing.Annotated[numpy.typing.ArrayLike
         period_s: Time between two set-points, s.
     
     Returns:
-        Set-points, (n_samples, 3), mm, read-only; the first is the start, the last exactly the end.
+        Set-points, (n_samples, 3), mm, read-only; the first is the start, the last exactly the end; none without length.
     
     Raises:
         ArgumentError: A limit or period that is not above zero and finite, a tolerance below zero, a segment without feed.
@@ -8162,7 +8166,7 @@ def time_optimal_trajectory(path: Path | typing.Annotated[numpy.typing.ArrayLike
     """
 def time_program(program: ProgramText, model: FanucModel, per_block: bool = False) -> CycleTime:
     """
-    Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in look-ahead. Raises ArgumentError on an invalid model.
+    Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in look-ahead. Raises ArgumentError on an invalid model, or a block without a feed.
     """
 def travel_blocks(blocks: Path, along: Path, block_end: BlockEnd, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
     """
@@ -8170,7 +8174,7 @@ def travel_blocks(blocks: Path, along: Path, block_end: BlockEnd, stations_mm: t
     """
 def travel_path(path: Path, profile: SpeedProfile, along: Path, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
     """
-    Actual speeds of a path under a speed profile, followed along `along`, the same path or the one from which it was made. `stations_mm` (n,) ascend to the length of `along`; `filters` act after the set-points; speeds are averaged over `window_s`. Raises ArgumentError on stations that do not ascend.
+    Actual speeds of a path under a speed profile, followed along `along`, the same path or the one from which it was made. `stations_mm` (n,) ascend to the length of `along`; `filters` act after the set-points; speeds are averaged over `window_s`. Raises ArgumentError on stations that do not ascend to that length.
     """
 def wall_error_um(force: MillingForce, beam: ToolBeam, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, side: WallSide, height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     """
@@ -8205,7 +8209,7 @@ def wilson_theta(mass_kg: typing.SupportsFloat | typing.SupportsIndex, damping_n
         stiffness_n_per_m: Stiffness, above 0.
         force_n: Force in N, shape (n,).
         period_s: Time between samples in s, above 0.
-        theta: Number of periods over which the acceleration is linear, at least 1; stable from 1.37 on.
+        theta: Number of periods over which the acceleration is linear, at least 1; from 1.37 on stable for any period.
         displacement_m: At the first sample.
         velocity_m_per_s: At the first sample.
     
@@ -8219,7 +8223,7 @@ def wilson_theta(mass_kg: typing.SupportsFloat | typing.SupportsIndex, damping_n
     """
 def with_feeds(path: Path, stretches: collections.abc.Sequence[FeedStretch]) -> Path:
     """
-    The path with other feeds: segments are divided where a section ends within one. Raises ArgumentError if the sections do not cover it.
+    The path with the feeds of the sections `stretches`: segments are divided where a section ends within one. Raises ArgumentError if they do not cover the path.
     """
 def worst_residual(shaper: Shaper, mode: Mode, lowest_hz: typing.SupportsFloat | typing.SupportsIndex, highest_hz: typing.SupportsFloat | typing.SupportsIndex) -> WorstResidual:
     """
@@ -8246,7 +8250,7 @@ def write_blocks(blocks: FittedBlocks, start: typing.Annotated[collections.abc.S
     """
 def write_feeds(program: ProgramText, region: Region, stretches: collections.abc.Sequence[FeedStretch], options: FeedWriterOptions) -> RefedRegion:
     """
-    The region's lines with the feeds of sections that cover its path; everything else in them does not change. Raises ArgumentError if they do not cover it, or end within a block that cannot be divided.
+    The region's lines with the feeds of the sections `stretches`, which cover its path; everything else in them does not change. Raises ArgumentError if they do not, or if one ends within a block that cannot be divided.
     """
 def zv(mode: Mode | typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Shaper:
     """
@@ -8260,13 +8264,13 @@ def zv(mode: Mode | typing.SupportsFloat | typing.SupportsIndex, damping_ratio: 
         A shaper with 2 non-negative impulses.
     
     Raises:
-        ArgumentError: A value is outside its range, or a damping ratio beside a mode.
+        ArgumentError: A value is outside its range, or a damping ratio is given although `mode` is a Mode.
     
     Source: paper 002, eq. 1-2 (Smith 1958).
     """
 def zv_on_grid(mode: Mode, period_s: typing.SupportsFloat | typing.SupportsIndex) -> Shaper:
     """
-    ZV with impulses at multiples of a period only; the second one is divided between two neighbours.
+    ZV with impulses at multiples of a period only: the second impulse is divided between two of them.
     
     Args:
         mode: The mode to cancel.

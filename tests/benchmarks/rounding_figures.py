@@ -23,6 +23,7 @@ from judge.plant import residual_um
 from judge.player import play
 from shapegcode import _core
 from shapegcode.conversion.convert import convert
+from shapegcode.machine.programs import ANY_PRICE
 
 MODES = ((46.0, 0.02), (131.0, 0.02), None)
 #: Name, inch, least increment in mm.
@@ -64,14 +65,14 @@ def path(seed: int, *, inch: bool = False) -> str:
 
 
 def machine(rounding: str, period_s: float, increment_mm: float = 1e-3) -> sg.Machine:
-    """The VX500 with a rounding and a block period, and IS-C words if the increment is 0.1 µm."""
+    """The VX500 with a rounding and a block period, at any price, and IS-C words if the increment is 0.1 µm."""
     data = tomllib.loads(sg.Machine.builtin_text("vx500"))
     data["emission"]["rounding"] = rounding
     data["emission"]["block_period_s"] = period_s
     data["controller"]["block_time_s"] = period_s
     if increment_mm < 1e-3:
         data["controller"]["least_increment_mm"] = increment_mm
-    return sg.Machine.from_data(data)
+    return sg.Machine.from_data(data).with_values(ANY_PRICE)
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def convert_path(seed: int, rounding: str, period_s: float, *, inch: bool, incre
     program = sg.Program.from_text(path(seed, inch=inch).encode(), owner, source=f"path {seed}")
     # With one thread the last blocks that are fitted are those that are written.
     with mock.patch.object(_core, "fit_blocks", measured), mock.patch.dict(os.environ, {"SHAPEGCODE_THREADS": "1"}):
-        result = convert(program, owner)
+        result = convert(program, owner, shape_all=True)
     moves = [move for line in interpret(result.text.decode()).lines for move in line.moves if move.kind != "rapid"]
     residuals = [residual_um(play(moves, block_end=rule), MODES, 0.001)[:2] for rule in ("ceil", "carry")]
     peak = result.peak_vibration_um.emitted

@@ -157,17 +157,21 @@ TEST_CASE("lines in which nothing differs stay as they are") {
 }
 
 TEST_CASE("what plain lines are") {
-  const auto count = [](std::string_view text) { return shapegcode::linuxcnc::scan_plain_lines(text, 0, true).count; };
+  const std::vector<std::uint8_t> once(100, 1);
+  const auto scan = [&](std::string_view text) { return shapegcode::linuxcnc::scan_plain_lines(text, 0, true, once); };
+  const auto count = [&](std::string_view text) { return scan(text).count; };
   CHECK(count("X1\nY2\n\nZ3\n") == 2);
   CHECK(count("n1G03X1I2K3F4\n") == 1);
   CHECK(count("X12345678.\n") == 1);
   for (const std::string_view other :
-       {"X123456789.\n", "X.\n", "X1.2.3\n", "X\n", "N G1 X1\n", "G10 X1\n", "G1.1 X1\n", "G4 X1\n", "G1\n",
-        "G1 X1 I2\n", "G2 X1\n", "X1 A2\n", "X1 F1 F2\n", "X#1\n", "X1 (a)\n", "X- 1\n", "F1 X1\n", "X1", "X1\r\n"}) {
+       {"X123456789.\n", "X.\n",      "X1.2.3\n", "X\n",    "N G1 X1\n",  "N0 X1\n", "N100 X1\n",
+        "G10 X1\n",      "G1.1 X1\n", "G4 X1\n",  "G1\n",   "G1 X1 I2\n", "G2 X1\n", "X1 A2\n",
+        "X1 F1 F2\n",    "X#1\n",     "X1 (a)\n", "X- 1\n", "F1 X1\n",    "X1",      "X1\r\n"}) {
     CAPTURE(std::string(other));
     CHECK(count(other) == 0);
   }
-  const auto lines = shapegcode::linuxcnc::scan_plain_lines("G1 X1 X2\nG3 Y-.5 J7 F9\n", 0, true);
+  const auto lines = scan("N99 G1 X1 X2\nG3 Y-.5 J7 F9\nN100 X4\n");
+  CHECK(lines.n_words == std::vector<std::uint32_t>{99});
   CHECK(lines.last_motion == 3);
   CHECK(lines.last[0] == 2.0);
   CHECK(lines.sum[0] == 3.0);

@@ -399,6 +399,18 @@ def test_n_words_stay_where_a_search_finds_one_block() -> None:
     assert ends(program) == ends(read(without)) and dwells(program) == dwells(read(without))
 
 
+def test_n_words_of_plain_lines_too() -> None:
+    """N100 stands twice, N300 in a loop, N400 in a subroutine."""
+    body = (
+        "O2 sub\nN400 G1 Y1\nO2 endsub\nF600\nN100 G1 X5\nN100 G1 X6\nN200 X7\nX8\nN0 X9\nO1 repeat [2]\n"
+        "N300 G1 Y2\nY0\nO1 endrepeat\nO2 call"
+    )
+    text = read(body).expanded_text.decode()
+    assert re.findall(r"N(\d+)", text) == ["200", "300", "400"]
+    without = re.sub(r"(?m)^N[\d ]+", "", body)
+    assert ends(read(body)) == ends(read(without))
+
+
 def test_time_check_and_convert_to_linuxcnc(tmp_path: Path) -> None:
     (tmp_path / "loop.ngc").write_text(LOOP)
     for command in ("time", "check", "simulate"):

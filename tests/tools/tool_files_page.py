@@ -80,7 +80,7 @@ there before the first block. `shapegcode feed` reads both; what the machine all
 ([feed_control](machine.md#feed_control)). Both are TOML. An unknown key, a number that is not finite or a value
 outside its limits is an error, and all errors of a file are listed at once, each with its line.
 
-A default marked **assumed** is not known for real tools in general: look it up or measure it.
+A default marked **assumed** is a typical value; your tool's may differ: look it up or measure it.
 
 ## The tool file
 
@@ -103,9 +103,10 @@ The finished part is what lies behind the wall: on the side `wall` of the tool's
 Roughing has left `allowance_mm` on it, and inside corners with `corner_radius_mm` where the part has a smaller one: a
 wall along which a circle of that radius could roll at that distance. All of it reaches from `z_mm[0]` to `z_mm[1]`.
 
-A contour that closes upon itself is a pocket or a boss, by `wall` and its sense; what leads to it and away from it is
-left out. An open one is a wall from its beginning to its end and goes on straight beyond both; state `lead_in_mm` and
-`lead_out_mm` where the run of cutting moves begins before the wall. Only moves below the top of the stock count.
+A closed contour is a pocket or a boss, depending on `wall` and on its direction of travel; moves that lead to it and
+away from it are ignored. An open contour is a wall from its beginning to its end and continues straight beyond both;
+state `lead_in_mm` and `lead_out_mm` where the cut begins before the wall, or ends after it. Only moves below the top of
+the stock count.
 Where a path crosses itself or both of its sides are walls, describe the stock as a `[polygon]` instead: the message
 says so. Outlines are right within half a micrometre.
 """

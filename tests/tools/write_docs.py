@@ -37,14 +37,14 @@ What can be guessed:
 
 | line | what it gives |
 |---|---|
-| `sg.convert("part.nc", "vx500")` | the shaped program with its verdict; so do `simulate`, `check`, `cycle_time` |
+| `sg.convert("part.nc", "vx500")` | the shaped program; `simulate`, `check`, `cycle_time` take the same arguments |
 | `sg.zv(46, 0.02)` | the ZV shaper of 46 Hz with a damping ratio of 0.02; `sg.Mode(46, 0.02)` is that mode |
 | `sg.zv(46).residual(frequencies_hz)` | its residual vibration over an array of frequencies |
 | `sg.choose_shaper([46, 131])` | every family of shapers for two modes, and the one to take |
 | `sg.plot_sensitivity(shaper)` | residual vibration over frequency, of a comparison, a shaper or a dict of shapers |
 | `sg.identify(t, y)`, `sg.identify(t, y, force)` | modes of a decay, of an impact test, from arrays |
 | `sg.Machine.simple(modes={"x": 46, "y": [131, 200]})` | a machine of which nothing but its modes is known |
-| `sg.MotionController(shaper=sg.Mode(46, 0.02), ...)` | a controller behind the ZV of a mode on its own grid |
+| `sg.MotionController(shaper=sg.Mode(46, 0.02), ...)` | a controller with the ZV shaper of a mode, on its own grid |
 
 | name | home | what it is |
 |---|---|---|
@@ -76,8 +76,8 @@ _SCHEMAS = """\
 <!-- Generated: make docs -->
 
 `--json FILE` of a command writes its result. The keys of each kind of result stand in a JSON Schema, with units and
-meaning; Draft 2020-12, without references outside of the file. They are made from the code: in Python by
-`sg.schema(sg.Conversion)`, all of them by `make schemas` (build/schemas), and in the built book each name of the table
+meaning; Draft 2020-12, without references outside of the file. The schemas are made from the code: one by
+`sg.schema(sg.Conversion)` in Python, all by `make schemas` (build/schemas); in the built book each name of the table
 leads to its schema. Those of machine, tool, stock and study files, for editors: `shapegcode machine schema KIND`.
 
 | kind | what it is |

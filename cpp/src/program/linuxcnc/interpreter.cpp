@@ -146,7 +146,8 @@ PlainLines Interpreter::find_plain_lines() {
   const std::size_t begin = file_->start(next_);
   if (modes.feed_mode == 930 || (next_ > slow_from_ && next_ < slow_to_)) return {};
   if (modes.motion != 0 && modes.motion != 10 && !begins_with_motion(file_->text(), begin)) return {};
-  PlainLines lines = scan_plain_lines(file_->text(), begin, modes.centres == 911);
+  const std::span<const std::uint8_t> n_counts = file_ == &main_ ? n_words_ : std::span<const std::uint8_t>{};
+  PlainLines lines = scan_plain_lines(file_->text(), begin, modes.centres == 911, n_counts);
   // The slow way says what is wrong with a centre perpendicular to the plane, or without a feed.
   std::size_t slow_lines = lines.last_centre[dialect::axes_of(modes.plane / 10).normal];
   if (modes.feed <= 0.0 && !lines.last_feed) slow_lines = lines.count;
@@ -159,6 +160,7 @@ PlainLines Interpreter::find_plain_lines() {
 bool Interpreter::take_plain_lines() {
   const PlainLines lines = find_plain_lines();
   if (lines.count == 0) return false;
+  for (const std::uint32_t number : lines.n_words) n_words_[number] = 0;
   const std::size_t begin = file_->start(next_);
   const auto line = static_cast<std::uint32_t>(next_ + 1);
   runner_.place = {line, file_->index(), {}};

@@ -1,5 +1,7 @@
 #include "program/linuxcnc/plain_lines.hpp"
 
+#include <limits>
+
 #include "program/text/characters.hpp"
 #include "program/text/number_scan.hpp"
 
@@ -12,13 +14,17 @@ bool is_digit_at(std::string_view text, std::size_t i) noexcept { return i < tex
 
 char letter_at(std::string_view text, std::size_t i) noexcept { return i < text.size() ? upper(text[i]) : '\0'; }
 
-/// Reads N and its digits, which may be missing altogether; false: N has none.
-bool skip_n_word(std::string_view text, std::size_t& i) noexcept {
-  if (letter_at(text, i) != 'N') return true;
-  if (!is_digit_at(text, ++i)) return false;
-  while (is_digit_at(text, i)) ++i;
+constexpr std::size_t no_n_word = std::numeric_limits<std::size_t>::max();
+
+/// Reads N and its digits; none: N has no digits, or too many. `no_n_word`: there is no N.
+std::optional<std::size_t> scan_n_word(std::string_view text, std::size_t& i) noexcept {
+  if (letter_at(text, i) != 'N') return no_n_word;
+  const std::size_t begin = ++i;
+  std::size_t number = 0;
+  for (; is_digit_at(text, i); ++i) number = 10 * number + static_cast<std::size_t>(text[i] - '0');
+  if (i == begin || i - begin > most_characters) return std::nullopt;
   skip_spaces(text, i);
-  return true;
+  return number;
 }
 
 /// The number of G0 to G3 at text[i], behind which `i` stands then; -1: another word, or none.
@@ -51,8 +57,8 @@ std::optional<double> scan_value(std::string_view text, std::size_t& i) noexcept
 
 class PlainScanner {
  public:
-  PlainScanner(std::string_view text, std::size_t begin, bool with_arcs)
-      : text_(text), begin_(begin), with_arcs_(with_arcs) {}
+  PlainScanner(std::string_view text, std::size_t begin, bool with_arcs, std::span<const std::uint8_t> n_counts)
+      : text_(text), begin_(begin), with_arcs_(with_arcs), n_counts_(n_counts) {}
 
   PlainLines scan() {
     found_.end = begin_;
@@ -72,7 +78,8 @@ class PlainScanner {
   bool scan_line() {
     std::size_t i = found_.end;
     skip_spaces(text_, i);
-    if (!skip_n_word(text_, i)) return false;
+    const std::optional<std::size_t> n_word = scan_n_word(text_, i);
+    if (!n_word || (*n_word != no_n_word && !is_kept(*n_word))) return false;
     const bool has_g = letter_at(text_, i) == 'G';
     const int motion = has_g ? scan_motion(text_, i) : -1;
     const bool is_arc = motion > 1;
@@ -83,7 +90,12 @@ class PlainScanner {
     if (letter_at(text_, i) == 'F' && !(line.feed = scan_value(text_, i))) return false;
     if (i >= text_.size() || text_[i] != '\n') return false;
     take(line, has_g, motion, i + 1);
+    if (*n_word != no_n_word) found_.n_words.push_back(static_cast<std::uint32_t>(*n_word));
     return true;
+  }
+
+  bool is_kept(std::size_t n_word) const noexcept {
+    return n_word > 0 && n_word < n_counts_.size() && n_counts_[n_word] == 1;
   }
 
   bool scan_axes(std::size_t& i, Line& line) const noexcept {
@@ -121,18 +133,20 @@ class PlainScanner {
   std::string_view text_;
   std::size_t begin_;
   bool with_arcs_;
+  std::span<const std::uint8_t> n_counts_;
   PlainLines found_;
 };
 
 }  // namespace
 
-PlainLines scan_plain_lines(std::string_view text, std::size_t begin, bool with_arcs) {
-  return PlainScanner(text, begin, with_arcs).scan();
+PlainLines scan_plain_lines(std::string_view text, std::size_t begin, bool with_arcs,
+                            std::span<const std::uint8_t> n_counts) {
+  return PlainScanner(text, begin, with_arcs, n_counts).scan();
 }
 
 bool begins_with_motion(std::string_view text, std::size_t begin) noexcept {
   skip_spaces(text, begin);
-  return skip_n_word(text, begin) && scan_motion(text, begin) >= 0;
+  return scan_n_word(text, begin).has_value() && scan_motion(text, begin) >= 0;
 }
 
 std::string with_points(std::string_view lines) {

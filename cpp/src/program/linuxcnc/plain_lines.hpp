@@ -3,9 +3,12 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace shapegcode::linuxcnc {
 
@@ -19,9 +22,12 @@ struct PlainLines {
   std::array<std::optional<double>, 3> last{};  ///< number of the last word of each axis
   std::array<double, 3> sum{};                  ///< of all words of each axis
   std::array<std::size_t, 3> last_centre{};     ///< last line with I, J, K, from 1; 0: none
+  std::vector<std::uint32_t> n_words;           ///< their N words
 };
 
-[[nodiscard]] PlainLines scan_plain_lines(std::string_view text, std::size_t begin, bool with_arcs);
+/// `n_counts`: how often each N may still be written; a line whose N has another count than 1 is no plain one.
+[[nodiscard]] PlainLines scan_plain_lines(std::string_view text, std::size_t begin, bool with_arcs,
+                                          std::span<const std::uint8_t> n_counts);
 
 /// Whether the line there begins with G0 to G3, an N word aside.
 [[nodiscard]] bool begins_with_motion(std::string_view text, std::size_t begin) noexcept;
