@@ -168,7 +168,7 @@ def test_check_says_which_lines_and_why(tmp_path: Path) -> None:
         in found["kink_ratio"].message
     )
     assert found["kink_ratio"].severity == "warning" and found["kink_ratio"].line > 0
-    assert "[TRAJ] ARC_BLEND_RAMP_FREQ = 10000, and it is 100" in found["ramp_frequency"].message
+    assert "[TRAJ] ARC_BLEND_RAMP_FREQ = 10000 (now 100)" in found["ramp_frequency"].message
     (tmp_path / "plain.nc").write_text(text)
     assert not {"kink_ratio", "ramp_frequency"} & {
         each.code for each in sg.check(tmp_path / "plain.nc", machine).findings

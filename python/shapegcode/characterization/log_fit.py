@@ -263,7 +263,7 @@ class LogFacts(Facts):
 
     @property
     def stop_s(self) -> float | None:
-        """Time that a stop adds to a cutting move; None: unknown, or an exponential without end."""
+        """Time that a stop adds to a cutting move; None: unknown, or infinite (exponential)."""
         return None if self.exponential else self.cutting
 
     @property

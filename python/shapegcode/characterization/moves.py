@@ -172,7 +172,7 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
 
 
 def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> FloatArray:
-    """Fraction of the travel at times after the start, for a rectangle and moving averages of these lengths, s."""
+    """Fraction of the travel over time, for a rectangle of speed and moving averages of these lengths, s."""
     used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
     power, out = len(used), np.zeros_like(times)
     if not power:

@@ -68,7 +68,7 @@ class ShortRun:
     blocks: int  # number of all moving blocks
     shortest_s: float  # the shortest block
     programmed_s: float  # time of all at their feed, without acceleration
-    taken_s: float  # the same if no block is shorter than the block time
+    taken_s: float  # the same with at least the block time for each
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class ShortBlocks:
     share: float  # ratio of short ones
     shortest_s: float | None  # the shortest block; None: none is short
     programmed_s: float  # time of all at their feed, without acceleration
-    taken_s: float  # the same if no block is shorter than the block time
+    taken_s: float  # the same with at least the block time for each
     first_places: tuple[str, ...]  # `file:line` of the first short blocks
     region_count: int  # number of sequences with short blocks, listed or not
     regions: tuple[ShortRun, ...]  # these sequences, at most `MOST_FINDINGS`

@@ -56,7 +56,7 @@ class CuttingRun:
     needed_per_s: float
     blocks: int  # number of moving blocks
     time_s: float  # time at their feed, with axis limits, without acceleration
-    taken_s: float  # the same if no block is shorter than the block time
+    taken_s: float  # the same with at least the block time for each
     short_blocks: int  # number of blocks shorter than the block time
     shortest_s: float  # shortest block
     first_short_line: int  # line of the first short block, 0: none
@@ -94,7 +94,7 @@ class Breaker:
 
 
 def block_table(program: Program, machine: Machine) -> BlockTable:
-    """Time every block of a program at its feed."""
+    """Time every cutting block at its feed."""
     limited = _timed(program, machine, with_limits=True)
     # A move of rotary axes only has no length here, and so no comparable time.
     cutting = np.flatnonzero((limited["kind"] == _CUTTING) & (limited["duration_s"] > 0.0))

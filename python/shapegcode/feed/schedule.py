@@ -195,7 +195,7 @@ def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index
 
 
 def _read_back(text: bytes, program: Program, first_lines: Sequence[int], machine: Machine) -> Program:
-    """Read the new text back; its regions must match the original's in first line, length and end."""
+    """Read the new text back; regions must start at `first_lines`, with original length and end."""
     try:
         emitted = Program.from_text(
             text, machine, source="the written program", emitted=True,

@@ -312,7 +312,7 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sou
 
 
 def _few(ready: Prepared, problem: FitProblem, many: FrfModes, narrow: bool) -> int | None:
-    """Number of modes for a fit over time, if so few explain the records or `many` supports none; else None."""
+    """Number of modes for a fit over time; None unless a few explain the records or `many` supports none."""
     supported = [mode for mode in many.modes if not mode.refusal]
     starts = [(2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in supported]
     power = np.mean([np.mean(record.response**2) for record in ready.records])

@@ -92,7 +92,7 @@ def recommend(
 
 
 def _competing(designs: Sequence[Design], limit: float, allow_negative: bool) -> tuple[list[int], list[int]]:
-    """Allowed designs; those within the limit: only those that cancel the modes without a band, if any do."""
+    """Allowed designs, or all if none is; of these, those within the limit: the `exact` ones, if any is."""
     indices = [index for index, each in enumerate(designs) if allow_negative or not each.negative]
     indices = indices or list(range(len(designs)))
     good = [index for index in indices if is_within(designs[index], limit)]

@@ -1,1 +1,1 @@
-"""Verdict of programs: every cut, shaped or left unchanged, simulated in all operating conditions."""
+"""Verdict of programs: every cut, shaped or left unchanged, simulated in conditions that count."""

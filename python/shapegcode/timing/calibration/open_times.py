@@ -110,7 +110,7 @@ def open_row(name: str, base: Mapping[str, object], other: Mapping[str, object],
 
 
 def _symmetric_root(covariance: FloatArray) -> FloatArray:
-    """Symmetric square root of the covariance, (n, n); column i is the direction nearest to parameter i."""
+    """Square root R of the covariance, R R^T, (n, n); column i is the direction nearest to parameter i."""
     deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-18))
     value, vector = np.linalg.eigh(covariance / np.outer(deviation, deviation))
     return np.asarray(deviation[:, None] * ((vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T))
