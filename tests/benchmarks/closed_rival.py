@@ -28,7 +28,7 @@ CORNER_SPEED = 10.0  # mm/s
 NEGATIVE_SUM = 1.5  # of the taps' magnitudes, in the rows with negative taps
 _HALVINGS = 10
 _LEFT_OUT = {"taps", "robust", "si", "polynomial"}  # made for a band: the table above; no use on a fine grid
-_MOST_S = 0.2
+_MAX_S = 0.2
 
 
 def band_of(low: float, high: float) -> ModeBand:
@@ -44,7 +44,7 @@ def periods(shaper: Shaper) -> tuple[np.ndarray, np.ndarray]:
 def shortest(low: float, high: float, period_s: float, *, mirrored: bool = False, negative: bool = False) -> Shaper:
     """The shortest design with that band."""
     return minimax_robust(
-        [band_of(low, high)], period_s, max_duration_s=_MOST_S, mirrored=mirrored, non_negative=not negative,
+        [band_of(low, high)], period_s, max_duration_s=_MAX_S, mirrored=mirrored, non_negative=not negative,
         max_abs_sum=NEGATIVE_SUM, vibration_limit=guard.LIMIT, hints=False,
     ).shaper  # fmt: skip
 
@@ -98,7 +98,7 @@ def families_table() -> str:
             continue
         fine = None if row.continuous else FINE_S
         band = [ModeBand(Mode(FREQUENCY_HZ, guard.DAMPING))]
-        shaper = design(row.name, band, DesignOptions(period_s=fine, max_duration_s=_MOST_S))[0].shaper
+        shaper = design(row.name, band, DesignOptions(period_s=fine, max_duration_s=_MAX_S))[0].shaper
         times, amplitudes = periods(shaper)
         low, high = guard.five_percent_band(times, amplitudes)
         try:
@@ -121,14 +121,14 @@ def families_table() -> str:
 
 
 def _grid_of(name: str, band: list[ModeBand]) -> str:
-    return _ms(design(name, band, DesignOptions(period_s=BLOCK_S, max_duration_s=_MOST_S))[0].shaper)
+    return _ms(design(name, band, DesignOptions(period_s=BLOCK_S, max_duration_s=_MAX_S))[0].shaper)
 
 
 def _on_grid(mode: guard.GuardMode) -> Shaper:
     """The rival's kernel on the grid of blocks, with its zeros exact there."""
     name = "mirrored" if mode.symmetric else ("zv", "zvd", "zvdd")[mode.number - 1]
     band = [ModeBand(Mode(FREQUENCY_HZ, guard.DAMPING))]
-    return design(name, band, DesignOptions(period_s=BLOCK_S, max_duration_s=_MOST_S))[0].shaper
+    return design(name, band, DesignOptions(period_s=BLOCK_S, max_duration_s=_MAX_S))[0].shaper
 
 
 def _figures(times: np.ndarray, amplitudes: np.ndarray) -> list[str]:

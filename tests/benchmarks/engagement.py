@@ -24,7 +24,7 @@ _SIZE_MM = (100.0, 80.0)
 _STEPOVER_MM = 3.2
 _LEVEL_MM = 1.0
 _BLOCKS = (25_000, 50_000, 100_000, 200_000)
-_MOST_SECONDS = 10.0  # for 100 000 blocks, force included: what users were promised
+_MAX_SECONDS = 10.0  # for 100 000 blocks, force included: what users were promised
 
 
 def pocket(blocks: int) -> Path:
@@ -140,7 +140,7 @@ def main() -> int:
             json.dump({"corner": errors, "speed": times}, file, indent=1)
     fine = [row["entry_degrees"] for row in errors if row["resolution_mm"] == 0.02]
     longest = next(Sample.of(row["seconds"]).median for row in times if row["blocks"] == 100_000)
-    return 0 if max(fine) < 0.5 and longest < _MOST_SECONDS else 1
+    return 0 if max(fine) < 0.5 and longest < _MAX_SECONDS else 1
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ POINT_MM = 0.02
 SLICE_MM = 0.2
 SAMPLES = 150
 LEVEL_MM, ROW_MM, BLOCK_MM = 1.0, 3.2, 0.5  # of the long program
-BLOCK_MM_LEAST = 0.6
+BLOCK_MM_MIN = 0.6
 LARGEST_S = 10.0
 
 
@@ -89,9 +89,9 @@ def _share_possible(corner: Any) -> float:
         ends = np.append(s_mm[inside] - length[inside], s_mm[inside[-1]])
         for end in range(1, len(inside) + 1):
             # Blocks twice as long as the least one are two blocks with feeds at least as high.
-            first = int(np.searchsorted(ends, ends[end] - 2.0 * BLOCK_MM_LEAST - 1e-6))
+            first = int(np.searchsorted(ends, ends[end] - 2.0 * BLOCK_MM_MIN - 1e-6))
             for begin in range(first, end):
-                if ends[end] - ends[begin] < BLOCK_MM_LEAST - 1e-6 or not np.isfinite(best[begin]):
+                if ends[end] - ends[begin] < BLOCK_MM_MIN - 1e-6 or not np.isfinite(best[begin]):
                     continue
                 block = inside[begin:end]
                 near = float(length[block][most[block].min() >= enough[block]].sum())

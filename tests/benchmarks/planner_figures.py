@@ -31,7 +31,7 @@ from judge import play
 TICKS = 5  # of a block
 TICK_S = 1e-3
 PLAYED_S = 100.0  # of a cut, from which its acceleration and jerk are taken at most
-LEAST_UM = 1.0  # no tolerance below is asked for
+MIN_UM = 1.0  # no tolerance below is asked for
 HEADS = (
     "program", "original s", "look-ahead s", "optimal s", "same tolerance", "same contour", "contour µm",
     "residual µm", "blocks", "acceleration", "jerk", "conversion s",
@@ -128,7 +128,7 @@ def row(name: str, text: str, machine: sg.Machine, jerk_mm_s3: float) -> tuple[s
         converted(text, machine.with_values({"shaping.planner": planner}), jerk_mm_s3)
         for planner in ("look-ahead", "optimal")
     )
-    equal_um = max(LEAST_UM, before.contour_um)
+    equal_um = max(MIN_UM, before.contour_um)
     equal = converted(
         text, machine.with_values({"shaping.planner": "optimal", "tolerance.contour_um": equal_um}), jerk_mm_s3
     )

@@ -49,7 +49,7 @@ def main() -> int:
     ratios: dict[str, list[float]] = {"fine enough": [], **{f"{period} ms": [] for period in _PERIODS_MS}}
     worse: list[list[str]] = []
     shares: list[float] = []
-    least_s: list[float] = []
+    min_s: list[float] = []
     minimax_s: list[float] = []
     choice_s: list[float] = []
     for bands in pairs:
@@ -60,7 +60,7 @@ def main() -> int:
             period_s = fine_s if name == "fine enough" else 1e-3 * int(name.split()[0])
             start = time.process_time()
             found = least_worst(bands, period_s, float(times_s.max()))
-            least_s.append(time.process_time() - start)
+            min_s.append(time.process_time() - start)
             ours = worst_over_bands(found.shaper.times_s, found.shaper.amplitudes, bands, 2001)
             values.append(ours / theirs)
             if ours > theirs:
@@ -81,7 +81,7 @@ def main() -> int:
         end="\n\n",
     )
     times = [
-        _times("least_worst", least_s),
+        _times("minimax", min_s),
         _times("minimax_robust", minimax_s),
         _times("choose_block_period, 2 to 20 ms", choice_s),
     ]

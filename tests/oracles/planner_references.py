@@ -136,10 +136,10 @@ def smoothed(points: Vector) -> Vector:
     return (held[:-2] + 4.0 * held[1:-1] + held[2:]) / 6.0
 
 
-def distance_in_time(one: Vector, other: Vector, most_shift: int = 6) -> float:
+def distance_in_time(one: Vector, other: Vector, max_shift: int = 6) -> float:
     """Largest distance of set-points at the same time, mm, where one begins by so many periods earlier or later."""
     found = []
-    for shift in range(-most_shift, most_shift + 1):
+    for shift in range(-max_shift, max_shift + 1):
         a, b = one[max(0, shift) :], other[max(0, -shift) :]
         count = max(len(a), len(b))
         a, b = (np.vstack([each, np.repeat(each[-1:], count - len(each), axis=0)]) for each in (a, b))

@@ -10,7 +10,7 @@ import pytest
 
 import shapegcode as sg
 from effort import cpu_s
-from shapegcode.checking.check import MOST_FINDINGS
+from shapegcode.checking.check import MAX_FINDINGS
 from shapegcode.checking.runs import block_table
 from shapegcode.cli import main
 from shapegcode.results.json import schema
@@ -211,10 +211,10 @@ def test_in_a_look_ahead_mode_every_function_stops() -> None:
 
 
 def test_long_lists_are_capped_and_counted() -> None:
-    count = MOST_FINDINGS + 500
+    count = MAX_FINDINGS + 500
     check = checked("G1F1000.\n" + "".join(f"X{k % 2 * 10}.\nM8\n" for k in range(1, count + 1)) + "X5.\n")
     assert check.counts_by_code["look_ahead_breaker"] == check.counts.note == count
-    assert len(told(check, "look_ahead_breaker")) == MOST_FINDINGS
+    assert len(told(check, "look_ahead_breaker")) == MAX_FINDINGS
 
 
 # ---- time, memory, line ------------------------------------------------------------------------------------

@@ -76,7 +76,7 @@ def test_what_runs_too_fast_is_a_miss_that_says_where(monkeypatch: pytest.Monkey
         return found
 
     monkeypatch.setattr(write.RegionWriter, "options", unlimited)
-    monkeypatch.setattr(plan, "_LEAST_FEED_RATIO", 1.0)
+    monkeypatch.setattr(plan, "_MIN_FEED_RATIO", 1.0)
     conversion, measured = converted(SMALL_ARCS)
     assert not conversion.ok
     (miss,) = conversion.misses()

@@ -36,15 +36,15 @@ class Judged:
     gain: float
 
 
-def machine_and_control(name: str, time_constant_s: float | None, most_change: float | None) -> tuple[Machine, Control]:
+def machine_and_control(name: str, time_constant_s: float | None, max_change: float | None) -> tuple[Machine, Control]:
     machine = Machine.load(name)
     text = machine.to_toml()
     if time_constant_s is not None:
         old = f"\ntime_constant_s = {machine.controller.time_constant_s}"
         assert old in text
         text = text.replace(old, f"\ntime_constant_s = {time_constant_s}")
-    if most_change is not None:
-        text = text.replace("\ninterval_mm = 0.6", f"\ninterval_mm = 0.6\nmax_change_mm_per_min = {most_change}")
+    if max_change is not None:
+        text = text.replace("\ninterval_mm = 0.6", f"\ninterval_mm = 0.6\nmax_change_mm_per_min = {max_change}")
     machine = Machine.from_toml(text)
     controller = machine.controller
     after = controller.motion == "after_interpolation"
@@ -62,12 +62,12 @@ def machine_and_control(name: str, time_constant_s: float | None, most_change: f
 
 def judged(
     seed: int, kind: str, name: str, limited: str, *, feed: float = 300.0, rev_per_min: float | None = None,
-    raised: float = 0.0, time_constant_s: float | None = None, most_change: float | None = None, step_mm: float = 0.4,
+    raised: float = 0.0, time_constant_s: float | None = None, max_change: float | None = None, step_mm: float = 0.4,
 ) -> Judged:  # fmt: skip
     """Schedules a random program with limits that are a share of what it takes as it is."""
     random = np.random.default_rng(seed)
     case = random_case(random, kind, feed=feed, rev_per_min=rev_per_min)
-    machine, control = machine_and_control(name, time_constant_s, most_change)
+    machine, control = machine_and_control(name, time_constant_s, max_change)
     met = engagements(interpret(case.program), case.blocks, 0.5 * case.mill.diameter, step_mm=step_mm)
     forces = Forces(case.mill)
     mean = limited == "mean"
@@ -82,10 +82,10 @@ def judged(
         Program.from_text(case.program, machine), machine, Tool.from_toml(tool), Stock.from_toml(case.stock_toml)
     )
     verdict = judge(
-        case, result.text.decode(), result.to_dict(), met, forces, control, mean=mean, most_feed=raised or math.inf,
+        case, result.text.decode(), result.to_dict(), met, forces, control, mean=mean, max_feed=raised or math.inf,
         raised=raised > 0.0,
     )  # fmt: skip
-    ceiling = min(raised, control.most_feed) if raised else feed
+    ceiling = min(raised, control.max_feed) if raised else feed
     constant = constant_feed_time(met, forces, case.limits, mean, ceiling)
     return Judged(case, result, verdict, met, forces, constant / verdict.emitted["time"])
 
@@ -116,7 +116,7 @@ QUICK = [
     (20, "outside", "vx500", "resultant_n", 0.6, {}),
     (302, "pocket", "vx500", "deflection_um", 0.7, {"raised": 1460.0}),
     (105, "inside", "kimm004", "torque_nm", 0.4, {}),
-    (27, "island", "vx500", "mean", 0.7, {"most_change": 60.0}),
+    (27, "island", "vx500", "mean", 0.7, {"max_change": 60.0}),
     (209, "inside", "kimm004", "resultant_n", 0.0,
      {"time_constant_s": 0.1, "feed": 2000.0, "rev_per_min": 8000.0}),
 ]  # fmt: skip
@@ -136,7 +136,7 @@ MORE = [
     (9, "inside", "vx500", "power_w", 0.0, {}),
     (17, "inside", "kimm004", "mean", 0.0, {"feed": 600.0}),
     (6, "pocket", "vx500", "power_w", 0.5, {"feed": 600.0}),
-    (302, "pocket", "kimm004", "resultant_n", 0.3, {"most_change": 60.0}),
+    (302, "pocket", "kimm004", "resultant_n", 0.3, {"max_change": 60.0}),
     (106, "pocket", "kimm004", "mean", 0.3, {"raised": 560.0}),
     (204, "outside", "kimm004", "torque_nm", 0.3,
      {"time_constant_s": 0.1, "feed": 2000.0, "rev_per_min": 8000.0, "raised": 4689.0}),

@@ -14,7 +14,7 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 
-LEAST_MM = 0.6
+MIN_MM = 0.6
 MACHINE = Machine.load("vx500")
 
 
@@ -43,7 +43,7 @@ def with_random_feeds(program: Program, seed: int) -> tuple[str, Feeds, list[tup
         unit = MM_PER_INCH * 0.01 if region.exit.units == 20 else 0.1
         divisible = _core.divisible_segments(core, region, options)
         stretches = _core.schedule_feed(
-            path.segment_ends_mm, np.zeros(len(path)), divisible, stations, feeds, LEAST_MM, math.inf, unit
+            path.segment_ends_mm, np.zeros(len(path)), divisible, stations, feeds, MIN_MM, math.inf, unit
         )
         between, text = (
             core.slice(position, region.text_begin),
@@ -111,7 +111,7 @@ def test_other_feeds_leave_the_path_where_it_is(text: str, seed: int) -> None:
             if np.abs(borders - middle).min() > 3.0 * increment:  # of a longer block than the border is rounded by
                 assert move.feed == pytest.approx(stretch.feed_mm_per_min, rel=1e-6)
             original = any(abs(move.length - whole.length) < 2.5 * increment for whole in old)
-            assert move.length >= LEAST_MM - 2.0 * increment or original
+            assert move.length >= MIN_MM - 2.0 * increment or original
     for name, value in before.modal.items():
         if name != "line":
             np.testing.assert_array_equal(value, after.modal[name], err_msg=name)

@@ -10,7 +10,7 @@ import pytest
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 FEW, MANY = 200_000, 400_000  # with fewer, what does not grow is not yet there
-MOST_BYTES_PER_BLOCK = 150
+MAX_BYTES_PER_BLOCK = 150
 
 
 def peak_bytes(folder: Path, lines: int) -> int:
@@ -28,4 +28,4 @@ def peak_bytes(folder: Path, lines: int) -> int:
 @pytest.mark.slow
 def test_a_block_more_costs_little_memory(tmp_path: Path) -> None:
     few, many = peak_bytes(tmp_path, FEW), peak_bytes(tmp_path, MANY)
-    assert (many - few) / (MANY - FEW) <= MOST_BYTES_PER_BLOCK
+    assert (many - few) / (MANY - FEW) <= MAX_BYTES_PER_BLOCK

@@ -293,7 +293,7 @@ def test_tracks_refuse_what_they_cannot_do() -> None:
         (ArgumentError, 2, (400.0, 0.0), {}, "must be finite and ascend"),
         (ArgumentError, 1, (0.0, 400.0), {}, "can follow one axis"),
         (ArgumentError, 2, (0.0, 400.0), {"residual_limit": 0.0}, "must be above 0"),
-        (DesignError, 2, (0.0, 400.0), {"residual_limit": 1e-4, "most_nodes": 4}, "more than 4 are not tried"),
+        (DesignError, 2, (0.0, 400.0), {"residual_limit": 1e-4, "max_nodes": 4}, "more than 4 are not tried"),
         (DesignError, 2, (0.0, 400.0), {"max_duration_s": 0.006}, "no non-negative design within"),
     ):
         with pytest.raises(error, match=said):

@@ -30,7 +30,7 @@ def test_the_spectrum_is_welchs() -> None:
     spectrum = AccelerationSpectrum(period_s)
     for piece in np.array_split(samples, [1, 700, 5000, 5003]):
         spectrum.add(piece)
-    lines = spectrum.lines("original", most_hz=100.0)
+    lines = spectrum.lines("original", max_hz=100.0)
     assert [line.axis for line in lines] == ["x", "y"]
     for rank, line in enumerate(lines):
         frequency, density = signal.welch(

@@ -34,7 +34,7 @@ def worst(shaper: Shaper, bands: Sequence[ModeBand]) -> float:
     return worst_over_bands(shaper.times_s, shaper.amplitudes, bands, 4001)
 
 
-def least_possible(bands: Sequence[ModeBand], period_s: float, last: int) -> float:
+def min_possible(bands: Sequence[ModeBand], period_s: float, last: int) -> float:
     """Bound that no non-negative design of this many periods beats: a dual solution, checked by hand.
 
     Any weights (sum 1) on frequencies and directions turn the largest |R| into a weighted sum of Re(e^{-ja} R), which
@@ -72,15 +72,15 @@ def least_possible(bands: Sequence[ModeBand], period_s: float, last: int) -> flo
 )
 def test_least_worst_reaches_what_a_dual_solution_allows(bands: Sequence[ModeBand], period_s: float, last: int) -> None:
     found = least_worst(bands, period_s, last * period_s)
-    bound = least_possible(bands, period_s, last)
+    bound = min_possible(bands, period_s, last)
     assert bound > 1e-3
     assert found.shaper.duration_s == pytest.approx(last * period_s)
     assert found.shaper.amplitudes.min() > 0.0
     # 64 directions and 61 frequencies miss at most 0.2 % of the optimum, the design itself 0.1 %
     assert bound <= found.worst_residual * (1.0 + 1e-6) <= bound * 1.003
-    assert found.least_possible <= bound * 1.003
+    assert found.min_possible <= bound * 1.003
     assert worst(found.shaper, bands) == pytest.approx(found.worst_residual, rel=2e-4)
-    assert found.worst_residual <= (1.0 + 1.5e-3) * found.least_possible
+    assert found.worst_residual <= (1.0 + 1.5e-3) * found.min_possible
 
 
 def test_undamped_optimum_is_that_of_a_real_program() -> None:
@@ -103,8 +103,8 @@ def test_minimax_is_the_shortest_below_the_limit(period_s: float) -> None:
     found = minimax_robust(PAPER_BANDS, period_s, vibration_limit=0.03)
     last = round(found.shaper.duration_s / period_s)
     assert worst(found.shaper, PAPER_BANDS) <= found.worst_residual <= 0.03
-    assert least_possible(PAPER_BANDS, period_s, last - 1) > 0.03
-    assert least_possible(PAPER_BANDS, period_s, last) <= 0.03
+    assert min_possible(PAPER_BANDS, period_s, last - 1) > 0.03
+    assert min_possible(PAPER_BANDS, period_s, last) <= 0.03
     assert np.abs(found.shaper.times_s / period_s - np.round(found.shaper.times_s / period_s)).max() < 1e-9
 
 
@@ -215,9 +215,9 @@ def test_refusal_shows_the_nearest() -> None:
     match = re.search(
         r"the longest allowed shaper reaches ([\d.]+) %; (\d+) ms suffices; a period of ([\d.]+) ms reaches", text
     )
-    assert float(match[1]) == pytest.approx(100.0 * least_possible(PAPER_BANDS, 0.005, 4), rel=0.005)
-    assert least_possible(PAPER_BANDS, 0.005, round(int(match[2]) / 5)) <= 0.01
-    assert least_possible(PAPER_BANDS, 0.005, round(int(match[2]) / 5) - 2) > 0.01
+    assert float(match[1]) == pytest.approx(100.0 * min_possible(PAPER_BANDS, 0.005, 4), rel=0.005)
+    assert min_possible(PAPER_BANDS, 0.005, round(int(match[2]) / 5)) <= 0.01
+    assert min_possible(PAPER_BANDS, 0.005, round(int(match[2]) / 5) - 2) > 0.01
     with pytest.raises(DesignError, match=r"40 ms do not; .* reaches"):
         minimax_robust(PAPER_BANDS, 0.005, vibration_limit=0.0001, max_duration_s=0.01)
 

@@ -415,7 +415,7 @@ def test_envelope_is_that_of_all_samples_at_once() -> None:
     assert len(low) * size >= len(values)
 
 
-def most_memory_mb(folder: Path, turns: int) -> float:
+def max_memory_mb(folder: Path, turns: int) -> float:
     """Largest resident size of a process that writes the motion of so many squares of 24 s each."""
     square = "G01 X20. F200.\nY20.\nX0.\nY0.\n"
     (folder / "part.nc").write_text("%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\n" + square * turns + "M30\n%\n")
@@ -430,9 +430,9 @@ def most_memory_mb(folder: Path, turns: int) -> float:
 
 @pytest.mark.slow
 def test_memory_does_not_grow_with_the_length(folder: Path) -> None:
-    short = most_memory_mb(folder, 10)
+    short = max_memory_mb(folder, 10)
     size = (folder / "m.npz").stat().st_size
-    long = most_memory_mb(folder, 60)
+    long = max_memory_mb(folder, 60)
     grown = (folder / "m.npz").stat().st_size - size
     assert grown > 80e6
     assert long < short + 15.0

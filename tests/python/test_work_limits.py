@@ -190,7 +190,7 @@ def test_what_a_conversion_would_write_counts_too(tmp_path: Path, monkeypatch: p
 def test_a_region_too_long_for_one_piece_keeps_its_text_and_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     from shapegcode.conversion import whole_text
 
-    monkeypatch.setattr(whole_text, "_MOST_PERIODS", 1000)
+    monkeypatch.setattr(whole_text, "_MAX_PERIODS", 1000)
     machine = sg.Machine.load("vx500")
     text = f"{HEAD}G01 X200. F2000\nY100.\nX0\nG00 Z50.\nX0 Y0\nG01 X10. F2000\nY20.\n{END}"
     converted = sg.convert(sg.Program.from_text(text, machine), machine, shape_all=True)

@@ -309,7 +309,7 @@ def test_exit_code_and_table_follow_the_worst_case(tmp_path: Path) -> None:
         assert done.returncode == code
         out = done.stdout
         report = json.loads((tmp_path / "report.json").read_text())
-        (line,) = (line for line in out.splitlines() if "<- worst" in line)
+        (line,) = (line for line in out.splitlines() if "← decides" in line)
         assert line.startswith(report["worst_case"]["name"])
         assert ("OUT" in line) == bool(code)
     assert "(out)" in out and "(within)" in out
@@ -433,7 +433,7 @@ def test_what_has_to_be_measured_depends_on_the_target() -> None:
 def test_table_shows_what_only_stands_beside_in_brackets(judged: Judged) -> None:
     (table,) = (each for each in judged.conversion.tables() if each.title.startswith("operating conditions"))
     lines = str(table).splitlines()
-    assert sum("<- worst" in line for line in lines) == 1
+    assert sum("← decides" in line for line in lines) == 1
     rows = {case.name: line for case in judged.conversion.cases for line in lines if case.name in line}
     assert "(out)" in rows["underrun 20 ms"]
     assert "within" in rows["all modes low"] and "(" not in rows["all modes low"]

@@ -25,10 +25,10 @@ def read_list() -> set[str]:
 
 def main() -> None:
     """Add what a log says."""
-    least_s = float(sys.argv[2]) if len(sys.argv) > 2 else 1.0
+    min_s = float(sys.argv[2]) if len(sys.argv) > 2 else 1.0
     found = read_list()
     for line in Path(sys.argv[1]).read_text().splitlines():
-        if (one := re.fullmatch(r"(\d+\.\d+)s call +tests/python/(\S.*?) *", line)) and float(one[1]) >= least_s:
+        if (one := re.fullmatch(r"(\d+\.\d+)s call +tests/python/(\S.*?) *", line)) and float(one[1]) >= min_s:
             found.add(one[2])
     LIST.write_text(HEAD + "".join(f"{name}\n" for name in sorted(found)))
 

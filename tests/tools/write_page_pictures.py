@@ -21,7 +21,7 @@ sys.path.insert(0, str(ROOT / "tests" / "python"))
 from browser import SEEN, Browser, chromium  # noqa: E402
 
 FOLDER = ROOT / "docs" / "images"
-MOST_BYTES = 150_000
+MAX_BYTES = 150_000
 
 
 def write(browser: Browser, name: str, box: dict[str, float]) -> None:
@@ -32,7 +32,7 @@ def write(browser: Browser, name: str, box: dict[str, float]) -> None:
     for colours in (256, 128, 64, 32):
         stream = io.BytesIO()
         picture.quantize(colours, dither=Image.Dither.NONE).save(stream, format="png", optimize=True)
-        if len(stream.getvalue()) <= MOST_BYTES:
+        if len(stream.getvalue()) <= MAX_BYTES:
             break
     (FOLDER / f"page-{name}.png").write_bytes(stream.getvalue())
     print(f"page-{name}.png: {len(stream.getvalue())} bytes, {colours} colours")

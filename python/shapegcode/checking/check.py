@@ -21,7 +21,7 @@ from shapegcode.program.computer import require_memory_for_lines
 from shapegcode.program.reading import given_text, index_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, no_room
 
-MOST_FINDINGS = 1000  # listed findings of one code; all are counted
+MAX_FINDINGS = 1000  # listed findings of one code; all are counted
 
 _SEVERITIES = ("alarm", "warning", "note")
 _MACRO_CONTROL = re.compile(r"(?<![A-Z])(IF|GOTO|WHILE)(?=\s*[\[#\d.])|(?<![A-Z])(DO|END)(?=\s*\d)")
@@ -163,7 +163,7 @@ def _listed(found: Iterable[Finding], source: str) -> tuple[Finding, ...]:
     listed, seen = [], Counter[str]()
     for finding in sorted(found, key=rank):
         seen[finding.code] += 1
-        if seen[finding.code] <= MOST_FINDINGS:
+        if seen[finding.code] <= MAX_FINDINGS:
             listed.append(finding)
     return tuple(listed)
 
@@ -234,7 +234,7 @@ def _feed_findings(program: Program, machine: Machine, table: BlockTable) -> Ite
         message = (
             f"{clamped.feed_mm_per_min:.10g} mm/min exceed the axis limits in {clamped.blocks} "
             f"block{'' if clamped.blocks == 1 else 's'} from here on: the control reduces it to "
-            f"{clamped.least_mm_per_min:.0f} mm/min"
+            f"{clamped.min_mm_per_min:.0f} mm/min"
         )
         yield _at(program, "warning", "axis_feed", clamped.first_line, message)
     least = machine.controller.minimum_feed_mm_per_min
@@ -278,7 +278,7 @@ def _short_blocks(program: Program, machine: Machine, table: BlockTable) -> Shor
         region_count=len(short),
         regions=tuple(
             ShortRun(_lines(program, run), run.short_blocks, run.blocks, run.shortest_s, run.time_s, run.taken_s)
-            for run in short[:MOST_FINDINGS]
+            for run in short[:MAX_FINDINGS]
         ),
     )
 
@@ -305,7 +305,7 @@ def _serial_line(program: Program, machine: Machine, runs: Iterable[CuttingRun])
                 needed_characters_per_s=run.needed_per_s,
                 factor=run.needed_per_s / carried,
             )
-            for run in starved[:MOST_FINDINGS]
+            for run in starved[:MAX_FINDINGS]
         ),
     )
 

@@ -84,7 +84,7 @@ class ShortBlocks:
     taken_s: float  # the same with at least the block time for each
     first_places: tuple[str, ...]  # `file:line` of the first short blocks
     region_count: int  # number of sequences with short blocks, listed or not
-    regions: tuple[ShortRun, ...]  # these sequences, at most `MOST_FINDINGS`
+    regions: tuple[ShortRun, ...]  # these sequences, at most `MAX_FINDINGS`
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class SerialLine:
     needed_characters_per_s: float  # required by the worst sequence
     factor: float  # their ratio; above 1 that sequence takes longer by this factor
     region_count: int  # number of sequences with underruns, listed or not
-    regions: tuple[StarvedRun, ...]  # these sequences, at most `MOST_FINDINGS`
+    regions: tuple[StarvedRun, ...]  # these sequences, at most `MAX_FINDINGS`
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -119,7 +119,7 @@ class Check(Result):
     Attributes:
         program: name of the program.
         machine: name of the machine.
-        findings: sorted by position, at most `MOST_FINDINGS` of each code.
+        findings: sorted by position, at most `MAX_FINDINGS` of each code.
         counts: number of findings by severity.
         counts_by_code: number of findings by code.
         size_bytes: size of the whole file, or of the requested program of a multi-program file.

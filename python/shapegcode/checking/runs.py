@@ -69,7 +69,7 @@ class ClampedFeed:
     feed_mm_per_min: float  # as programmed
     first_line: int  # line of its first slowed block
     blocks: int  # number of slowed blocks
-    least_mm_per_min: float  # feed along the path in the slowest of them
+    min_mm_per_min: float  # feed along the path in the slowest of them
 
 
 @dataclass(frozen=True)
@@ -151,12 +151,12 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
 
 
 def _shaper_s(program: Program, machine: Machine) -> float:
-    """Window of the busiest rate: shaper duration in the header of a shaped program, s, at least the block time."""
-    least_s = machine.controller.block_time_s
+    """Window for the busiest rate, s: shaper duration in a shaped program's header, at least the block time."""
+    min_s = machine.controller.block_time_s
     try:
-        return max(float(program.stamp.shaper_ms) * 1e-3, least_s) if program.stamp else least_s
+        return max(float(program.stamp.shaper_ms) * 1e-3, min_s) if program.stamp else min_s
     except ValueError:
-        return least_s
+        return min_s
 
 
 def _clamped_feeds(line: npt.NDArray[np.int64], feed: FloatArray, ratio: FloatArray) -> Iterator[ClampedFeed]:

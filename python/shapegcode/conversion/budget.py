@@ -112,7 +112,7 @@ class BudgetOutcome(OldNames):
 
 
 # Lowest expected ratio of the blocks per period of a section on a longer block period to those before.
-_LEAST_FILLED = 0.5
+_MIN_FILLED = 0.5
 _LINES_NAMED = 5  # regions listed in the warning
 
 
@@ -149,7 +149,7 @@ class Spending:
         while self._factors(best_loads) or periods * self._period_s < best.shaper.duration_s:
             # After the first period without excess, shorter shapers are still tried; none is shorter than a period.
             factors = self._factors(loads)
-            periods = max(periods + 1, math.floor(measured * min(factors, default=1.0) * _LEAST_FILLED))
+            periods = max(periods + 1, math.floor(measured * min(factors, default=1.0) * _MIN_FILLED))
             if periods > self._max_periods:
                 break
             try:

@@ -174,7 +174,7 @@ def _cuts(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> tupl
         read = region.text_end - region.text_begin
         gained = plan.gains_um.get(index)
         if gained is None:
-            gained = judging.most_to_gain_um(plan.originals[index].result())
+            gained = judging.max_gain_um(plan.originals[index].result())
         residual, reason, is_shaped = cut.residual_vibration_um, plan.reasons[index], index in sizes
         rows.append(
             tables.CutOutcome(

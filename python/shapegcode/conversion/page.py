@@ -26,7 +26,7 @@ N = TypeVar("N", int, float)
 
 _LONGEST_REGIONS = 8
 _SHOWN_CUTS = 12
-_LEAST_SHOWN_UM = 0.05
+_MIN_SHOWN_UM = 0.05
 _SHOWN_KEYS = ("axes.", "tolerance.", "verdict.")
 _RUN_FIRST = ("first run",)
 
@@ -118,7 +118,7 @@ def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[mo
 def _figures(conversion: Conversion) -> Iterator[model.Figure]:
     residual = conversion.residual_vibration_um
     for axis in "xyz":
-        if max(residual.original[axis], residual.emitted[axis]) >= _LEAST_SHOWN_UM:
+        if max(residual.original[axis], residual.emitted[axis]) >= _MIN_SHOWN_UM:
             yield model.Figure(
                 f"residual vibration {axis.upper()}", "µm", residual.original[axis], residual.emitted[axis],
                 limit=conversion.residual_limit_um(axis),
@@ -154,7 +154,7 @@ def _further(conversion: Conversion) -> Iterator[model.NextStep]:
 
 
 def _cases(conversion: Conversion) -> model.Section:
-    axes = [axis for axis in "xyz" if any(case.residual_um[axis] >= _LEAST_SHOWN_UM for case in conversion.cases)]
+    axes = [axis for axis in "xyz" if any(case.residual_um[axis] >= _MIN_SHOWN_UM for case in conversion.cases)]
     columns = (*(f"residual {axis.upper()} µm" for axis in axes), "contour, command µm", "contour, machine table µm",
                "worst figure, % of its limit")  # fmt: skip
     rows = tuple(_case(rank, case, axes, conversion) for rank, case in enumerate(conversion.cases))

@@ -22,13 +22,13 @@ from shapegcode.program import Program
 from shapegcode.results.table import Column, Table
 from shapegcode.shaping.grid import Grid, choose_grid
 from shapegcode.verdict.figures import Placed, RegionVerdict
-from shapegcode.verdict.judge import Judge, RegionFigures, most_to_gain_um, rapid_vibration_um, simulate_unchanged
+from shapegcode.verdict.judge import Judge, RegionFigures, max_gain_um, rapid_vibration_um, simulate_unchanged
 
 if TYPE_CHECKING:
     from shapegcode.conversion.rapids.shape import ShapedRapids
 
 _SLOWER = 0.98  # ratio of the lowered feed to the one that would just suffice
-_LEAST_FEED_RATIO = 0.5  # of the programmed feed: below it, a too high speed has other causes
+_MIN_FEED_RATIO = 0.5  # of the programmed feed: below it, a too high speed has other causes
 _HELPED = 0.98  # ratio of errors: a tighter plan with less improvement is reverted
 _PRICE_MARGIN = 0.995  # ratio of the permitted time used for a plan
 _LOOSER = 1.05  # smallest factor on the deviation after a plan that was still too expensive
@@ -91,8 +91,8 @@ class Aims:
         for place, region in zip(written.placed, figures, strict=True):
             excess = region.feed_excess
             index, ratio = self.index(place.region), 0.0 if excess is None else excess.ratio
-            if ratio > limit and self.feed_ratio[index] > _LEAST_FEED_RATIO:
-                self.feed_ratio[index] = max(_LEAST_FEED_RATIO, self.feed_ratio[index] * _SLOWER * limit / ratio)
+            if ratio > limit and self.feed_ratio[index] > _MIN_FEED_RATIO:
+                self.feed_ratio[index] = max(_MIN_FEED_RATIO, self.feed_ratio[index] * _SLOWER * limit / ratio)
                 slower = True
         return slower
 
@@ -139,8 +139,8 @@ class Aims:
             if found_um is not None and attempts_left > 0:
                 self._loosen(index, found_um if attempts_left > 1 else self._curve_of(index).loosest_um)
             elif keepable(index):
-                least_s = self.emitted_s[index] if found_um is not None else self._planned_s(index, math.inf)
-                cost = (least_s / self.original_s[index] - 1.0) * 100.0
+                min_s = self.emitted_s[index] if found_um is not None else self._planned_s(index, math.inf)
+                cost = (min_s / self.original_s[index] - 1.0) * 100.0
                 self.reasons[index] = (
                     f"shaping it takes {cost:+.0f} % time at any tolerance, price {percent:g} % "
                     "(price.cut_time_percent)"
@@ -232,10 +232,10 @@ class Aims:
     def _planned_s(self, index: int, allowed_um: float) -> float:
         """Time of a cut planned for a deviation, s; its cost of slowing is scaled to that of the blocks as written."""
         curve, blocks_s = self._curve_of(index), self._blocks_s[index]
-        least_s, now_s, then_s = (curve.time_s(um) for um in (math.inf, self.allowed_um[index], allowed_um))
-        ratio = max(0.0, blocks_s - least_s) / (now_s - least_s) if now_s > least_s else 1.0
-        slowest_s = least_s if now_s > least_s else max(least_s, blocks_s)
-        return self.emitted_s[index] - blocks_s + slowest_s + ratio * (then_s - least_s)
+        min_s, now_s, then_s = (curve.time_s(um) for um in (math.inf, self.allowed_um[index], allowed_um))
+        ratio = max(0.0, blocks_s - min_s) / (now_s - min_s) if now_s > min_s else 1.0
+        slowest_s = min_s if now_s > min_s else max(min_s, blocks_s)
+        return self.emitted_s[index] - blocks_s + slowest_s + ratio * (then_s - min_s)
 
     def _loosen(self, index: int, allowed_um: float) -> None:
         self.allowed_um[index] = max(
@@ -533,7 +533,7 @@ class ConversionPlan:
         least = self.machine.shaping.least_gain_um
         for index, (reason, original) in enumerate(zip(self.reasons, self.originals, strict=True)):
             if not reason and self.is_keepable(index):
-                most = most_to_gain_um(original.result())
+                most = max_gain_um(original.result())
                 if most < least:
                     self.leave(index, f"nothing to gain: {most:.1f} µm", most)
         if self.original_within:

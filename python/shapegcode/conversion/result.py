@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from shapegcode.results.page.scene import Scene
 
 _VIBRATIONS = {"residual_vibration_um": "residual vibration", "peak_vibration_um": "peak vibration"}
-_LEAST_SHOWN_UM = 0.05
+_MIN_SHOWN_UM = 0.05
 _DEVIATIONS = {"max": "largest", "rms": "RMS", "gouge": "gouge", "excess": "excess"}
 
 
@@ -241,8 +241,8 @@ class Conversion(ProgramFigures, Result):
                 f"{target.original.max:.1f} µm; {self._unchanged}"
             )
         change = change_percent(self.cycle_time_s.original, self.cycle_time_s.emitted)
-        worst_stay = target.original.max - target.emitted.max < _LEAST_SHOWN_UM and (
-            vibration.original[axis] - vibration.emitted[axis] < _LEAST_SHOWN_UM
+        worst_stay = target.original.max - target.emitted.max < _MIN_SHOWN_UM and (
+            vibration.original[axis] - vibration.emitted[axis] < _MIN_SHOWN_UM
         )
         best = max(self.cuts, key=lambda cut: cut.gain_um if cut.is_shaped else -1.0)
         beside = ""
@@ -362,7 +362,7 @@ class Conversion(ProgramFigures, Result):
         yield [
             BeforeAfter(f"vibration after rapids {axis.upper()}", "µm", between.original[axis], between.emitted[axis])
             for axis in "xyz"
-            if between.original[axis] >= _LEAST_SHOWN_UM or between.emitted[axis] >= _LEAST_SHOWN_UM
+            if between.original[axis] >= _MIN_SHOWN_UM or between.emitted[axis] >= _MIN_SHOWN_UM
         ]
 
     def residual_limit_um(self, axis: str) -> float | None:

@@ -22,8 +22,8 @@ from shapegcode.settings.keys import KeyValue
 from shapegcode.verdict.figures import Case, CaseFigures, Placed, case_figures, judge_region, unbroken
 from shapegcode.verdict.judge import Judge, RegionFigures
 
-_LEAST_SHARE = 0.01  # of a limit: smaller effects do not matter
-_MOST_SHOWN = 8
+_MIN_SHARE = 0.01  # of a limit: smaller effects do not matter
+_MAX_SHOWN = 8
 _FREE_S = 60.0  # total duration of motion that may always be simulated with contour error
 _FULL_RUNS = 2  # simulations of a whole region; the verdict needs about twice as many
 _FILTER_S = 0.024  # typical time constant (parameter 1769 or 1622) of a machining centre, if the file has none
@@ -158,10 +158,10 @@ def _ranked(rows: Sequence[Sensitivity]) -> tuple[Sensitivity, ...]:
     """The worst trial of each key, largest effect first; small effects only of axes with unknown modes."""
     worst: dict[str, Sensitivity] = {}
     for row in rows:
-        matters = row.share >= _LEAST_SHARE or row.key.endswith(".modes")
+        matters = row.share >= _MIN_SHARE or row.key.endswith(".modes")
         if matters and (row.key not in worst or row.share > worst[row.key].share):
             worst[row.key] = row
-    return tuple(sorted(worst.values(), key=lambda row: -row.share)[:_MOST_SHOWN])
+    return tuple(sorted(worst.values(), key=lambda row: -row.share)[:_MAX_SHOWN])
 
 
 def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
@@ -273,7 +273,7 @@ def _key_of(case: Case) -> tuple[str, str]:
 
 
 # Percentages of smaller values would compare round-off errors.
-_LEAST_COMPARED_UM = 1.0
+_MIN_COMPARED_UM = 1.0
 
 
 def change_percent(original: float, emitted: float) -> float:
@@ -300,7 +300,7 @@ class BeforeAfter:
     @property
     def change(self) -> str:
         """Change from original to emitted; empty if the original is missing or too small."""
-        least = _LEAST_COMPARED_UM if self.unit == "µm" else 0.5 * 10.0**-self.digits
+        least = _MIN_COMPARED_UM if self.unit == "µm" else 0.5 * 10.0**-self.digits
         if self.original is None or abs(self.original) < least:
             return ""
         return percent(change_percent(self.original, self.emitted))

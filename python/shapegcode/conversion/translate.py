@@ -380,7 +380,7 @@ class _Translator:
         return lines
 
     def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
-        """Words of an original that was written for the output control, in place of the FANUC words read for them."""
+        """The original's own words by the FANUC words read for them, if it was written for the output control."""
         held = dict(words)
         found = {}
         if (tool := self._names.get(f"T{held.get('T', '')}")) is not None:

@@ -41,14 +41,14 @@ Step = Callable[[float, int], None]
 Aim = tuple[float, float]  # tolerance, µm, and feed ratio of a shaped region
 
 _WAITING = 2  # running or finished parts per core that were not fetched: bounds the memory
-_MOST_PERIODS = 10_000_000  # of a region: fits into half a gigabyte
+_MAX_PERIODS = 10_000_000  # of a region: fits into half a gigabyte
 
 
 def why_kept(program: Program, region: _core.Region, machine: Machine, grid: Grid) -> str:
     """Reason why a region cannot be written as shaped blocks; empty if it can."""
     if reason := why_off_grid(program, region, machine):
         return reason
-    longest_s = _MOST_PERIODS * grid.block_period_s
+    longest_s = _MAX_PERIODS * grid.block_period_s
     time_s = region.path.programmed_time_s
     if time_s > longest_s:
         return f"{time_s:.0f} s of cutting without a stop exceed what can be shaped at a time ({longest_s:.0f} s)"

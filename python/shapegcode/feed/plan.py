@@ -143,7 +143,7 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
     limit = np.where(frozen[segment], programmed[segment], limit)
     holds[frozen[segment]] = KEPT
     # Plan, simulate the travel, and slow down earlier or more where it is still too fast.
-    most_change = math.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min
+    max_change = math.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min
     floor = np.minimum(limit, lowest)
     planned = np.maximum(_stepped(limit, programmed[segment]), floor)
     before = np.full(len(planned), motion.reach_s + window_s)
@@ -153,7 +153,7 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
         feeds = _core.look_ahead_on_load(stations_mm, planned, load, before, behind)
         stretches = _core.schedule_feed(
             path.segment_ends_mm, np.where(frozen, programmed, 0.0), divisible, stations_mm, feeds, control.interval_mm,
-            most_change, feed_unit_mm_per_min,
+            max_change, feed_unit_mm_per_min,
         )  # fmt: skip
         run = motion.travel(_core.with_feeds(path, stretches), path, stations_mm, window_s).feed_mm_per_min
         over = ~frozen[segment] & (run > load * (1.0 + _TOO_FAST))

@@ -27,7 +27,7 @@ _WIDTHS, _NEAREST = 8.0, 0.08  # fitted around a mode: half-power widths; ratio 
 _LOCAL_WIDTHS, _LOCAL_LINES = 2.0, 4  # range around a mode for its residual
 _HITS_TO_SCATTER = 5  # fewer impacts do not determine their scatter
 _NO_VIBRATION = 0.3  # damping ratio above which a pole is background
-LEAST_MOVE = 0.01  # relative to the motion along its own axis; smaller motion is not written, its phase not reported
+MIN_MOVE = 0.01  # relative to the motion along its own axis; smaller motion is not written, its phase not reported
 _OUT_OF_PHASE = 1.0  # tan of the phase angle beyond which two axes do not move in phase
 
 
@@ -91,7 +91,7 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
         moves: dict[str, Estimate | None] = dict.fromkeys(_AXES) | {found.axis: Estimate(1.0, 1.0, 1.0)}
         for letter, parts in along.items():
             ratio, moves[letter] = in_phase = _ratio(own, parts, index)
-            out_of_phase = abs(ratio.imag) > max(_OUT_OF_PHASE * abs(ratio.real), LEAST_MOVE)
+            out_of_phase = abs(ratio.imag) > max(_OUT_OF_PHASE * abs(ratio.real), MIN_MOVE)
             if out_of_phase and _is_significant(in_phase[1], abs(ratio)):
                 notes.append(
                     f"{mode.frequency_hz.value:.4g} Hz: {letter.upper()} moves {abs(ratio):.3g} times as far, "

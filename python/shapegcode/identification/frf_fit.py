@@ -289,7 +289,7 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
-    """Weight lines by the noise in the model residual: like the assumed noise, like the model, or half of each."""
+    """Weight lines by the residual's noise: in proportion to the assumed noise or the model, or half of each."""
     left = np.abs(lines.response - model) ** 2
     # Lines without a mode nearby have no model: they keep their assumed noise.
     left = np.where(left > 0.0, left, np.log(2.0) / lines.weight**2)

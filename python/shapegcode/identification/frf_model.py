@@ -204,7 +204,7 @@ _QUIETEST = 1e-6  # least noise of a sensor, relative to the largest line
 _LATE = 0.4  # a steady disturbance is searched after this fraction of the record
 _STANDS_OUT = 8.0  # times the median of the spectrum there
 _STEADY = (0.8, 1.25)  # range of the second half's amplitude over that of the first half, both after `_LATE`
-_MOST_STEADY = 12
+_MAX_STEADY = 12
 
 
 def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, list[float]]:
@@ -227,7 +227,7 @@ def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, lis
         turn = np.angle(spectra[1][top] / spectra[0][top] * np.exp(-2j * np.pi * top)) / (2.0 * np.pi)
         if abs(turn) < 0.45:
             found.append((float(height[top]), float((top + turn) * step)))
-    chosen = [hertz for _, hertz in sorted(found, reverse=True)[:_MOST_STEADY]]
+    chosen = [hertz for _, hertz in sorted(found, reverse=True)[:_MAX_STEADY]]
     if not chosen:
         return np.zeros(samples), []
     time_s = np.arange(samples) * period_s

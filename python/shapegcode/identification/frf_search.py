@@ -484,7 +484,7 @@ def _correlated(columns: ComplexArray, correlation: ComplexArray) -> ComplexArra
 # --- poles by poly-reference least squares in the frequency domain (pLSCF), band by band -----------------------------
 
 _CIRCLE = 0.85  # fraction of the unit circle onto which a band is mapped
-_LINES_PER_ORDER, _MAX_ORDER, _MIN_ORDER, _MOST_POLE_DAMPING = 4, 24, 2, 0.3
+_LINES_PER_ORDER, _MAX_ORDER, _MIN_ORDER, _MAX_POLE_DAMPING = 4, 24, 2, 0.3
 
 
 def band_poles(parts: Sequence[Lines], low: float, high: float) -> list[Pole]:
@@ -527,6 +527,6 @@ def band_poles(parts: Sequence[Lines], low: float, high: float) -> list[Pole]:
         for pole in exponent + 1j * low:
             omega = float(np.abs(pole))
             zeta = float(-pole.real / omega)
-            if low <= omega <= high and 0.0 < zeta < _MOST_POLE_DAMPING:
+            if low <= omega <= high and 0.0 < zeta < _MAX_POLE_DAMPING:
                 found.append(Pole(omega, zeta, order))
     return found

@@ -82,7 +82,7 @@ class TapPlan(Result):
 _USUAL_HZ = (20.0, 200.0)  # Typical modes that a machining centre's own motion excites, without a machine file
 _USUAL_DAMPING = 0.02  # Damping ratio if unknown: welded and cast structures with guides have 0.01 to 0.05
 # Modes are searched up to this multiple of the highest known one, and at least up to this many Hz.
-_LOOK_ABOVE, _LOOK_LEAST_HZ = 2.0, 500.0
+_LOOK_ABOVE, _LOOK_MIN_HZ = 2.0, 500.0
 _PULSE_SAMPLES = 10  # Samples in the pulse of the hammer: a half sine of ten is known to a percent
 _FALLEN_TO = 0.01  # The record lasts until the slowest mode has decayed to this ratio
 _PERIODS = 20  # ... and at least this many of its periods
@@ -106,7 +106,7 @@ def _round_up(value: float) -> float:
 def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisRecording:
     """How to record an axis whose modes are known (Hz, damping ratio); without any, for the usual range."""
     known = modes or tuple((frequency, _USUAL_DAMPING) for frequency in _USUAL_HZ)
-    highest = max(_LOOK_LEAST_HZ, _LOOK_ABOVE * max(frequency for frequency, _ in known))
+    highest = max(_LOOK_MIN_HZ, _LOOK_ABOVE * max(frequency for frequency, _ in known))
     pulse = checks.EXCITED_HALF_SINE / highest
     limit, tip = next((limit, name) for limit, name in _TIPS if highest <= limit)
     shortest = checks.EXCITED_HALF_SINE / (limit if math.isfinite(limit) else highest)
@@ -166,7 +166,7 @@ def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
         recordings: tuple[AxisRecording, ...] = (recording_for("X Y Z", ()),)
         about = (
             f"No machine file is given: lengths are for modes from {usual}, the range that a machining centre's own "
-            f"motion excites, rates for modes up to {_LOOK_LEAST_HZ:g} Hz. With -m MACHINE they follow from its "
+            f"motion excites, rates for modes up to {_LOOK_MIN_HZ:g} Hz. With -m MACHINE they follow from its "
             "modes."
         )
     else:
@@ -186,7 +186,7 @@ def tap_plan(machine: Machine | str | Path | None = None) -> TapPlan:
         distances_mm = [max(10.0, 10.0 * math.ceil(2.0 * each / 10.0)) for each in reached]
         about = (
             f"Lengths follow from the modes of the machine file (an axis without modes: {usual}); every axis is "
-            f"measured up to {_LOOK_LEAST_HZ:g} Hz or more, as the file may lack modes."
+            f"measured up to {_LOOK_MIN_HZ:g} Hz or more, as the file may lack modes."
         )
     dwell_s = max(_LONG_STOP_S, 2.0 * max(how.duration_s for how in recordings))
     stops = tuple(

@@ -219,7 +219,7 @@ _MOTION_SHARE = 0.4  # The axis moves if the mean over the slowest mode's period
 _FEWEST_PERIODS = 3.0  # of the strongest frequency in the record
 _STOP_PERIODS, _STOP_FALLS = 3.0, 0.3  # periods of the lowest frequency after a stop; ratio to which the envelope falls
 _LOWEST_HZ = 10.0  # lowest mode in an ordinary run; slower is motion
-_MOST_STOPS = 20
+_MAX_STOPS = 20
 
 
 def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
@@ -354,7 +354,7 @@ def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
         inside = slice(part[0] + round(period), part[1])
         return float(np.sum(slow[inside] ** 2) / np.sum(quiet[inside] ** 2))
 
-    parts = sorted(sorted(parts, key=lambda part: -envelope[part[0]])[:_MOST_STOPS], key=moved)
+    parts = sorted(sorted(parts, key=lambda part: -envelope[part[0]])[:_MAX_STOPS], key=moved)
     names = [f" stop at {record.start_s + begin * record.period_s:.2f} s" for begin, _ in parts]
     return [part_of(record, *part, name) for part, name in zip(parts, names, strict=True)]
 

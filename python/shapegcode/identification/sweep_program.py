@@ -31,12 +31,12 @@ _TRIED = 8, 24  # moves of a trial, and of a longer one
 _LONGEST = 1 << 20
 _ROUNDS = 6
 _OF_STEP = 0.4  # feed over the corner speed difference: a reversal changes the speed by twice the feed; margin 20 %
-_LEAST_AT_ONCE = 100.0  # mm/min; below it moves excite too little, and moves with ramps are used
+_MIN_AT_ONCE = 100.0  # mm/min; below it moves excite too little, and moves with ramps are used
 _SPARE = 1.15  # Margin to the shortest block time, for rounding of moves to increments
 _HALVINGS = 14
 _ENOUGH = 0.98  # of the largest amplitude: a higher feed gains nothing
 _MIN_INCREMENTS = 4  # of the shortest move
-_LEAST_MM_S2 = 20.0  # a sensor of 12 bits and ± 2 g resolves 10 mm/s²
+_MIN_MM_S2 = 20.0  # a sensor of 12 bits and ± 2 g resolves 10 mm/s²
 _LOW_HZ, _HIGH_HZ = 8.0, 200.0
 _MIN_CYCLES = 3.0  # least cycles of the lowest frequency in its rise
 _MIN_BAND = 1.5  # upper end over lower end
@@ -231,11 +231,11 @@ class _Planner:
         if controller.motion == "look_ahead" and controller.corner_rule == "speed_difference":
             # A reversal at this feed needs no ramp: a move takes length/feed whatever the time constants.
             at_once = _OF_STEP * getattr(controller.corner_speed_difference_mm_per_min, axis)
-            if at_once >= _LEAST_AT_ONCE:
+            if at_once >= _MIN_AT_ONCE:
                 self._feed = min(self._feed, at_once)
         self.allowed = self.wanted = share * limits.max_acceleration_mm_s2
         self._block_s = max(controller.block_time_s, 2.0 * controller.interpolation_period_s)
-        self._least_mm = _MIN_INCREMENTS * controller.least_increment_mm
+        self._min_mm = _MIN_INCREMENTS * controller.least_increment_mm
 
     def plan(self, low: float, high: float) -> tuple[list[_Move], str]:
         """Moves from the lowest frequency to the highest reachable one, and its limit."""
@@ -251,12 +251,12 @@ class _Planner:
         found: list[_Move] = []
         for hertz in np.geomspace(low, top, count):
             move, amplitude = self._move(float(hertz))
-            short = move.length_mm < self._least_mm
-            if short or amplitude < _LEAST_MM_S2:
+            short = move.length_mm < self._min_mm
+            if short or amplitude < _MIN_MM_S2:
                 limit = f"at {hertz:.4g} Hz " + (
-                    f"a move would be {1e3 * move.length_mm:.2g} µm, less than {1e3 * self._least_mm:g} µm"
+                    f"a move would be {1e3 * move.length_mm:.2g} µm, less than {1e3 * self._min_mm:g} µm"
                     if short
-                    else f"the control commands only {amplitude:.2g} mm/s², less than {_LEAST_MM_S2:g} mm/s²"
+                    else f"the control commands only {amplitude:.2g} mm/s², less than {_MIN_MM_S2:g} mm/s²"
                 )
                 break
             found.append(move)

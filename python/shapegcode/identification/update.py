@@ -16,7 +16,7 @@ from scipy.optimize import linear_sum_assignment
 from tomlkit.items import AoT, Key, SingleKey, Table
 
 from shapegcode.errors import ArgumentError, MachineError
-from shapegcode.identification.across import LEAST_MOVE, significant_motions
+from shapegcode.identification.across import MIN_MOVE, significant_motions
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, MachineFile
 from shapegcode.machine import Machine, check_axes
 from shapegcode.settings import edit
@@ -378,7 +378,7 @@ class ModeTables:
         values["source"] = self.source, ""
         values = {key: values[key] for key in _KEYS if key in values}
         significant = {
-            letter: each for letter, each in significant_motions(mode).items() if abs(each.value) >= LEAST_MOVE
+            letter: each for letter, each in significant_motions(mode).items() if abs(each.value) >= MIN_MOVE
         }
         if len(significant) > 1:  # motion along other axes is significant
             others = (

@@ -309,7 +309,7 @@ class Controller(TomlTable):
         default=100_000_000,
     )
     max_expansion_moves: Annotated[int, Strict(), Field(ge=1, le=10**9)] = key(
-        "moves that loops, calls and drilling cycles may add to one per line",
+        "moves of loops, calls and drilling cycles beyond one per line",
         unit="moves",
         default=800_000,
     )

@@ -49,7 +49,7 @@ class Dialect:
     feed_decimals: int | None = None  # decimals of F; None: `controller.feed_decimals_mm`
     # largest distance by which the middle of an arc may move to reduce the angle between blocks; 0: none
     smooth_arcs_um: float = 0.0
-    least_block_s: float | None = None  # shortest block of the control; None: not known
+    min_block_s: float | None = None  # shortest block of the control; None: not known
     # lines that switch the feed override off, and on again; empty: none are known
     lock: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
     lock_word: str = ""  # word that switches the override off, written in each shaped block instead of these lines

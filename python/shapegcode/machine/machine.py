@@ -96,7 +96,7 @@ class Machine(TomlTable):
         own, dialect = dialect_of(emission.dialect), f"emission.dialect = {toml(emission.dialect)}"
         if own is None:
             return self
-        shortest = own.least_block_s
+        shortest = own.min_block_s
         if shortest is not None and given_s < shortest * (1 - 1e-9):
             limit = f"must not be below {toml(shortest)} with {dialect}: {own.facts['shortest block'].text}"
             raise KeyProblem("controller.block_time_s", given_s, limit)

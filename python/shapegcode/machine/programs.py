@@ -408,7 +408,7 @@ class Tolerance(TomlTable):
     )
     feed_excess_ratio: Annotated[NonNegative, Field(ge=0.01, le=10)] = key(
         "ratio by which the set-points may be faster along the path than the programmed feed at the same position, "
-        "averaged over one, four and sixteen shortest blocks; two increments are subtracted, since rounding may "
+        "averaged over 1, 4 and 16 times the shortest block; two increments are subtracted, since rounding may "
         "lengthen a block by that much. Contour compensation keeps to it, and needs at least 0.01",
         default=0.05,
     )

@@ -142,7 +142,7 @@ def _limit(value: float | None) -> float:
 BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)  # both rules of block timing
 PLANTS = ("modal", "feed-drive")  # ideal servo followed by modes; motor, ball screw and table with their servo loops
 _DRIVE_REST_S = 0.5  # time after a stop in which the residual vibration of feed drives is evaluated
-_LEAST_DECAY_PER_S = 0.01  # below it a mode counts as undamped
+_MIN_DECAY_PER_S = 0.01  # below it a mode counts as undamped
 
 
 @dataclass(frozen=True)
@@ -277,7 +277,7 @@ class MachineModel:
     def vibration_memory_s(self) -> float:
         """Time in which a vibration decays to a millionth, s; 0 if a mode is undamped, or if there is none."""
         slowest = self.slowest_decay_per_s
-        return math.log(1e6) / slowest if _LEAST_DECAY_PER_S < slowest < math.inf else 0.0
+        return math.log(1e6) / slowest if _MIN_DECAY_PER_S < slowest < math.inf else 0.0
 
     @cached_property
     def bounds_deviations(self) -> bool:
@@ -399,7 +399,7 @@ class MachineModel:
 
 RAMP_FREQUENCY_HZ = 10_000.0  # no emitted block is a ramp at this frequency
 _CORNER_RAD = 0.1  # from this turn of the path LinuxCNC blends or stops
-_MOST_KINK_RATIO = 0.7  # LinuxCNC reduces larger values to 0.7071
+_MAX_KINK_RATIO = 0.7  # LinuxCNC reduces larger values to 0.7071
 _KINK_MARGIN = 1.25
 _STEPS = 20.0  # a kink ratio is rounded up to a multiple of 1/20
 
@@ -416,8 +416,8 @@ def ini_lines(
     blocks = sum(each.segments for each in found)
     if kinks := sum(each.kinks for each in found):
         worst = max(found, key=lambda each: each.largest_ratio)
-        ratio = min(_MOST_KINK_RATIO, math.ceil(worst.largest_ratio * _KINK_MARGIN * _STEPS) / _STEPS)
-        more = "" if worst.largest_ratio < _MOST_KINK_RATIO else ", the highest accepted value"
+        ratio = min(_MAX_KINK_RATIO, math.ceil(worst.largest_ratio * _KINK_MARGIN * _STEPS) / _STEPS)
+        more = "" if worst.largest_ratio < _MAX_KINK_RATIO else ", the highest accepted value"
         yield "kink_ratio", worst.line, (
             f"LinuxCNC slows where {kinks} of {blocks} shaped blocks meet: {worst.speed_mm_per_s:.0f} mm/s turn by "
             f"{worst.angle_rad * 1e3:.2f} mrad within {rules.period_s * 1e3:g} ms, which takes "

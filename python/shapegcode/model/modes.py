@@ -155,7 +155,7 @@ def region_offset(region: _core.Region, machine: Machine) -> Offset:
 
 
 def machine_warnings(machine: Machine) -> list[str]:
-    """Warnings about the tables of modes known before reading a program: mass missing, unused or outside."""
+    """Warnings that need no program: the part's mass is missing, has no effect, or lies outside a table."""
     mass = machine.shaping.part_mass_kg
     tables = [(name, mode, mode.frequency_over) for name, _, mode in numbered_modes(machine)]
     over_mass = [(name, mode, over.mass_kg) for name, mode, over in tables if over is not None and over.mass_kg]

@@ -19,8 +19,8 @@ from shapegcode.program.compensation import paired_regions
 from shapegcode.results.page import scene as page
 from shapegcode.results.page.scene import Kept, Scene, SceneSpectrum, Variant
 
-MOST_POINTS = 60_000  # largest number of samples per program on a page
-_HALF_PIXEL, _LEAST_EXTENT_MM = 0.5, 1e-3
+MAX_POINTS = 60_000  # largest number of samples per program on a page
+_HALF_PIXEL, _MIN_EXTENT_MM = 0.5, 1e-3
 _FLAT = {"deviation": 1e-3, "vibration": 1e-3, "speed": 1e-3, "acceleration": 1e-6}  # a curve with less range is flat
 
 
@@ -96,7 +96,7 @@ def _variant(
     whole_s = _core.time_program(program.core, fanuc_model(machine)).total_s or period_s
     cuts = [(mine, other.path) for mine, other in paired_regions(program, nominal)]
     followed = _Followed(sorted(cuts, key=lambda cut: cut[0].first_line))
-    thinner, spectrum = page.Thinner(_scales(nominal), MOST_POINTS), page.AccelerationSpectrum(period_s)
+    thinner, spectrum = page.Thinner(_scales(nominal), MAX_POINTS), page.AccelerationSpectrum(period_s)
     blocks = _Blocks()
     velocity: FloatArray | None = None
     for chunk in stream(program, machine, plant=plant):
@@ -126,7 +126,7 @@ def _variant(
     )  # fmt: skip
     # Up to twice the highest mode and at least 200 Hz, within half the sample rate.
     highest = max((mode.frequency_hz for modes in axis_modes(machine) for mode in modes), default=0.0)
-    return variant, spectrum.lines(key, most_hz=min(max(2.0 * highest, 200.0), 0.5 / period_s)), kept
+    return variant, spectrum.lines(key, max_hz=min(max(2.0 * highest, 200.0), 0.5 / period_s)), kept
 
 
 class _Blocks:
@@ -158,4 +158,4 @@ def _scales(program: Program) -> dict[str, float]:
     """Half a pixel of the path in mm, and for each curve the range below which it is flat."""
     corners = [corner for region in program.regions for corner in (region.path.polyline(),) if len(corner)]
     extent = float(np.ptp(np.concatenate(corners), axis=0).max()) if corners else 0.0
-    return {"path": max(extent, _LEAST_EXTENT_MM) * _HALF_PIXEL / page.PIXELS_WIDE} | _FLAT
+    return {"path": max(extent, _MIN_EXTENT_MM) * _HALF_PIXEL / page.PIXELS_WIDE} | _FLAT

@@ -134,7 +134,7 @@ class Table:
 
     def width(self) -> int:
         """Width of the table with every column, in characters, without wrapped texts."""
-        return _least_width(self.shown(), self._texts(self.shown()), whole=True)
+        return _min_width(self.shown(), self._texts(self.shown()), whole=True)
 
     def _texts(self, shown: Sequence[Column]) -> list[list[str]]:
         """Cells as texts; a figure with interval or unit is kept on one line."""
@@ -145,7 +145,7 @@ class Table:
     def _fitting(self, shown: list[Column], width: int) -> list[Column]:
         """The columns that fit a width without a cut word."""
         kept = list(shown)
-        while _least_width(kept, self._texts(kept)) > width:
+        while _min_width(kept, self._texts(kept)) > width:
             free = [rank for rank, column in enumerate(kept) if rank > 0 and column.priority > 0]
             if not free:
                 break
@@ -174,7 +174,7 @@ class Table:
         return table
 
 
-def _least_and_most(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> tuple[list[int], list[int]]:
+def _min_and_max(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> tuple[list[int], list[int]]:
     """Width of each column for its longest word, and for its longest line."""
     least, most = [], []
     for rank, column in enumerate(columns):
@@ -186,15 +186,15 @@ def _least_and_most(columns: Sequence[Column], rows: Sequence[Sequence[str]]) ->
     return least, most
 
 
-def _least_width(columns: Sequence[Column], rows: Sequence[Sequence[str]], *, whole: bool = False) -> int:
+def _min_width(columns: Sequence[Column], rows: Sequence[Sequence[str]], *, whole: bool = False) -> int:
     """Width of a table, with the space between its columns."""
-    least, most = _least_and_most(columns, rows)
+    least, most = _min_and_max(columns, rows)
     return sum(most if whole else least) + 2 * len(columns) - 1
 
 
 def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int) -> list[int]:
     """Widths of the columns without cut words; rich would shrink all columns alike and cut the last ones."""
-    least, most = _least_and_most(columns, rows)
+    least, most = _min_and_max(columns, rows)
     found = list(least)
     spare = width - (2 * len(columns) - 1) - sum(least)
     for _ in range(-spare):

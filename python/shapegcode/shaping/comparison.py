@@ -39,7 +39,7 @@ from shapegcode.shaping.robust import least_worst
 _SLOWEST_PERIODS = 3.0  # default longest shaper in periods of the slowest mode: its three-hump EI and a faster mode's
 _ROBUST = "robust"  # the family whose best design is shown even above the limit
 _OWN_TAPS = "taps"  # the family of the user's impulses
-_MOST_PERIODS = 5000  # periods in the longest shaper: finer grids are as good as continuous times
+_MAX_PERIODS = 5000  # periods in the longest shaper: finer grids are as good as continuous times
 _NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of cycles per period
 
 
@@ -205,10 +205,10 @@ def _check(
         if not (math.isfinite(value) and value > 0.0):
             raise ArgumentError(f"{name} is {value:g}: it must be finite and above 0")
     finest_s = min((period_s for period_s in periods_s if period_s is not None), default=math.inf)
-    if options.max_duration_s > _MOST_PERIODS * finest_s:
+    if options.max_duration_s > _MAX_PERIODS * finest_s:
         raise ArgumentError(
             f"a shaper of {ms(options.max_duration_s)} on a grid of {ms(finest_s)} has up to "
-            f"{options.max_duration_s / finest_s:.3g} impulses, at most {_MOST_PERIODS} can be searched: use a longer "
+            f"{options.max_duration_s / finest_s:.3g} impulses, at most {_MAX_PERIODS} can be searched: use a longer "
             "period or a shorter duration"
         )
     if objective not in OBJECTIVES:

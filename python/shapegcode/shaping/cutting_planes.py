@@ -23,7 +23,7 @@ from shapegcode.shaping.bands import ModeBand
 
 # Tolerance and presolve: occasionally the solver fails or cycles with the first of them.
 _ATTEMPTS = ((1e-10, False), (1e-9, True), (1e-9, False), (1e-8, True), (1e-7, True), (1e-7, False))
-_MOST_PIVOTS = 20  # per unknown and condition; about 1 is usual
+_MAX_PIVOTS = 20  # per unknown and condition; about 1 is usual
 
 
 class _Quiet(highspy.Highs):
@@ -80,7 +80,7 @@ class LinearProgram:
 
     def solve(self) -> FloatArray | None:
         """Minimise; None if infeasible."""
-        pivots = _MOST_PIVOTS * (len(self._columns) + self._rows)
+        pivots = _MAX_PIVOTS * (len(self._columns) + self._rows)
         for attempt, (tolerance, presolve) in enumerate(_ATTEMPTS):
             if attempt:  # restart
                 self._solver.clearSolver()
@@ -163,7 +163,7 @@ SAME_RESIDUAL = 1e-3  # relative gap between the lower bound and the design at w
 NO_RESIDUAL = 1e-6  # residual ratio that counts as zero: no smaller gap is pursued
 _STEP_RAD = 0.1  # sweep step as phase from the middle of the shaper; peaks are refined
 _FEWEST_STEPS = 8
-_MOST_ROUNDS = 60
+_MAX_ROUNDS = 60
 _STARTS = 5  # initial frequencies of a band in every search
 _BOUNDS_SHARE = 0.5  # of the worst residual: planes whose value is below this fraction count as inactive
 _SAME_VALUE = 1e-6  # relative
@@ -273,7 +273,7 @@ class TapProblem:
         lower, upper = 0.0, math.inf
         # far below the limit the program would be degenerate, and the solver may cycle
         floor = 0.5 * NO_RESIDUAL if limit is None else 0.5 * limit
-        for _ in range(_MOST_ROUNDS):
+        for _ in range(_MAX_ROUNDS):
             found = self._solve(None, floor)
             if found is None:
                 return None
@@ -288,13 +288,13 @@ class TapProblem:
                 self._forget(best, upper)
                 return Bounds(best, min(lower, upper), upper)
         raise DesignError(
-            f"after {_MOST_ROUNDS} linear programs the worst residual lies between {lower:.4g} and {upper:.4g}: "
+            f"after {_MAX_ROUNDS} linear programs the worst residual lies between {lower:.4g} and {upper:.4g}: "
             "no design is proven best"
         )
 
     def cheapest(self, cost: FloatArray, limit: float) -> FloatArray | None:
         """Taps of least cost (sum of magnitudes if signed) with a residual below the limit, or None."""
-        for _ in range(_MOST_ROUNDS):
+        for _ in range(_MAX_ROUNDS):
             found = self._solve(cost, limit)
             if found is None:
                 return None

@@ -105,7 +105,7 @@ def choose_block_period(
         choice = _shortest(candidates)
         if not wide:
             return choice
-        best = _candidate(bands, choice.period_s, max_duration_s, vibration_limit, least_cost=True)
+        best = _candidate(bands, choice.period_s, max_duration_s, vibration_limit, min_cost=True)
         return _shortest(tuple(best if each.period_s == choice.period_s else each for each in candidates))
     if wide:
         candidates = tuple(_fallback(each, bands, max_duration_s, vibration_limit) for each in candidates)
@@ -126,7 +126,7 @@ def robust_candidate(
 ) -> BlockPeriodCandidate:
     """The candidate of :func:`choose_block_period` on one period."""
     check_modes_and_times(bands, period_s=period_s, max_duration_s=max_duration_s)
-    candidate = _candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=True)
+    candidate = _candidate(bands, period_s, max_duration_s, vibration_limit, min_cost=True)
     if candidate.shaper is None and any(band.uncertainty for band in bands):
         candidate = _fallback(candidate, bands, max_duration_s, vibration_limit)
     if candidate.shaper is None:
@@ -168,7 +168,7 @@ def _choice(chosen: BlockPeriodCandidate, candidates: tuple[BlockPeriodCandidate
 
 
 def _candidate(
-    bands: Sequence[ModeBand], period_s: float, max_duration_s: float, limit: float, *, least_cost: bool = False
+    bands: Sequence[ModeBand], period_s: float, max_duration_s: float, limit: float, *, min_cost: bool = False
 ) -> BlockPeriodCandidate:
     """Shortest design on a grid, or why there is none (without the search for a remedy)."""
     if not any(band.uncertainty for band in bands):
@@ -182,7 +182,7 @@ def _candidate(
     if not 0.0 < limit < 1.0:
         raise ArgumentError(f"vibration_limit is {limit}: it must be above 0 and below 1")
     task = Task.checked(bands, period_s)
-    found = shortest_below(task, limit, max_duration_s, least_cost=least_cost)
+    found = shortest_below(task, limit, max_duration_s, min_cost=min_cost)
     if found is None:
         return BlockPeriodCandidate(period_s, None, refusal(task, limit, max_duration_s))
     return BlockPeriodCandidate(period_s, found.shaper, worst_residual=found.worst_residual)
@@ -234,11 +234,11 @@ def candidate_periods(
     if machine is not None and machine.emission.block_period_s is not None:
         return [machine.emission.block_period_s]
     if machine is not None:
-        interpolation_s, least_s = machine.controller.interpolation_period_s, machine.controller.block_time_s
+        interpolation_s, min_s = machine.controller.interpolation_period_s, machine.controller.block_time_s
     else:
-        least_s = _FINEST_SHARE / max(band.mode.frequency_hz for band in bands)
-        interpolation_s = _ASSUMED_PERIOD_S * max(1, math.ceil(least_s / _ASSUMED_PERIOD_S))
-    first = max(1, math.ceil(least_s / interpolation_s - _WHOLE))
+        min_s = _FINEST_SHARE / max(band.mode.frequency_hz for band in bands)
+        interpolation_s = _ASSUMED_PERIOD_S * max(1, math.ceil(min_s / _ASSUMED_PERIOD_S))
+    first = max(1, math.ceil(min_s / interpolation_s - _WHOLE))
     last = max(first + _PERIODS_COMPARED - 1, math.floor(_LONGEST_BLOCK_PERIOD_S / interpolation_s + _WHOLE))
     every: list[tuple[float, float]] = []  # duration and negative period: of equal durations the longer period first
     for multiple in range(first, last + 1):
@@ -248,7 +248,7 @@ def candidate_periods(
         if len(every) >= _PERIODS_COMPARED:
             longest_s = min(longest_s, max(every[_PERIODS_COMPARED - 1][0], (1.0 + SAME) * every[0][0]))
         task = Task.checked(bands, period_s)
-        found = shortest_below(task, vibration_limit, longest_s, least_cost=False)
+        found = shortest_below(task, vibration_limit, longest_s, min_cost=False)
         if found is not None:
             every = sorted([*every, (round(found.shaper.duration_s, 9), -period_s)])
     if not every:

@@ -290,7 +290,7 @@ def lower_hull(
     edges = [(leftmost, rightmost)]
     while edges:
         left, right = edges.pop()
-        if _least_between(left, right) >= (1.0 - tolerance) * min(each.variance for each in found):
+        if _min_between(left, right) >= (1.0 - tolerance) * min(each.variance for each in found):
             continue
         run = right.mean - left.mean
         slope = (right.second - left.second) / run if run > _SAME_OBJECTIVE else 2.0 * left.mean
@@ -304,7 +304,7 @@ def lower_hull(
     return [each.taps for each in sorted(found, key=lambda each: each.variance)]
 
 
-def _least_between(left: _Corner, right: _Corner) -> float:
+def _min_between(left: _Corner, right: _Corner) -> float:
     """Lower bound on the second central moment between two corners, from their supporting lines."""
     if left.slope is None or right.slope is None or right.slope - left.slope <= _SAME_OBJECTIVE:
         return -math.inf

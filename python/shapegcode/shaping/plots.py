@@ -17,7 +17,7 @@ from shapegcode.shaping.bands import Design, ModeBand, mode_band
 from shapegcode.shaping.result import Recommendation, times_name
 
 _CURVES = 6
-_LEAST_RATIO = 1.02
+_MIN_RATIO = 1.02
 _RATIO_STEP = 0.02
 _BRANCH_CYCLES = 1.0  # cycles of the slower mode: longer minimal shapers are of no interest
 _FREQUENCIES = 601
@@ -134,8 +134,8 @@ def plot_sensitivity(
 
     Args:
         result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, or shapers by name.
-        modes: modes to mark if shapers are given, as for `choose_shaper`; empty: the curves are undamped, up to 2.5
-            cycles within the longest shaper.
+        modes: modes to mark if shapers are given, as for `choose_shaper`; empty: undamped, up to 2.5 cycles in
+            the duration of the longest shaper.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -295,7 +295,7 @@ def _branches(result: Recommendation) -> MinimalBranches | None:
         return None
     slow, fast = sorted((band.mode for band in result.modes), key=lambda mode: mode.frequency_hz)
     ratio = fast.frequency_hz / slow.frequency_hz
-    lowest = max(_LEAST_RATIO, 0.6 * ratio)
+    lowest = max(_MIN_RATIO, 0.6 * ratio)
     ratios = np.arange(lowest, max(1.4 * ratio, lowest + 0.2), _RATIO_STEP)
     # Two limits besides the option: curves that can be distinguished, and the search (100 periods of the faster mode).
     longest_s = min(result.max_duration_s, _BRANCH_CYCLES / slow.frequency_hz, 99.0 / (ratios[-1] * slow.frequency_hz))

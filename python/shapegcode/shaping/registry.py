@@ -36,12 +36,12 @@ _SMALLEST_TAP = 1e-9
 _FIRST = 0.7  # of the usual length: start of the search; no kernel without negative samples is shorter
 _FURTHEST = 2.5
 _STRIDES = 40  # of the usual length: first search step, before bisection
-_MOST_SAMPLES = 20_000
+_MAX_SAMPLES = 20_000
 _WHOLE = 1e-9
 _CLEARLY = 1e-3  # of the largest sample: a negative sample beyond rounding error
 _SINGULAR = 1e-12  # relative singular value below which two conditions coincide on this grid
 _SPANS = (1.0, 2.0)  # searched durations relative to the convolved ZV, in order
-_MOST_PERIODS = 100.0 - 1e-6  # of the fastest mode: the limit of minimal_shapers
+_MAX_PERIODS = 100.0 - 1e-6  # of the fastest mode: the limit of minimal_shapers
 _PROVEN_MODES = 3  # more modes need too many search boxes for a proof: searched from starting points only
 
 
@@ -214,9 +214,9 @@ def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bo
         fewest = max(2 * len(ratios) + 2, math.ceil((1.0 - _WHOLE if at_least else _FIRST) * usual))
         most = max(2 * fewest, int(_FURTHEST * usual))
         title = f"{name} for {mode_names([mode])} on a {ms(period_s)} grid"
-        if usual > _MOST_SAMPLES:
+        if usual > _MAX_SAMPLES:
             raise _core.DesignError(
-                f"{title} would take {usual:.0f} samples: at most {_MOST_SAMPLES}; use a longer period"
+                f"{title} would take {usual:.0f} samples: at most {_MAX_SAMPLES}; use a longer period"
             )
 
         def taps(steps: int) -> FloatArray | None:
@@ -279,7 +279,7 @@ def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[_co
     `options.max_duration_s` or 100 periods of the fastest mode.
     """
     modes = [band.mode for band in bands]
-    longest_s = min(options.max_duration_s, _MOST_PERIODS / max(mode.frequency_hz for mode in modes))
+    longest_s = min(options.max_duration_s, _MAX_PERIODS / max(mode.frequency_hz for mode in modes))
     usual_s = _core.convolved_zv(modes).duration_s
     boxes = {} if len(modes) <= _PROVEN_MODES else {"max_boxes": 0}
     for span in _SPANS:
@@ -487,17 +487,17 @@ def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None =
     if options.period_s is not None and not row.on_grid:
         raise ArgumentError(f"{name} has no design on a grid: omit the period ({row.validity})")
     found = row.solve(distinct(bands), options)
-    most_s, most_sum = options.max_duration_s, options.max_abs_sum
+    max_s, max_sum = options.max_duration_s, options.max_abs_sum
     within = [
         shaper
         for shaper in found
         if row.name == "taps"
-        or (shaper.duration_s <= most_s * (1.0 + _SLACK) and shaper.abs_sum <= most_sum * (1.0 + _SLACK))
+        or (shaper.duration_s <= max_s * (1.0 + _SLACK) and shaper.abs_sum <= max_sum * (1.0 + _SLACK))
     ]
     if found and not within:
         nearest = min(found, key=lambda shaper: shaper.duration_s)
         raise DesignError(
-            f"{name} takes {ms(nearest.duration_s)} with sum|a| {nearest.abs_sum:.4g}: the limits are {ms(most_s)} and "
-            f"{most_sum:.4g}"
+            f"{name} takes {ms(nearest.duration_s)} with sum|a| {nearest.abs_sum:.4g}: the limits are {ms(max_s)} and "
+            f"{max_sum:.4g}"
         )
     return [evaluate(name, shaper, bands, options.period_s) for shaper in within]

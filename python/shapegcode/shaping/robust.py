@@ -58,7 +58,7 @@ def least_worst(
 ) -> RobustDesign:
     """Design taps on a grid with the smallest worst residual over the bands, for a given duration.
 
-    The optimum is proven to 0.1 %: `worst_residual` is at most that much above `least_possible` (a residual below
+    The optimum is proven to 0.1 %: `worst_residual` is at most that much above `min_possible` (a residual below
     1e-6 counts as zero). The exception is a damped mode whose optimum has no taps in its last periods:
     the residual counts from the last tap on, so the shaper is then shorter, or gets a last tap of 0.001.
 
@@ -127,7 +127,7 @@ def _hints(task: Task, limit: float, max_duration_s: float) -> str:
 
 def _other_period(task: Task, limit: float, max_duration_s: float) -> str:
     shortest_s, least = math.inf, math.inf
-    shortest_text, least_text = "", "no other period from half to twice as long has a design within that duration"
+    shortest_text, min_text = "", "no other period from half to twice as long has a design within that duration"
     for share in _OTHER_PERIODS:
         other = task.at_period(share * task.period_s)
         most = min(other.periods(max_duration_s), _HINT_PERIODS)
@@ -142,8 +142,8 @@ def _other_period(task: Task, limit: float, max_duration_s: float) -> str:
         found = best_within(other, most)
         if found is not None and found.worst_residual < least:
             least = found.worst_residual
-            least_text = f"a period of {ms(other.period_s)} reaches {_percent(least)} within that duration"
-    return shortest_text or least_text
+            min_text = f"a period of {ms(other.period_s)} reaches {_percent(least)} within that duration"
+    return shortest_text or min_text
 
 
 def _percent(ratio: float) -> str:
@@ -157,7 +157,7 @@ class RobustDesign:
     shaper: Shaper  # the taps; times are multiples of `period_s`
     period_s: float  # period of the grid, s
     worst_residual: float  # largest residual ratio over the bands, proven
-    least_possible: float  # no design of this duration or a shorter one has a smaller worst residual
+    min_possible: float  # no design of this duration or a shorter one has a smaller worst residual
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,7 @@ class Task:
         return RobustDesign(shaper, self.period_s, worst, min(lower, worst))
 
 
-def shortest_below(task: Task, limit: float, max_duration_s: float, *, least_cost: bool = True) -> RobustDesign | None:
+def shortest_below(task: Task, limit: float, max_duration_s: float, *, min_cost: bool = True) -> RobustDesign | None:
     """Shortest design with a worst residual below the limit, of least contour cost if requested; else None."""
     most = task.periods(max_duration_s)
     if not task.wide and task.max_abs_sum is None and not task.mirrored:
@@ -242,7 +242,7 @@ def shortest_below(task: Task, limit: float, max_duration_s: float, *, least_cos
         return None
     last = smallest_below(task, limit, most)
     while last is not None and last <= most:
-        found = _within(task, last, limit, least_cost)
+        found = _within(task, last, limit, min_cost)
         if found is not None:
             return found
         last += 1  # the taps became invalid in full precision
@@ -295,7 +295,7 @@ def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, pre
     )  # fmt: skip
 
 
-def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesign | None:
+def _within(task: Task, last: int, limit: float, min_cost: bool) -> RobustDesign | None:
     """A design of `last` periods below the limit, with the least contour cost if requested; None if none is valid."""
     for last_tap in (0.0, _LAST_TAP):
         problem = task.problem(last, last_tap)
@@ -307,13 +307,13 @@ def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesi
         return None
     inner = (1.0 - 0.4 * SAME_RESIDUAL) * limit  # margin for the gap of the planes and the proof
     candidates = []
-    if least_cost and task.max_abs_sum is None:
+    if min_cost and task.max_abs_sum is None:
         candidates = lower_hull(lambda cost: problem.cheapest(cost, inner), last, _SAME_VARIANCE)
-    elif least_cost:
+    elif min_cost:
         least = problem.cheapest(np.ones(last + 1), inner)
         candidates = [] if least is None else [least]
     for taps in candidates:
-        found = task.finished(taps, plain.least_possible)
+        found = task.finished(taps, plain.min_possible)
         if found is not None and found.worst_residual <= limit:
             return found
     return plain

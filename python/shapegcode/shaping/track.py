@@ -85,7 +85,7 @@ def design_track(
     max_duration_s: float = 0.25,
     *,
     residual_limit: float = 0.01,
-    most_nodes: int = 100,
+    max_nodes: int = 100,
     design: NodeDesign | None = None,
 ) -> ShaperTrack:
     """Design shapers along an axis with every mode's residual below a limit, also between the nodes."""
@@ -115,10 +115,10 @@ def design_track(
         if not middles:
             ends = max(node.shaper.residual_ratio(mode) for node in nodes for mode in node.modes)
             return ShaperTrack(axis, period_s, tuple(nodes), max([ends, *residuals]))
-        if len(positions) + len(middles) > most_nodes:
+        if len(positions) + len(middles) > max_nodes:
             raise DesignError(
                 f"{len(positions)} shapers between {low:g} and {high:g} mm have a residual up to {max(residuals):.3g}, "
-                f"limit {residual_limit:g}; more than {most_nodes} are not tried"
+                f"limit {residual_limit:g}; more than {max_nodes} are not tried"
             )
         positions = sorted([*positions, *middles])
 
@@ -205,7 +205,7 @@ def mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[fl
 
 
 def _worst_between(left: TrackNode, right: TrackNode, modes: Sequence[MovingMode]) -> float:
-    """Largest residual ratio of a mode for increments started between two nodes."""
+    """Largest residual ratio of a mode with the mixed shapers between two nodes."""
     times = sorted({*left.shaper.times_s.tolist(), *right.shaper.times_s.tolist()})
     first, second = (
         np.array([dict(zip(s.times_s.tolist(), s.amplitudes.tolist(), strict=True)).get(t, 0.0) for t in times])

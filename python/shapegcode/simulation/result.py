@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 # With a feed drive the difference of command and table is vibration and servo lag.
-_LEAST_SHOWN_UM = 0.005
+_MIN_SHOWN_UM = 0.005
 _NAMES = {"modal": ("residual vibration", "peak vibration"), "feed-drive": ("error after the stop", "largest error")}
 
 
@@ -233,7 +233,7 @@ class Simulation(Result):
         vibrations = [
             Figure(f"{residual} {axis.upper()}", "µm", None, self.residual_vibration_um[axis], 2,
                    key_after=f"residual_vibration_um.{axis}")
-            for axis in "xyz" if self.residual_vibration_um[axis] >= _LEAST_SHOWN_UM
+            for axis in "xyz" if self.residual_vibration_um[axis] >= _MIN_SHOWN_UM
         ]  # fmt: skip
         return (
             Figure("cycle time", "s", None, self.cycle_time_s, 2, key_after="cycle_time_s"),

@@ -20,7 +20,7 @@ from shapegcode.results.json import OldNames, sparse
 from shapegcode.results.outcome import CONTOURS, ContourError, Deviation, Pair, Tracks, Xyz
 from shapegcode.results.table import NO_BREAK, Column, Table
 
-_LEAST_BETTER = 0.3  # relative reduction of a figure that counts as a benefit
+_MIN_BETTER = 0.3  # relative reduction of a figure that counts as a benefit
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ class RegionVerdict:
         return any(
             before > threshold
             and before - after >= least_gain_um
-            and (after <= (1.0 - _LEAST_BETTER) * before or (before > limit >= after))
+            and (after <= (1.0 - _MIN_BETTER) * before or (before > limit >= after))
             for before, after, limit, threshold in pairs
         )
 
@@ -465,7 +465,7 @@ def _share(share: float | None) -> str:
 
 def _verdict(case: CaseVerdict, worst: bool) -> str:
     word = "within" if case.within else "OUT"
-    return (word if case.counts else f"({word.lower()})") + (" <- worst" if worst else "")
+    return (word if case.counts else f"({word.lower()})") + (" ← decides" if worst else "")
 
 
 def _style(case: CaseVerdict, worst: bool) -> str:

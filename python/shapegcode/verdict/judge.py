@@ -86,7 +86,7 @@ def _figures_um(simulated: _core.SimulationFigures) -> tuple[float, float]:
     return float(np.max(simulated.residual_mm)) * 1e3, simulated.response.max_abs_mm * 1e3
 
 
-def most_to_gain_um(original: _core.SimulationFigures) -> float:
+def max_gain_um(original: _core.SimulationFigures) -> float:
     """Upper bound of the gain of shaping: residual vibration or contour error of the original, the larger."""
     return max(_figures_um(original))
 

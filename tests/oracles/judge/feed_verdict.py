@@ -36,9 +36,9 @@ class Control:
     block_end: BlockEnd = "ceil"
     period_s: float = 0.001
     interval_mm: float = 0.6
-    most_change: float = math.inf
-    most_feed: float = 15000.0
-    least_feed: float = 1.0
+    max_change: float = math.inf
+    max_feed: float = 15000.0
+    min_feed: float = 1.0
 
 
 @dataclass
@@ -77,7 +77,7 @@ def kept_lines(report: Mapping[str, Any]) -> list[tuple[int, int]]:
 
 def judge(
     case: Case, text: str, report: Mapping[str, Any], met: list[Run], forces: Forces, control: Control,
-    *, mean: bool = False, most_feed: float = math.inf, raised: bool = False,
+    *, mean: bool = False, max_feed: float = math.inf, raised: bool = False,
 ) -> Verdict:  # fmt: skip
     """Everything of one emitted program."""
     verdict = Verdict()
@@ -102,7 +102,7 @@ def judge(
         # Half an increment in each axis, and the radii of R words and centres likewise.
         if off > 1.5 * increment:
             say(f"path {off / increment:.2f} increments beside the original, line {blocks[0].line}")
-        _blocks(run, blocks, kept, control, increment, most_feed, say)
+        _blocks(run, blocks, kept, control, increment, max_feed, say)
         travel = real(run, blocks, case, control)
         was = real(run, run.moves, case, control)
         lines = np.array([move.line for move in run.moves])[run.move]
@@ -129,7 +129,7 @@ def judge(
                     f"arcs {np.round(run.arcs[k], 3).tolist()}"
                 )
         programmed = np.array([move.feed for move in run.moves])[run.move]
-        ceiling = np.full(len(programmed), min(most_feed, control.most_feed)) if raised else programmed
+        ceiling = np.full(len(programmed), min(max_feed, control.max_feed)) if raised else programmed
         cut = np.array([bool(arcs) for arcs in run.arcs])
         word = commanded(run, blocks).feed
         if math.isfinite(case.limits.get("feed_per_tooth_max_mm", math.inf)):
@@ -202,7 +202,7 @@ def _only_feed(words: Any) -> bool:
 
 
 def _blocks(
-    run: Run, blocks: list[Move], kept: list[tuple[int, int]], control: Control, increment: float, most_feed: float,
+    run: Run, blocks: list[Move], kept: list[tuple[int, int]], control: Control, increment: float, max_feed: float,
     say: Any,
 ) -> None:  # fmt: skip
     """Lengths and feeds of the blocks."""
@@ -212,22 +212,22 @@ def _blocks(
         if move.length < control.interval_mm - 2 * increment and np.abs(originals - move.length).min() > 3 * increment:
             say(f"line {move.line}: block of {move.length:.4f} mm, shorter than {control.interval_mm} and not original")
     change = np.flatnonzero(np.diff(feeds) != 0.0)
-    if math.isfinite(control.most_change):
+    if math.isfinite(control.max_change):
         near_lines = _lines_near(run, blocks, change)
         for k in change:
             step = abs(feeds[k + 1] - feeds[k])
             # As far as feeds that are kept allow.
             beside_kept = any(any(a <= line <= b for a, b in kept) for line in near_lines[int(k)])
-            if step > control.most_change + 0.26 and not beside_kept:
-                say(f"line {blocks[k + 1].line}: feed changes by {step:.1f} > {control.most_change:g} mm/min")
+            if step > control.max_change + 0.26 and not beside_kept:
+                say(f"line {blocks[k + 1].line}: feed changes by {step:.1f} > {control.max_change:g} mm/min")
     borders = np.concatenate([[0], change + 1, [len(blocks)]])
     lengths = np.array([move.length for move in blocks])
     for a, b in pairwise(borders):
         stretch = float(lengths[a:b].sum())
         if stretch < control.interval_mm - 3 * increment and stretch < run.length - 3 * increment:
             say(f"line {blocks[a].line}: feed {feeds[a]:g} stays for {stretch:.4f} mm < {control.interval_mm}")
-    if feeds.max() > min(most_feed, control.most_feed) + 1e-6:
-        say(f"feed {feeds.max():g} above the largest {min(most_feed, control.most_feed):g}")
+    if feeds.max() > min(max_feed, control.max_feed) + 1e-6:
+        say(f"feed {feeds.max():g} above the largest {min(max_feed, control.max_feed):g}")
 
 
 def _lines_near(run: Run, blocks: list[Move], change: npt.NDArray[np.intp]) -> dict[int, list[int]]:
@@ -246,7 +246,7 @@ def _chips(case: Case, run: Run, word: Array, cut: npt.NDArray[np.bool_], contro
     """Feed words in material, per tooth."""
     teeth = case.mill.flutes * case.mill.rev_per_min
     most = case.limits.get("feed_per_tooth_max_mm", math.inf) * teeth
-    least = max(case.limits.get("feed_per_tooth_min_mm", 0.0) * teeth, control.least_feed)
+    least = max(case.limits.get("feed_per_tooth_min_mm", 0.0) * teeth, control.min_feed)
     programmed = np.array([move.feed for move in run.moves])[run.move]
     for k in np.flatnonzero(cut):
         # At a border the larger one was taken.

@@ -248,9 +248,9 @@ class Choice:
 class OpenGap:
     """A gap in which rapids may be replaced, with the effect on the time until the next cut can start."""
 
-    def __init__(self, gap: Gap, plant: RapidPlant, pool: Executor, least_gain_s: float) -> None:
+    def __init__(self, gap: Gap, plant: RapidPlant, pool: Executor, min_gain_s: float) -> None:
         self._plant = plant
-        self._least_gain_s = least_gain_s
+        self._min_gain_s = min_gain_s
         self._steps = [plant.pause(step) if isinstance(step, float) else plant.rapid(step) for step in gap.steps]
         self.choices: list[Choice] = []
         self._at: list[int] = []
@@ -260,7 +260,7 @@ class OpenGap:
         self._region = regions[-1]
         clock_s = math.fsum(step.clock_s for step in self._steps)
         self._before_s = plant.ready_s(self._steps, self._region)
-        if self._before_s < clock_s + least_gain_s:
+        if self._before_s < clock_s + min_gain_s:
             return
         end_s = 0.0
         for at, (step, timing) in enumerate(zip(gap.steps, self._steps, strict=True)):
@@ -305,11 +305,11 @@ class OpenGap:
             if flags[k]:
                 flags[k] = False
                 without_s = self._ready_s(flags)
-                if without_s < ready_s + self._least_gain_s:
+                if without_s < ready_s + self._min_gain_s:
                     ready_s = without_s
                 else:
                     flags[k] = True
-        if ready_s > self._before_s - self._least_gain_s:
+        if ready_s > self._before_s - self._min_gain_s:
             flags = [False] * len(flags)
         chosen = iter(flags)
         self.drop(NO_GAIN, kept, lambda _choice: not next(chosen))

@@ -286,13 +286,13 @@ class AccelerationSpectrum:
         self._power += np.abs(np.fft.rfft(part * self._window[:, None], axis=0)) ** 2
         self._windows += 1
 
-    def lines(self, variant: str, *, most_hz: float) -> list[SceneSpectrum]:
+    def lines(self, variant: str, *, max_hz: float) -> list[SceneSpectrum]:
         """The spectral density of each axis that moves."""
         if len(self._rest) and not self._windows:
             # A motion shorter than one window: zero-padded.
             self._count(np.concatenate([self._rest, np.zeros((self._length - len(self._rest), 3))]))
         frequency: FloatArray = np.fft.rfftfreq(self._length, self._period_s).astype(np.float64)
-        wanted = (frequency > 0.0) & (frequency <= most_hz)
+        wanted = (frequency > 0.0) & (frequency <= max_hz)
         scale = 2.0 * self._period_s / float((self._window**2).sum()) / max(self._windows, 1)
         density: FloatArray = np.sqrt(self._power * scale)
         moving = np.flatnonzero(density.max(axis=0) > _STILL)

@@ -12,7 +12,7 @@ from .tape import Alarm, Block, TapeProgram, read_tape
 from .variables import Variables, arguments
 from .words import Word, parse_words
 
-MOST_STEPS = 200_000
+MAX_STEPS = 200_000
 _DO = re.compile(r"DO(\d+)$")
 _END = re.compile(r"END(\d+)$")
 _KEYWORDS = ("IF", "WHILE", "GOTO", "DO", "END")
@@ -76,7 +76,7 @@ class Flow:
     # ---- the loop ----------------------------------------------------------------------------------------------------
 
     def play(self) -> None:
-        for _ in range(MOST_STEPS):
+        for _ in range(MAX_STEPS):
             frame = self.stack[-1]
             self.variables.local = frame.local
             if frame.at >= len(frame.program.blocks):
@@ -90,7 +90,7 @@ class Flow:
                 continue
             if self.execute(frame, block):
                 return
-        raise Alarm(self.line, f"more than {MOST_STEPS} blocks: endless?")
+        raise Alarm(self.line, f"more than {MAX_STEPS} blocks: endless?")
 
     def read(self, n: int) -> Value:
         return self.variables.read(n, self.line)
