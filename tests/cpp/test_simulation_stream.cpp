@@ -191,6 +191,14 @@ TEST_CASE("simulation stream: a program takes its cycle time, without a jump, an
   }
 }
 
+TEST_CASE("simulation stream: M06 for the tool in the spindle is a tool change, as in the table of blocks") {
+  const auto text = program("G00 X0. Y0. Z5.\nM06 T1\nM06 M08\nG01 X5. F600.");
+  FanucModel model = waiting_controller(MotionKind::look_ahead);
+  model.last_tool_in_spindle = true;
+  const Simulated simulated = drained(SimulationStream(text, model, vertical_machine()), 1000);
+  CHECK(std::count(simulated.kind.begin(), simulated.kind.end(), BlockKind::tool_change) == 250);
+}
+
 TEST_CASE("simulation stream: waits that are no whole periods add up") {
   const auto text = program("G90 G94\nG00 X0. Y0. Z0.\nG04 X.0015\nG04 X.0025\nG04 X.0007\nG04 X.0007\nG04 X.0006");
   const FanucModel model;

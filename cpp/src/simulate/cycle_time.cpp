@@ -111,17 +111,16 @@ class Clock {
     if (function.tool >= 0) {
       selected_ = function.tool;
     }
-    const auto codes = std::span(function.m_codes).first(static_cast<std::size_t>(function.m_count));
-    const auto changes = std::count(codes.begin(), codes.end(), detail::tool_change_code);
-    if ((changes > 0 && selected_ >= 0) || (changes_by_t_ && function.tool >= 0)) {
+    const bool changes = detail::changes_tool(function);
+    if ((changes && selected_ >= 0) || (changes_by_t_ && function.tool >= 0)) {
       select_tool(selected_, line);
     }
     const detail::FunctionWait wait = function_times_.functions(function, now_s());
-    if (!codes.empty() || wait.function_s > 0.0) {
+    if (function.m_count > 0 || wait.function_s > 0.0) {
       TimeParts parts;
       parts.tool_change_s = wait.tool_change_s;
       parts.function_s = wait.function_s;
-      note(line, changes > 0 ? BlockKind::tool_change : BlockKind::function, parts, 0.0);
+      note(line, changes ? BlockKind::tool_change : BlockKind::function, parts, 0.0);
       add(parts);
     }
   }

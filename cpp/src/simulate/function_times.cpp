@@ -23,11 +23,6 @@ double spindle_time_s(const std::vector<SpindleTime>& table, double rev_per_min)
   return below.seconds;
 }
 
-bool changes_tool(const MachineFunction& function) noexcept {
-  const auto codes = std::span(function.m_codes).first(static_cast<std::size_t>(function.m_count));
-  return std::ranges::find(codes, detail::tool_change_code) != codes.end();
-}
-
 bool starts(int code) noexcept { return code == 3 || code == 4; }
 
 // Whoever stops the program, changes the tool or turns the spindle the other way waits for it to rest.

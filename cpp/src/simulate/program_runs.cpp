@@ -70,11 +70,13 @@ Segment last_moving(const Path& path) {
 
 }  // namespace
 
+bool changes_tool(const MachineFunction& function) noexcept {
+  const auto end = function.m_codes.begin() + function.m_count;
+  return std::find(function.m_codes.begin(), end, tool_change_code) != end;
+}
+
 bool has_tool_change(const Program& program) noexcept {
-  return std::any_of(program.functions.begin(), program.functions.end(), [](const MachineFunction& function) {
-    const auto end = function.m_codes.begin() + function.m_count;
-    return std::find(function.m_codes.begin(), end, tool_change_code) != end;
-  });
+  return std::any_of(program.functions.begin(), program.functions.end(), changes_tool);
 }
 
 bool is_cutting(const OtherMove& move) noexcept {

@@ -16,6 +16,8 @@ namespace shapegcode::detail {
 
 inline constexpr int tool_change_code = 6;
 
+/// Whether M06 is among the M codes of a block.
+[[nodiscard]] bool changes_tool(const MachineFunction& function) noexcept;
 [[nodiscard]] bool has_tool_change(const Program& program) noexcept;
 
 /// A cutting move outside of the regions: neither a rapid nor a dwell.

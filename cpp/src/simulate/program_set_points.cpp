@@ -150,7 +150,7 @@ void ProgramSetPoints::open_functions(const MachineFunction& function) {
   const FunctionWait wait = function_times_.functions(function, elapsed_s());
   time_.tool_change_s += wait.tool_change_s;
   time_.function_s += wait.function_s;
-  next_.kind = wait.tool_change_s > 0.0 ? BlockKind::tool_change : BlockKind::function;
+  next_.kind = detail::changes_tool(function) ? BlockKind::tool_change : BlockKind::function;
   // A machine function needs no servo loop: the time's full interpolation leaves it out.
   if (waits_ == Waits::full) {
     open_wait(wait.tool_change_s + wait.function_s);
