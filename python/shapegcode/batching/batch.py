@@ -238,7 +238,7 @@ class Runs:
             self._keep(rank, fingerprint, outcome)
 
     def _is_done(self, rank: int, key: str, fingerprint: str) -> bool:
-        """True if an earlier batch did the same, and its files are unchanged; the run is then counted as done."""
+        """True if an earlier batch did the same run and its output files are unchanged; the run then counts as done."""
         row = self._manifest.earlier(key) if self._resume else None
         if row is None or row.get("fingerprint") != fingerprint or row["ended"] == "failed":
             return False

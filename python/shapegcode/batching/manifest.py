@@ -1,6 +1,6 @@
 """Manifest of a batch: a file of JSON lines, one per finished run, kept for resuming.
 
-The first line identifies the file; of several rows with one key the last counts; truncated rows are ignored.
+The first line identifies the file; of rows with the same key the last counts; truncated rows are ignored.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Manifest:
             raise
 
     def earlier(self, key: str) -> dict[str, Any] | None:
-        """The row of an earlier batch, also without *resume*: it lists the files of the run."""
+        """Row of a run in an earlier batch, even without *resume*: the row lists the files that the run wrote."""
         at = self._known.get(short(key))
         if at is None or self._before is None:
             return None
@@ -73,7 +73,7 @@ class Manifest:
         return row
 
     def kept_at(self, key: str) -> int:
-        """Present position of the row of an earlier batch."""
+        """Position in the present file of a row that was kept from an earlier batch."""
         return self._new[bisect.bisect_left(self._old, self._known[short(key)])]
 
     def add(self, row: Mapping[str, Any]) -> int:

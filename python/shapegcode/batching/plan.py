@@ -65,7 +65,7 @@ def _each(given: Iterable[str], avoid: Path) -> Iterator[Source]:
 
 
 def _listed(file: Path, avoid: Path) -> Iterator[Source]:
-    """Programs of a list; error messages give its line."""
+    """Programs of a list file; an error message gives the line in that file."""
     try:
         text = read_file(file, MAX_SETTINGS_BYTES).decode()
     except UnicodeDecodeError:
@@ -165,7 +165,7 @@ _OF_ONE_RUN = (
 
 @dataclass(frozen=True)
 class _OnMachine:
-    """Common data of the runs on one machine: its name as given and in a run's command, and its folder of results."""
+    """What all runs on one machine share: its name as given, the argument of -m, and the folder of the results."""
 
     given: str
     word: str

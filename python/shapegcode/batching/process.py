@@ -163,7 +163,7 @@ class Hosts:
             return self._run_in(Path(folder), packed)
 
     def end(self) -> None:
-        """End all fork servers and their runs; a later `run` returns a killed job."""
+        """End all fork servers and the jobs that they run; `run` then reports every job as killed."""
         with self._lock:
             self._ended = True
             hosts = list(self._all)

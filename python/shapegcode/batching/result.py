@@ -34,13 +34,13 @@ class BatchRow(OldNames):
         ended: end of the run.
         answer: the first line of the command's output, or why there is none.
         residual_um: residual vibration of the worst axis; None: the command does not compute it.
-        contour_um: contour error, likewise.
-        cycle_time_s: cycle time, likewise; the pair is equal for a command that writes no program.
+        contour_um: contour error; None: the command does not compute it.
+        cycle_time_s: cycle time; None: not computed; if the command writes no program, both values are equal.
         alarms: number of alarms of `check`.
         output: the program that was written; empty: none.
         report: its JSON; empty: none.
         page: its page; empty: none.
-        earlier: done by an earlier batch, and unchanged since.
+        earlier: an earlier batch did this run, and its files are unchanged since.
         wall_s: elapsed time.
         cpu_s: processor time.
         peak_bytes: peak memory.
@@ -169,12 +169,12 @@ class Batch(Result):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of runs by their end."""
+        """Number of runs with each outcome."""
         return {name: self._tally[name] for name in ("ok", "not ok", "refused", "failed")}
 
     @cached_property
     def _tally(self) -> Counter[str]:
-        """Counts over the rows: ends, runs done earlier, and machines."""
+        """Number of rows by outcome and by machine, and of those done by an earlier batch."""
         each = ((row.ended, f"on {row.machine}", *(["earlier"] if row.earlier else [])) for row in self.rows)
         return Counter(itertools.chain.from_iterable(each))
 
@@ -215,12 +215,12 @@ class Batch(Result):
         return found | {"rows": Streamed(self.rows)}
 
     def key_figures(self) -> tuple[Figure, ...]:
-        """Number of runs by their end."""
+        """Number of runs with each outcome."""
         shown = {name: float(count) for name, count in self.counts.items() if count or name == "ok"}
         return tuple(Figure(name, "runs", None, count, 0, None, "", f"counts.{name}") for name, count in shown.items())
 
     def tables(self) -> list[Table]:
-        """Runs with problems, and good runs by gain; the first twenty of each; 2000 on an index of pages."""
+        """Tables of runs with problems, and of good runs by gain: 20 of each at most; for an index of pages, 2000."""
         worst, counts, shown = list(_RED), self.counts, _LISTED if self.html else _SHOWN
         others, fine = (row for row in self.rows if row.ended != "ok"), (row for row in self.rows if row.ended == "ok")
         bad = heapq.nsmallest(shown, others, key=lambda row: worst.index(row.ended))

@@ -192,11 +192,11 @@ class _Maker:
         return Part("rapid", axis, count, self._signed(axis, increments), self.rapid[axis])
 
     def rate_is_reached(self, axis: str) -> bool:
-        """Whether rapids over the box reach their rate; otherwise rapids of more lengths are run."""
+        """Whether rapids over the box reach the rapid rate (if not, the tests have rapids of more lengths)."""
         return abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / _PER_MINUTE
 
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:
-        """Moves of one length, alternately fast and slow, and back; none if the box is too small."""
+        """Moves of one length in one direction, alternately fast and slow, then back; none if the box is too small."""
         room = int((abs(self._box.travel_mm(axis)) + 1e-9) / length_mm)
         wanted = max(8, 2 * math.ceil(_STEPS_MOVE_S * self.feed / _PER_MINUTE / (2.0 * length_mm)))
         stride = min(wanted, room - room % 2)

@@ -57,7 +57,7 @@ def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list
 def _period(
     facts: LogFacts, logs: Mapping[str, ServoLog], stops: list[moves.PartLog], run: list[moves.PartLog], bend: int
 ) -> None:
-    """Interpolation period: from steps or bends of the command, else from moves just below and above whole periods."""
+    """Interpolation period: from steps or bends of the command, else from move durations rounded up to periods."""
     name, key = "interpolation period", "controller.interpolation_period_s"
     count, sampling = min((moves.held_samples(log)[0], log.sampling_s) for log in logs.values())
     facts.sampling = sampling
@@ -81,7 +81,7 @@ def _period(
 
 
 def _period_of_stops(stops: list[moves.PartLog]) -> tuple[float, float, str] | None:
-    """Usual period that explains the difference of two rounded durations; with half-width and a note."""
+    """Interpolation period, if one usual value alone explains the difference of two durations; half-width, note."""
     if len(stops) < 2:
         return None
     (below, half_b), (above, half_a) = stops[0].pitch_s(), stops[1].pitch_s()
@@ -95,7 +95,7 @@ def _period_of_stops(stops: list[moves.PartLog]) -> tuple[float, float, str] | N
 
 
 def _period_of_run(run: list[moves.PartLog], sampling: float) -> tuple[float, float, str] | None:
-    """Usual period to which the blocks of a run are rounded; with half-width and a note."""
+    """The one of `PERIODS_S` that explains the rounded block times of a run; with half-width and a note."""
     steady = moves.line_slope(run[0], _RUN_SETTLE_S) if run else None
     if steady is None:
         return None
@@ -110,7 +110,7 @@ def _period_of_run(run: list[moves.PartLog], sampling: float) -> tuple[float, fl
 
 
 def _dwells(facts: LogFacts, part: moves.PartLog) -> float:
-    """Find whether a dwell waits for in-position; returns the pitch of the moves without the dwell."""
+    """Find whether a dwell waits for in-position; returns the time from one move to the next, less the dwell, s."""
     pitch, half = part.pitch_s()
     moving = pitch - whole_periods(part.part.dwell_s, facts.tick)
     if facts.stop_s is not None:
@@ -133,7 +133,7 @@ def _in_position(facts: LogFacts, parts: list[moves.PartLog], stop_pitch: float 
 
 
 def _waits(facts: LogFacts, stops: dict[str, _Interval], rapids: dict[str, list[_Interval]]) -> None:
-    """In-position times: after rapids, compared with those after exact stops."""
+    """In-position times after rapids and after exact stops: combined if they agree, else those after rapids."""
     for axis in AXES:
         name, key = f"in-position time {axis}", f"controller.in_position_s.{axis.lower()}"
         after, stop = rapids.get(axis, []), stops.get(axis)
@@ -216,7 +216,7 @@ def _feed_steps(facts: LogFacts, parts: list[moves.PartLog]) -> None:
 
 
 def _followed_share(log: moves.PartLog) -> float | None:
-    """Ratio of the speed step that is reached; None if nothing remains between the ramps at start and reversal."""
+    """Fraction of the speed step that is reached; None without samples between the ramps at start and reversal."""
     part = log.part
     top = int(np.argmax(log.travel_mm))  # the reversal, which smoothing shortens
     begin = log.times_s[int(np.argmax(log.travel_mm > max(0.02, 5 * log.noise_mm)))]

@@ -21,7 +21,7 @@ _HOLD_SHARE, _BEND_SHARE, _LONGEST_HOLD = 0.9, 0.85, 64
 
 
 def held_samples(log: ServoLog) -> tuple[int, int]:
-    """Number of samples for which the command is held, and index of the first of them; (1, 0): it is not held."""
+    """Samples for which each command is held, and index of the first sample with a new one; (1, 0): not held."""
     command = np.nan_to_num(log.command_mm)
     increments = np.diff(command, axis=0)
     noise = np.maximum(command[: max(3, round(0.1 / log.sampling_s))].std(axis=0), 5e-4)
@@ -38,7 +38,7 @@ def held_samples(log: ServoLog) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class _Bends:
-    """How well the speed changes of a command fall on every count-th sample, or between it and the next one."""
+    """How well the speed changes of a command repeat every few samples, each at a sample or between two neighbours."""
 
     share: float  # fraction of all curvature
     first: int  # index of the first such sample
@@ -71,7 +71,7 @@ def bend_samples(logs: Sequence[ServoLog]) -> int:
 
 
 def ticks(log: ServoLog, bend: int) -> tuple[FloatArray, FloatArray]:
-    """Times and positions, one for each interpolation period if it is visible."""
+    """Times and positions: one per interpolation period if the log shows it, else one per sample."""
     count, first = held_samples(log)
     if count == 1 and bend > 1:
         found = _bends(log, bend)
@@ -172,7 +172,7 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
 
 
 def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> FloatArray:
-    """Fraction of the travel over time, for a rectangle of speed and moving averages of these lengths, s."""
+    """Fraction of the travel over time: a rectangle of speed, then moving averages; *boxes*: durations of all, s."""
     used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
     power, out = len(used), np.zeros_like(times)
     if not power:
@@ -184,7 +184,7 @@ def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> Fl
 
 
 def lagged_share(times: FloatArray, values: FloatArray) -> FloatArray:
-    """Fraction of the travel for a rectangle and an exponential with duration and time constant, s."""
+    """Fraction of the travel over time: rectangle of speed, then first-order lag; *values*: their times, s."""
     rectangle_s, lag_s = values
 
     def ramp(t: FloatArray) -> FloatArray:

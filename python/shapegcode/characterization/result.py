@@ -148,7 +148,7 @@ class CharacterisationTests(Result):
 
     @property
     def next_step(self) -> str:
-        """Run the tests."""
+        """Next step: run the tests and fill in the results."""
         return f"read {self.folder}/README.txt, run the tests, fill in {self.folder}/RESULTS.toml"
 
     def tables(self) -> list[Table]:
@@ -200,7 +200,7 @@ class Characterisation(Result):
 
     @property
     def next_step(self) -> str:
-        """Repeat contradicting tests, or use the machine file."""
+        """Next step: repeat the tests that contradict others; if there are none, use the machine file."""
         if not self.ok:
             return "repeat the tests that contradict the others"
         return "shapegcode machine show explains the machine file with these values, which -o FILE writes"

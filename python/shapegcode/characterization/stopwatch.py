@@ -1,6 +1,6 @@
 """Fits controller parameters to stopwatch times of the test programs; method: this project.
 
-Each time is one equation. For every usual period and both rules of block timing the other parameters are fitted; a
+Each time is one equation. For every candidate period and both rules of block timing the other parameters are fitted; a
 period or rule is known only if the alternatives fit clearly worse. Rapids are fitted last, for every time constant.
 """
 
@@ -173,7 +173,7 @@ def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
 
 
 def _discrete(fits: Sequence[_Fit], facts: WatchFacts) -> tuple[_Fit, float | None]:
-    """The best fit, and the period if known; adds period and rule to the facts."""
+    """The best fit, and its interpolation period if certain; adds period and rule of block timing to the facts."""
     best = min(fits, key=lambda fit: fit.chi2)
     close = [fit for fit in fits if fit.chi2 < best.chi2 + _CLEARLY]
     periods = sorted({fit.period for fit in close})

@@ -1,6 +1,6 @@
 """Find what a controller would refuse in a program on reading it, and where it would not run it as programmed.
 
-The latter follows mainly from the time of each block at its feed.
+Where it would not run it as programmed follows mainly from the time that each block takes at its feed.
 """
 
 from __future__ import annotations

@@ -209,7 +209,7 @@ class Check(Result):
         return "shapegcode time predicts its cycle time, shapegcode simulate its vibration."
 
     def tables(self) -> list[Table]:
-        """The findings in the order of their positions; the first ones of a kind, and the number of the others."""
+        """Table of findings by position: the first of each kind, and for each code the number of those not shown."""
         if not self.findings:
             return []
         columns = (

@@ -64,7 +64,7 @@ class CuttingRun:
 
 @dataclass(frozen=True)
 class ClampedFeed:
-    """An F beyond the axis limits, with all its blocks."""
+    """A programmed feed beyond the axis limits, with the blocks that the limits slow down."""
 
     feed_mm_per_min: float  # as programmed
     first_line: int  # line of its first slowed block
@@ -151,7 +151,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
 
 
 def _shaper_s(program: Program, machine: Machine) -> float:
-    """Window for the busiest rate, s: shaper duration in a shaped program's header, at least the block time."""
+    """Window of the highest character rate, s: shaper duration by a program's header, at least the block time."""
     min_s = machine.controller.block_time_s
     try:
         return max(float(program.stamp.shaper_ms) * 1e-3, min_s) if program.stamp else min_s

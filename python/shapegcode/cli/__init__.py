@@ -126,7 +126,7 @@ def parser_of(selected: str | None) -> argparse.ArgumentParser:
 
 
 def _expected(error: Exception) -> bool:
-    """True for errors that need no traceback: of the input, of the file system, or matplotlib is missing."""
+    """True for errors that need no traceback: those of shapegcode, of the file system, and a missing matplotlib."""
     if isinstance(error, ModuleNotFoundError):
         return error.name == "matplotlib"
     # If the error is one of shapegcode, its core is loaded already: no import is needed.

@@ -268,7 +268,7 @@ arguments of argparse.
 
 @dataclass(frozen=True)
 class OneOf:
-    """Mutually exclusive options, in their group."""
+    """Options of which at most one may be given, shown in a group of the help."""
 
     title: str
     rows: tuple[Row, ...]

@@ -90,7 +90,7 @@ def _study_options(what: str, draws: str) -> tuple[Row, ...]:
 
 
 def _loaded(args: argparse.Namespace) -> tuple[StudyFile, Machine]:
-    """The study file and the machine, with program and machine file added to the input files of the command."""
+    """Load the study file and the machine; record program and machine file as inputs of the command."""
     from shapegcode.studies.study_file import load_study
 
     file = load_study(args.input)

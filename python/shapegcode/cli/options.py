@@ -231,7 +231,7 @@ def _facts(key: str) -> tuple[str, str, Any]:
 
 
 def decided_modes(args: argparse.Namespace, open_modes: Mapping[str, str], introduction: str) -> tuple[str, str]:
-    """Axes to keep and rigid axes, from the options; at a terminal also from a question for each undecided axis."""
+    """Axes whose modes are kept and rigid axes, by the options; at a terminal the user is asked for others."""
     keep, rigid = args.keep_modes or "", args.rigid or ""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return keep, rigid

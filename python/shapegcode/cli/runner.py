@@ -109,7 +109,7 @@ _NEVER_PIPED = {"npz": "an archive", "html": "a page"}
 def check_files(
     args: argparse.Namespace, *, also_written: Sequence[str | Path] = (), also_read: Sequence[str | Path] = ()
 ) -> None:
-    """Refuse an output file that the run also reads or writes twice, and a second output to standard output."""
+    """Refuse to overwrite an input file, to write a file twice, and to send two outputs to standard output."""
     given = {name: value for name in _WRITTEN if (value := getattr(args, name, None)) is not None}
     piped = ["-o -" if name == "output" else f"--{name} -" for name, value in given.items() if value == "-"]
     if len(piped) > 1:

@@ -1,7 +1,7 @@
 """``--program all``: run a command for every program of a file that no other one calls, each as if it were alone.
 
-Emitted programs are written into one file. Everything else in it is unchanged, also subprograms whose moves the shaped
-programs now contain.
+The emitted programs replace the originals in a copy of the file. Everything else is unchanged, also subprograms whose
+moves the shaped programs now contain.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _TABLES = ("csv", "npz", "html")
 
 
 def run_all(args: argparse.Namespace) -> int:
-    """Run a command for every program of its file that no other one calls."""
+    """Run a command for each program of a file, except those that others call, or called before shaping."""
     for name in _TABLES:
         if getattr(args, name, None) == "-":
             raise ArgumentError(f"--{name} - with --program all: each program needs a file, give one")

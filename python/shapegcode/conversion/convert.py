@@ -65,11 +65,11 @@ def convert(
         rapids: write rapids as shaped moves where that saves time: `shaping.rapids`.
         budget: limits of the emitted program; None: no limit.
         arc_feed_ratio: feed on arcs relative to the programmed one, reached before the arc: `shaping.arc_feed_ratio`.
-        block_period_s: block period, s: `emission.block_period_s`; None there too: chosen by `choose_grid`.
+        block_period_s: block period, s: `emission.block_period_s`; if neither is set, `choose_grid` chooses it.
         max_time_increase_percent: largest increase of the program's time: `price.program_time_percent`.
-        max_cut_time_increase_percent: likewise of one cut: `price.cut_time_percent`.
+        max_cut_time_increase_percent: largest increase of the time of one cut: `price.cut_time_percent`.
         only: ranges of lines (first, last) of the original: shape only the cuts with a line in one of them; None: all.
-        leave: likewise, but leave these cuts unchanged.
+        leave: ranges of lines (first, last) of the original: leave the cuts with a line in one of them unchanged.
         shape_all: shape every cut that can be shaped within the table ``[price]``, even if it gains less than
             `shaping.least_gain_um`, gets worse, or the program is within tolerance. False: such cuts stay unchanged.
         tolerance_curve: compute the cycle time at other contour tolerances.
@@ -221,7 +221,7 @@ def simulate(plan: ConversionPlan, written: Written, text: ReadBack, *, prefetch
 
 
 def keep_what_pays(plan: ConversionPlan, shaped: Shaped) -> Shaped:
-    """Loosen tolerances of cuts or leave cuts unchanged because of the budget, small gain, or the program's price."""
+    """Leave cuts unchanged for the budget or small gain; for the price loosen tolerances or leave more unchanged."""
     while plan.spending is not None and plan.spending.give_up(plan.grid, shaped.written, plan.verdicts(shaped)):
         for index, left_unchanged in plan.spending.left_unchanged.items():
             plan.reasons[index] = left_unchanged.reason

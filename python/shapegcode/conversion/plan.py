@@ -37,7 +37,7 @@ _LEVELS = 40  # steps of a bisection
 
 @dataclass
 class _Attempt:
-    """The last plan of a cut beyond its tolerance."""
+    """The latest plan with which a cut exceeded its tolerance."""
 
     allowed_um: float
     reached_um: float  # deviation reached with it
@@ -97,12 +97,12 @@ class Aims:
         return slower
 
     def tighten(self, written: Written, figures: Sequence[RegionFigures], judge: Judge) -> bool:
-        """Plan cuts beyond their contour tolerance more tightly, so that they are slower. False if no plan was changed.
+        """Plan cuts that exceed their contour tolerance for a tighter one, so that they slow down. False: no change.
 
         The bound on the feed treats corners and arcs one by one, but deviations within one shaper duration add up. If
-        the planned deviation of a cut is below its tolerance, tightening starts from that deviation (a bound above it
-        would change nothing). A cut that exceeds the limit only at other overrides is tightened once. A cut gets its
-        former plan back if tightening does not help, or was not enough at other overrides.
+        the planned deviation of a cut is below its tolerance, tightening starts from that deviation (with a
+        tolerance above it the plan would not change). A cut that exceeds the limit only at other overrides is tightened
+        once. A cut gets its former plan back if tightening does not help, or was not enough at other overrides.
         """
         allowed_um = self.allowed_um
         tightened = False
@@ -189,7 +189,7 @@ class Aims:
 
     @property
     def is_priced(self) -> bool:
-        """True if a shaped cut has a looser tolerance than requested: the tightest within its price."""
+        """True if a shaped cut has a looser tolerance than requested, namely the tightest one that its price allows."""
         return any(not self.reasons[index] for index in self._priced)
 
     def shaped_for_um(self, index: int) -> float:
@@ -230,7 +230,7 @@ class Aims:
         return TolerancePoint(name, tolerance_um, time_s, increase, within)
 
     def _planned_s(self, index: int, allowed_um: float) -> float:
-        """Time of a cut planned for a deviation, s; its cost of slowing is scaled to that of the blocks as written."""
+        """Time of a cut planned for a deviation, s; time lost by slowing is scaled to that of the written blocks."""
         curve, blocks_s = self._curve_of(index), self._blocks_s[index]
         min_s, now_s, then_s = (curve.time_s(um) for um in (math.inf, self.allowed_um[index], allowed_um))
         ratio = max(0.0, blocks_s - min_s) / (now_s - min_s) if now_s > min_s else 1.0
@@ -278,7 +278,7 @@ class CutCurve:
 
     @property
     def loosest_um(self) -> float:
-        """A planned deviation above which no time is saved, with a margin of 10 %."""
+        """Planned deviation above which no time is saved, plus 10 %."""
         return self.planned_um[-1] * 1.1
 
     def time_s(self, planned_um: float) -> float:
@@ -327,7 +327,7 @@ class ToleranceCurve:
 def plan_curve(
     path: _core.Path, fir: _core.Fir, options: _core.ShapingOptions, asked_um: float, original_um: float
 ) -> CutCurve:
-    """Plan a cut at several tolerances: first one that needs no slowing, then tighter ones to the requested one.
+    """Plan a cut at several tolerances: first without any limit, then ever tighter, down to the requested tolerance.
 
     Each search starts from the speeds of the search before it.
     """

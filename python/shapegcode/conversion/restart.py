@@ -190,7 +190,7 @@ class RestartPlaces:
         self.last = period
 
     def further_stops(self, points: Sequence[int], reached: Sequence[int], end: int) -> list[int]:
-        """Segments before which the command must stop, because it does not come nearly to rest within the interval."""
+        """Segments before which a stop is needed: otherwise restart points would be more than one interval apart."""
         stops: list[int] = []
         begins = np.asarray(reached)
         near = self._interval * _APART
@@ -304,7 +304,7 @@ class _PointLines:
         return begin, begin + len(self._text[begin:end].rstrip(b"\r\n"))
 
     def write(self, block: int, position: str) -> bytes | None:
-        """A block with its full modal state, G40 and G64 if they fit; None: it cannot be a restart point."""
+        """A block with its full modal state, G40 and G64 if the line has space; None: it cannot be a restart point."""
         if block >= len(self._begins):
             return None
         begin, end = self.extent(block)

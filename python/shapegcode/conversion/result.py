@@ -106,7 +106,7 @@ class Conversion(ProgramFigures, Result):
         reason: reason of the recommendation.
         cuts: every cut, shaped or left unchanged, with its gain and its time.
         tolerance_curve: what other contour tolerances cost in time; null: not computed, or no cut was ever shaped.
-        proof: that only the shaped cuts changed; null: nothing was shaped, or rapids were shaped without a header.
+        proof: evidence that only shaped cuts changed; null: nothing was shaped, or rapids were shaped without a header.
         advice: a smaller filter of the control that makes shaping unnecessary; null: none.
         cycle_time_s: whole program: cuts, rapids with in-position wait, dwells, drilling cycles, tool changes, M codes.
         cutting_time_s: the cuts alone, until the set-points rest.
@@ -122,8 +122,8 @@ class Conversion(ProgramFigures, Result):
         budget: only with a budget: its limits and effect.
         rapids: only with shaped rapids: their outcome.
         least_gain_um: smallest gain for which a cut is shaped, µm.
-        parameter_sensitivity: unverified values that matter; first that which increases a figure most, relative to
-            the limit of the figure.
+        parameter_sensitivity: unverified values that matter, sorted by how much they increase a figure relative to its
+            limit, the largest increase first.
         unverified_parameters_tested: number of unverified values that were changed, one at a time.
         at_the_control: cautions for loading and running it; empty if nothing was shaped.
         restart_points: blocks inside shaped cuts at which the control can restart.
@@ -269,7 +269,7 @@ class Conversion(ProgramFigures, Result):
         return "lines {} to {}: {}".format(*best.lines, best.reason)
 
     def _left_out(self) -> Iterator[str]:
-        """The first cut beyond its limits, unchanged cuts first, and its remedy."""
+        """A cut beyond its limits, and its remedy: the first one left unchanged, else the first shaped one."""
         out = sorted((cut for cut in self.cuts if cut.misses), key=lambda cut: cut.is_shaped)
         for cut in out[:1]:
             how = f"left unchanged ({cut.reason})" if not cut.is_shaped else self._cost_of(cut)
@@ -342,7 +342,7 @@ class Conversion(ProgramFigures, Result):
         return [before_after, *cuts, *curve, *cases, *rests, control_table(self.at_the_control), *points]
 
     def before_after(self) -> list[list[BeforeAfter]]:
-        """Every figure of original and emitted, in groups."""
+        """Every figure of the original and the emitted program, in groups."""
         pairs = (("cycle time", self.cycle_time_s), ("cutting time", self.cutting_time_s))
         times = [BeforeAfter(name, "s", pair.original, pair.emitted, 3) for name, pair in pairs]
         return [times, *self._vibrations(), *self._contours(), *self._orbits_and_feeds(), self._sizes()]
@@ -366,7 +366,7 @@ class Conversion(ProgramFigures, Result):
         ]
 
     def residual_limit_um(self, axis: str) -> float | None:
-        """Limit of residual vibration of an axis in the cut with the largest emitted one, µm.
+        """Limit of residual vibration of an axis, µm, in the cut whose emitted residual vibration along it is largest.
 
         Args:
             axis: "x", "y" or "z".

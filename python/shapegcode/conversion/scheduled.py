@@ -122,13 +122,13 @@ def convert_scheduled(
     Args:
         program: the program to convert, or its file.
         machine: controller, modes, tolerances.
-        tools: as :func:`shapegcode.feed.schedule.schedule_feed`.
-        stock: likewise.
-        margin: likewise.
-        resolution_mm: likewise.
-        block_period_s: as :func:`shapegcode.convert`.
-        arc_feed_ratio: likewise.
-        budget: likewise.
+        tools: see :func:`shapegcode.feed.schedule.schedule_feed`.
+        stock: see `schedule_feed`.
+        margin: see `schedule_feed`.
+        resolution_mm: see `schedule_feed`.
+        block_period_s: see :func:`shapegcode.convert`.
+        arc_feed_ratio: see `convert`.
+        budget: see `convert`.
         on_progress: called with the finished ratio, 0 to 1.
 
     Returns:

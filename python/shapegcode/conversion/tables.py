@@ -96,7 +96,7 @@ class _Region:
         return "".join(axis for axis, extent in zip("xyz", extent_mm, strict=True) if extent > 0.0)
 
     def sensitivity(self, value: KeyValue, tested: str, figures: RegionFigures, simulated: CaseFigures) -> Sensitivity:
-        """The figure that a changed value increases most, relative to its limit, over the nominal condition."""
+        """The figure, relative to its limit, that a changed value raises most above that of the nominal condition."""
         limits = self.judge.limits(figures, self.place)
         own = figures.emitted[self.judge.rules.index(self.judge.own_rule)]
         before = {each.figure: each for each in judge_region(case_figures(own), limits)}
@@ -111,7 +111,7 @@ class _Region:
 def start_trials(
     judge: Judge, machine: Machine, place: Placed, emitted: Program, tracker: _core.ContourTracker, pool: Executor
 ) -> StartedTrials:
-    """Start the first simulations with contour error for `parameter_sensitivity`, for a program with one region."""
+    """Start those of the first trials of `parameter_sensitivity` that need the contour error (one region only)."""
     region = _Region(place, emitted, judge, tracker)
     trials = filter(region.needs_contour, islice(_trials(machine, region.moving), _FULL_RUNS))
     return {_name(trial): pool.submit(region.simulate, trial, contour=True) for trial in trials}
@@ -155,7 +155,7 @@ def parameter_sensitivity(
 
 
 def _ranked(rows: Sequence[Sensitivity]) -> tuple[Sensitivity, ...]:
-    """The worst trial of each key, largest effect first; small effects only of axes with unknown modes."""
+    """The worst trial of each key, largest effect first; small effects are dropped, except of unknown modes."""
     worst: dict[str, Sensitivity] = {}
     for row in rows:
         matters = row.share >= _MIN_SHARE or row.key.endswith(".modes")
@@ -178,7 +178,7 @@ def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
 
 
 def _other_command(machine: Machine, unmeasured: Mapping[str, KeyValue], key: str, other_s: float) -> Iterator[_Trial]:
-    """A trial with another time constant or period, which changes the set-points too; none if measured or invalid."""
+    """A trial of another time constant or period, with other set-points; none if it was measured or is invalid."""
     with suppress(MachineError):
         if key in unmeasured:
             yield _Trial(unmeasured[key], f"{other_s:g} s", machine.with_values(key, other_s), moves_command=True)

@@ -380,7 +380,7 @@ class _Translator:
         return lines
 
     def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
-        """The original's own words by the FANUC words read for them, if it was written for the output control."""
+        """For FANUC words of a block, the words of the original, if that was written for the control of the output."""
         held = dict(words)
         found = {}
         if (tool := self._names.get(f"T{held.get('T', '')}")) is not None:

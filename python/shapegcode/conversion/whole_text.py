@@ -106,10 +106,11 @@ class Written:
 
 
 class Prefetch(Generic[T]):
-    """Runs tasks in a pool, in their order, a few of them before their results are fetched.
+    """Runs tasks in a pool, in order; a limited number of them is started ahead of the results that are fetched.
 
-    `tasks`: by number; each calls its argument with its finished ratio. `on_progress`: called with the sum of the
-    finished weights, also of parts without a task, by the thread that fetches results; it may be replaced.
+    `tasks`: by number; each gets a function, and calls it with the ratio of the task that is finished. `weights`: of
+    all parts, some of which have no task. `on_progress`: called with the sum of the finished weights, by the thread
+    that fetches results; it may be replaced.
     """
 
     def __init__(
@@ -128,7 +129,7 @@ class Prefetch(Generic[T]):
         self._done = 0.0
 
     def start(self) -> None:
-        """Start tasks, up to the limit of results that are not fetched."""
+        """Start tasks until there are as many results to fetch as the limit allows."""
         while self._waiting and len(self._running) < _WAITING * cores():
             number, task = self._waiting.pop()
             future = self._pool.submit(task, partial(self._put, number))
@@ -136,7 +137,7 @@ class Prefetch(Generic[T]):
             self._running[number] = future
 
     def result(self, number: int) -> T:
-        """The result of the next task."""
+        """Result of task *number*, the next one in order; waits for it."""
         self.start()
         future = self._running.pop(number)
         while not future.done():
@@ -188,7 +189,7 @@ class TextWriter:
     def write(
         self, reasons: Sequence[str], aims: Mapping[int, Aim], unreported: Collection[int], on_progress: Step
     ) -> Written:
-        """Write the whole program; *reasons*: why a region is left unchanged."""
+        """Write the whole program; *reasons*: for each region why it is left unchanged, empty to shape it."""
         core, regions = self._program.core, self._program.regions
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)

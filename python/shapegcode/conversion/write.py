@@ -90,7 +90,7 @@ class TransferLoad:
 
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
-    """Measure the highest data rate of a shaped cut as a mean over the shaper's duration; it hardly changes faster."""
+    """Measure the highest data rate of a shaped cut as a mean over the shaper's duration: rates vary slowly."""
     durations = np.concatenate(shaped.block_periods, dtype=np.float64)
     durations *= grid.block_period_s
     window_s = max(grid.duration_s, grid.block_period_s)
@@ -168,7 +168,7 @@ class _Marks:
         """N word at the start of the region, as written, to put before its prologue; empty: none."""
 
     def within(self, piece: _core.ShapedCommand, *, last: bool) -> tuple[list[_core.BlockMark], list[int]]:
-        """N words and comments within a piece, and the periods from its start at which blocks must end for them."""
+        """N words and comments within a piece; periods from its start at which blocks must end to place them."""
         first = piece.first_period
         end = first + len(piece.middle_mm)
         reached = piece.segment_periods
@@ -270,7 +270,7 @@ class RegionWriter:
         return places
 
     def _stop_for_restarts(self, region: _core.Region, options: _core.ShapingOptions) -> tuple[int, int]:
-        """Add stops for restart points where needed; return the number of block periods without them, and of stops."""
+        """Add the stops that restart points need; return the block periods without these stops, and their number."""
         places = self._places(region)
         segments = range(1, len(region.path))
         shaper = _core.RegionShaper(region.path, self._grid.fir, segments, options)
@@ -503,7 +503,7 @@ def linear_lines(
 
 
 def joints_of(lines: Mapping[int, str], numbers: Sequence[int]) -> list[int] | None:
-    """Indices of blocks that must begin a joined block: after other lines, with N words; None: not only moves."""
+    """Indices of blocks that begin a new joined block (N word, or after other lines); None: a line is no mere move."""
     if not all(_MERE_MOVE.fullmatch(lines[number]) for number in numbers):
         return None
     pairs = enumerate(pairwise(numbers), start=1)

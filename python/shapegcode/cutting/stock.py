@@ -148,7 +148,7 @@ class Stock(TomlTable):
 
     @property
     def kind(self) -> Literal["box", "polygon", "allowance", "program"]:
-        """The table that the file has, of the four kinds."""
+        """Which of the four tables the file has, by name."""
         return next(name for name in ("box", "polygon", "allowance", "program") if getattr(self, name) is not None)
 
     def beside(self, name: str) -> Path:

@@ -215,7 +215,7 @@ def _extended(points: Points, length_mm: float) -> Points:
 
 
 def _with_touched(points: Points) -> Points:
-    """Insert into each segment of a line the other points of the line on it, as where its end overlaps its start."""
+    """Split the segments of a line at its other points that lie on them, such as where its end overlaps its start."""
     import shapely
 
     pieces = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
@@ -315,7 +315,7 @@ def _placed(shape: Geometry, source: Geometry, distance_mm: float) -> Geometry:
 
 
 def _turns(shape: Geometry, corners: Points) -> NDArray[np.intp]:
-    """Indices of real turns of an outline with these corners, not between two chords of an arc."""
+    """Indices of the corners at which an outline turns by more than from one chord of an arc to the next."""
     import shapely
 
     begin, turns = 0, []
@@ -364,7 +364,7 @@ def build_material(
     *,
     others: Sequence[_core.Path] = (),
 ) -> _core.Material:
-    """Build the material before the first block of a program; for the kind `program` swept by the roughing tool."""
+    """Build the material before the first block of a program; stock of kind `program` is swept by the roughing tool."""
     pieces = stock_polygons(stock, paths, tool.radius_mm)
     rough = stock.program
     diameter_mm = 0.0 if rough is None else Tool.load(stock.beside(rough.tool)).tool.diameter_mm

@@ -324,7 +324,7 @@ class Tool(TomlTable):
         return _core.SpindleSense.clockwise if programmed is None else programmed
 
     def coefficients(self) -> _core.CuttingCoefficients:
-        """Cutting-force coefficients for the core: those of the file; those that it lacks from its material."""
+        """Cutting-force coefficients for the core: from the tool file; those missing there are of the work material."""
         return self.cutting.coefficients()
 
     def force(

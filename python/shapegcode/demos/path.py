@@ -151,7 +151,7 @@ class PathDemo(Result):
 
 
 def path_program(feed_mm_per_s: float, machine: Machine) -> Program:
-    """The paper's line, quarter arc, line, with its listing's first and last lines, at a feed."""
+    """Program of the paper's path at a feed; it begins and ends with the lines printed in the paper."""
     text = (resources.files("shapegcode") / "data" / "paper_path.nc").read_text(encoding="ascii")
     text = text.replace("F12000.", f"F{feed_mm_per_s * 60:.0f}.")
     return Program.from_text(text, machine, source="paper_path.nc")

@@ -189,7 +189,7 @@ class WallMaps:
 def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTraces) -> WallMaps | None:
     """Walls along the cutting path; None: no walls.
 
-    A column is the wall where the peak resultant of the original is largest in an interval of the path.
+    Each column is an interval of the path; it shows the wall at the station with the original's largest peak resultant.
 
     Source: the error of a wall is from Kim and Ko, 2001 (paper 001), section 2.3; its map is this project's.
     """

@@ -238,7 +238,7 @@ def goes_on(track: _core.EngagementTrack) -> npt.NDArray[np.bool_]:
 
 
 def _stepped(limit: Vector, programmed: Vector) -> Vector:
-    """Round feeds down in steps of 0.5 %, counted from the programmed feed, or from the largest for feeds above it."""
+    """Round feeds down in steps of 0.5 % from the programmed feed; feeds above that, from the largest feed."""
     top = np.where(limit > programmed, limit.max(initial=0.0), programmed)
     steps = np.ceil(np.log(top / limit) / math.log1p(_STEP) - 1e-9)
     return np.asarray(top * (1.0 + _STEP) ** -steps)

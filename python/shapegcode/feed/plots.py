@@ -301,7 +301,7 @@ def _both_sides(low: float, high: float) -> Colormap:
 
 
 def with_forces(scene: Scene, schedule: FeedSchedule) -> Scene:
-    """Add the largest resultant in a revolution along each region to the motion."""
+    """Add the cutting force along each region to the motion: the largest resultant within a revolution."""
     loads = schedule.loads
     regions = [[part.region for part in schedule.survey.regions], list(schedule.written.regions)]
     variants = []

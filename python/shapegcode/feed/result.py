@@ -122,7 +122,7 @@ class FeedSchedule(Result):
         blocks: number of blocks with a cutting move of a region.
         limits: limits of the feed by lines, in order.
         regions: sequences of cutting moves between two stops.
-        moves: cutting moves in material outside of them.
+        moves: cutting moves in material outside the regions.
         excess_ratio: largest relative excess of a limit where a lower feed could help; 0: none.
         warnings: findings, each with its location.
         text: the program with its new feeds.

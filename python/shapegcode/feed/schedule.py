@@ -58,7 +58,7 @@ def schedule_feed(
         tools: the tool, or several with their T numbers.
         stock: stock before the first block.
         motion: motion at the new feeds; None: the controller's own, as for an ordinary program.
-        margin: safety margin to each limit of the load, as a ratio; none to that of the feed per tooth.
+        margin: safety margin to each limit of the load, as a ratio; the limit of the feed per tooth has no margin.
         resolution_mm: grid spacing of the simulated material; None: a hundredth of the smallest tool's diameter.
         on_progress: called with the completed fraction, 0 to 1.
 
@@ -186,7 +186,7 @@ def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine)
 
 
 def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index: int) -> bool:
-    """Whether the next region gets its own feed, and no block before it needs the modal feed restored."""
+    """Whether the next region is written with its own feed, and no block between the regions uses the modal feed."""
     if index + 1 == len(plans) or plans[index + 1] is None:
         return False
     here, following = program.regions[index], program.regions[index + 1]
@@ -298,7 +298,7 @@ def _region(
 def _misses(
     part: SurveyedRegion, plan: FeedPlan | None, load: PathLoad | None, machine: Machine
 ) -> Iterator[tuple[str, float]]:
-    """Messages for limits exceeded after the schedule, and the relative excess if a lower feed could help."""
+    """Messages for limits that are still exceeded, each with the relative excess that a lower feed could reduce."""
     if load is None or part.tool is None or part.track is None:
         return
     helped = np.zeros(len(load.s_mm), dtype=bool) if plan is None else ~np.isin(plan.holds, (KEPT, MINIMUM))
@@ -323,7 +323,7 @@ def _resultants(loads: Sequence[PathLoad]) -> Pair[result.ResultantForce]:
 
 
 def _resultant(loads: Sequence[Load]) -> result.ResultantForce:
-    """Mean over the time in material of the mean resultant, and the largest resultant of all."""
+    """Mean resultant, averaged over the time in the material, and largest resultant, of all loads together."""
     cut = [load.peak_resultant_n > _AIR_N for load in loads]
     parts = list(zip(loads, cut, strict=True))
     time = sum(float(load.time_s[inside].sum()) for load, inside in parts)

@@ -33,12 +33,12 @@ _SHIFT_WORD = re.compile(rb"[XYZIJK]\s*([+-]?[\d.]+)")
 
 @dataclass(frozen=True)
 class Survey:
-    """A program swept through its stock.
+    """The tool engagement along a program, whose tools sweep its stock.
 
     Attributes:
-        program: the swept program.
+        program: the program.
         regions: its regions in order.
-        moves: cutting moves in material outside of them.
+        moves: cutting moves in material outside the regions.
         material: remaining stock.
         warnings: findings, each with its location.
     """
@@ -179,7 +179,7 @@ def why_not_swept(region: _core.Region, zero: ZeroPoints) -> str:
 
 
 def _above_overhang(tool: Tool, track: _core.EngagementTrack) -> float:
-    """Largest height above the tip at which the tool cuts, mm, if it is above the overhang; else 0."""
+    """Height above the tip up to which the tool cuts, mm, if that exceeds the tool's overhang; else 0."""
     top = float(track.arcs[:, 3].max(initial=0.0)) if len(track.arcs) else 0.0
     return top if top > tool.tool.overhang_mm else 0.0
 
@@ -266,7 +266,7 @@ class Walk:
         return found
 
     def why_no_tool(self, cutters: Sequence[Tool | None]) -> str:
-        """Message for missing tools if no region has one; empty if that is not the reason."""
+        """Message with used and described tools, if there are regions and none has a described tool; else empty."""
         if not cutters or any(cutter is not None for cutter in cutters):
             return ""
         used_tools = f"the program uses {', '.join(self._used)}" if self._used else "the program names no tool"
@@ -358,7 +358,7 @@ class Walk:
 
 
 class ZeroPoints:
-    """Work coordinates and zero shifts along the program; the stock is in those of the first cutting move."""
+    """Work coordinates and zero shifts along the program; the stock is described in those of the first cutting move."""
 
     def __init__(self, program: Program) -> None:
         self._lines: list[int] = []  # lines of changes

@@ -63,7 +63,7 @@ class _Amplitudes:
 
 
 def measured(sources: Sequence[Any], options: ReadOptions) -> list[Measured]:
-    """Records and frequency responses of all sources; files are read."""
+    """Records and frequency responses of all sources; reads those that are files."""
     found: list[Measured] = []
     for each in sources:
         found += [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options)
@@ -123,7 +123,7 @@ def _is_significant(estimate: Estimate, size: float) -> bool:
 def _amplitudes(
     found: Identification, by_axis: Mapping[str, Sequence[Measured]], poles: _Poles
 ) -> tuple[list[_Amplitudes], dict[str, list[_Amplitudes]]]:
-    """Amplitudes along the axis of the modes, and along each other axis."""
+    """Amplitudes of the modes along their own axis; the same along each of the other axes, by axis."""
     ready = found.prepared
     of_own: Measured = found.responses[0] if ready is None else ready.records[0]
     for each in (part for parts in by_axis.values() for part in parts):
@@ -175,7 +175,7 @@ def _records_beside(
 
 
 def _beside(use: Record, records: Sequence[Record], files: Sequence[str]) -> Record:
-    """Find the record of another channel that covers the time of a checked one."""
+    """Cut from the records of another axis the part recorded at the same time as *use*."""
 
     def far(each: Record) -> tuple[bool, bool, float]:
         own = f"{use.source} ".startswith(f"{each.source} ")
@@ -206,7 +206,7 @@ def _is_of_refused(each: Measured, found: Identification) -> bool:
 
 
 def _same_file(use: Record, other: Record, files: Sequence[str]) -> bool:
-    """True if both records are of one file; in a source, channel and impact follow the file name."""
+    """True if both records are of one file: their sources begin with its name, followed by channel and impact."""
     return any(all(f"{each.source} ".startswith(f"{name} ") for each in (use, other)) for name in files)
 
 
@@ -278,7 +278,7 @@ def _solved(columns: FloatArray, goal: FloatArray, modes: int) -> tuple[ComplexA
 
 
 def _local(at: FloatArray, power: FloatArray, poles: _Poles) -> FloatArray:
-    """Residual power around each mode, relative to the mean; 1 if it is smaller."""
+    """Residual power around each mode relative to the mean, at least 1."""
     omega, zeta = poles.omega, poles.zeta
     mean, step = max(float(np.mean(power)), 1e-300), float(at[1] - at[0])
     reach = np.maximum(_LOCAL_WIDTHS * zeta * omega, _LOCAL_LINES * step)

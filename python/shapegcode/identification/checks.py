@@ -31,7 +31,7 @@ class RecordUse:
 
     @property
     def duration_s(self) -> float | None:
-        """Duration, s; None if not used, or of a frequency response."""
+        """Duration, s; None for a record that is not used, or for a frequency response."""
         return None if self.samples is None or self.period_s is None else self.samples * self.period_s
 
 
@@ -49,7 +49,7 @@ class Hit:
 
 @dataclass(frozen=True, eq=False)
 class Usable:
-    """A usable record and its noise and pulse, which are None for a free decay."""
+    """A usable record, its noise and its pulse; for a free decay both noise and pulse are None."""
 
     record: Record  # without offset; the force is 0 outside the pulse; a free decay from its beginning
     force_noise_n: float | None = None  # RMS noise of the force outside the pulse
@@ -421,7 +421,7 @@ def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
 
 
 def _has_rested(record: Record, noise: float, hit: Hit, next_hit: Hit) -> bool:
-    """Whether the response has decayed between two impacts, or to its noise."""
+    """Whether the response decays between two impacts: at the end, little of it remains above the noise."""
     between = (record.response - np.median(record.response))[hit.end : next_hit.first]
     peak = float(np.max(np.abs(between)))
     power = float(np.mean(between[-max(1, len(between) // 10) :] ** 2)) - noise**2

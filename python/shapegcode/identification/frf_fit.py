@@ -183,7 +183,7 @@ def _merged(used: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
 
 
 def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -> tuple[_Measured, Hits]:
-    """Lines of the impacts with these responses, for the fit."""
+    """Spectral lines of the impacts, to be fitted; *responses*: those of the records, without steady oscillations."""
     period = ready.records[0].period_s
     duration = min(len(each) for each in responses) * period
     excited = min(max(each.excited_hz or 0.0 for each in ready.usable), 0.45 / period)
@@ -235,7 +235,7 @@ def _left(measured: _Measured, hits: Hits, model: ComplexArray) -> ComplexArray:
 
 
 def _in_responses(responses: Sequence[FrequencyResponse], sought: Sought) -> FrfModes:
-    """Search twice, weighting the lines by the first residual for the second, and test every mode."""
+    """Search for modes, again with lines weighted by the residual of the first search, and test every mode found."""
     parts = tuple(measured_lines(each, sought.exponential_window_s) for each in responses)
     low, high = min(float(each.omega[0]) for each in parts), max(float(each.omega[-1]) for each in parts)
     measured = _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
@@ -289,7 +289,7 @@ def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[Identifi
 
 
 def _weighed(lines: Lines, model: ComplexArray) -> Lines:
-    """Weight lines by the residual's noise: in proportion to the assumed noise or the model, or half of each."""
+    """Weight lines by the noise that fits the residual best: as assumed, as the model, or the mean of both."""
     left = np.abs(lines.response - model) ** 2
     # Lines without a mode nearby have no model: they keep their assumed noise.
     left = np.where(left > 0.0, left, np.log(2.0) / lines.weight**2)
@@ -380,7 +380,7 @@ def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], soug
 
 
 def _other_fits(window: Window) -> list[ModalFit]:
-    """The same modes in a narrower band with another background, and with the other kind (real, complex)."""
+    """Fits of the same modes: one in a narrower band with another background, one as the other kind (real, complex)."""
     starts, kind = starts_of(window.fit), window.fit.complex_modes
     ends = (float(window.parts[0].omega[0]), float(window.parts[0].omega[-1]))
     narrow = [cut(lines, window.low / 1.15, window.high * 1.15, kind, 1) for lines in window.parts]
@@ -396,7 +396,7 @@ def _other_fits(window: Window) -> list[ModalFit]:
 def _logarithms(
     window: Window, known: Uncertainty, index: int, measured: _Measured, others: Sequence[ModalFit]
 ) -> tuple[FloatArray, FloatArray]:
-    """ln of frequency (Hz), damping ratio, mass, viscous damping, stiffness, and half of their 95 % intervals."""
+    """Logarithms of frequency (Hz), damping ratio, mass, viscous damping and stiffness, and their 95 % half-widths."""
     fit = window.fit
     residue = abs(frf_search.residues_of(fit)[0, index])
     omega, zeta = starts_of(fit)[index]
@@ -419,7 +419,7 @@ def _logarithms(
 
 
 def _misfit(fit: ModalFit, parts: Sequence[Lines], index: int) -> float:
-    """Residual power of the fit around a mode over that in the whole window; 1 if it is smaller."""
+    """Mean residual power of the fit around a mode, relative to that in the whole window; at least 1."""
     omega, width = float(fit.omega[index]), 2.0 * float(fit.zeta[index] * fit.omega[index])
     around, count = 0.0, 0
     for lines, left in zip(parts, fit.left, strict=True):
@@ -520,7 +520,7 @@ def _response_refusal(residues: ComplexArray) -> str:
 
 
 def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[StablePole]) -> str:
-    """Refuse a mode unless the fit without it is worse: clearly, if it lacks a peak of its own or a stable pole."""
+    """Refuse a mode unless the fit is worse without it; much worse, if the mode lacks an own peak or a stable pole."""
     fit = window.fit
     omega, zeta = starts_of(fit)[index]
     share = min(lines.independent for lines in window.parts)

@@ -61,7 +61,7 @@ class Lines:
         return found
 
     def near(self, omega: float, reach: float, steps: float = 3.0) -> npt.NDArray[np.bool_]:
-        """Mask of the lines within a distance of an angular frequency, at least *steps* line spacings."""
+        """Mask of the lines within *reach* of an angular frequency; if *steps* line spacings are more, within these."""
         return np.asarray(np.abs(self.omega - omega) <= max(reach, steps * float(self.omega[1] - self.omega[0])))
 
     @property

@@ -80,7 +80,7 @@ def candidates_of(parts: Sequence[Lines]) -> tuple[list[StablePole], list[Pole]]
 
 
 def _clusters(poles: list[Pole], orders: int) -> list[StablePole]:
-    """Group poles of one band that are one mode; values are from the models of higher order."""
+    """Group the poles of one band by mode; values are medians over the half of a group with the highest orders."""
     left = sorted(poles, key=lambda pole: -pole.order)
     found = []
     while left:
@@ -116,7 +116,7 @@ class Window:
 def search(
     parts: Sequence[Lines], low: float, high: float, most: int, candidates: Sequence[StablePole], starts: Starts | None
 ) -> list[Window]:
-    """Fit windows, with the response of outside modes subtracted; starts from stable poles, or from `starts`."""
+    """Fit the modes of each window, begun from stable poles or `starts`; the response of other modes is subtracted."""
     final, least = starts is not None, STABLE if starts is None else np.inf
     spare = [(each.omega, each.zeta) for each in candidates if each.share < least]
     if starts is None:
@@ -201,7 +201,7 @@ def residues_of(fit: ModalFit) -> ComplexArray:
 def _fit_window(
     parts: Sequence[Lines], near: Starts, spare: Starts, low: float, high: float, most: int, final: bool
 ) -> list[Window]:
-    """Fit a window, modes chosen by evidence, from the starts near it; empty with too few lines or no mode."""
+    """Fit the modes of a window from starts near it; evidence decides how many. Empty: too few lines, or no mode."""
     found: list[tuple[float, Window]] = []
     for complex_modes in (True, False) if final else (True,):
         wide = tuple(cut(lines, low / _MARGIN, high * _MARGIN, complex_modes) for lines in parts)
@@ -241,7 +241,7 @@ def _thinned(lines: Lines) -> Lines:
 
 
 class _Selection:
-    """Modes of a window: adds or removes one from the starts while the evidence supports it."""
+    """Selects the modes of a window: adds, splits or removes one at a time while that improves the evidence."""
 
     def __init__(self, parts: Sequence[Lines], starts: Starts) -> None:
         self.parts, self.share = parts, min(lines.independent for lines in parts)
@@ -401,7 +401,7 @@ def starts_of(fit: ModalFit | None) -> Starts:
 
 
 def _twins(fit: ModalFit) -> bool:
-    """Whether two modes coincide (fitted to something that is no mode), or one is no vibration."""
+    """Whether two modes of a fit coincide (one then fits no real mode), or one has too much damping to vibrate."""
     order = np.argsort(fit.omega)
     omega, zeta = fit.omega[order], fit.zeta[order]
     near = np.diff(omega) < _TWINS * np.maximum(zeta[1:], zeta[:-1]) * omega[1:]
@@ -409,7 +409,7 @@ def _twins(fit: ModalFit) -> bool:
 
 
 def _apart(fit: ModalFit) -> Starts:
-    """Modes of a fit, at least one fewer: of two that coincide only the stronger, else without the weakest."""
+    """Leave out the modes of a fit that are heavily damped or coincide with a stronger one; if none is, the weakest."""
     order = np.argsort(np.max(np.abs(fit.residues), axis=0))[::-1]
     kept: list[int] = []
     for index in order:

@@ -58,22 +58,22 @@ def identify(
     """Identify modes from taps of one point (with force), free decays (without force), sweeps or frequency responses.
 
     Args:
-        source: a file (CSV, UFF, WAV, MATLAB), several files, records or frequency responses; of one axis
-            and one point, frequency responses also of several points. With `response`: the instants of its samples in
-            s, shape (n,), evenly spaced.
+        source: a file (CSV, UFF, WAV, MATLAB), several files, records or frequency responses. All are
+            of one axis and one point; only frequency responses may be of several points. With `response`: the instants
+            of its samples in s, shape (n,), evenly spaced.
         response: what a sensor measured at these instants, shape (n,), in the unit of `quantity`. A `ReadOptions`
             here is taken as `options`.
         force: of the hammer at these instants in N, shape (n,); None: a free decay.
         options: information missing in the files.
         quantity: of `response`: "acceleration" in m/s², "velocity" in m/s or "displacement" in m.
-        max_modes: largest number of modes; None: 40 over frequency, 8 over time. A sweep without force: 4 at most.
+        max_modes: largest number of modes; None: 40 (frequency fit), 8 (time fit). A sweep without force: 4 at most.
         modes: number of modes; None: by information criterion.
         band_hz: lowest and highest frequency of interest; None: all (a sweep without force: 10 to 130 Hz).
         start_s: time at which a decay begins; None: found automatically.
         stops: the records are of an ordinary run: every stop after which the machine rests is a decay; the 20
             strongest of a record are used. Motion below 10 Hz, or the lower end of `band_hz`, is no vibration.
-        accepted_percent: largest accepted half width of the 95 % interval of the damping ratio, in percent (in a fit
-            over time also of the stiffness); None: 5 % over time, 50 % over frequency. Not for a sweep without force.
+        accepted_percent: largest accepted half width of the 95 % interval of the damping ratio, in percent (in a time
+            fit also of the stiffness); None: 5 % in a time fit, 50 % in a frequency fit. Not for a sweep without force.
         sweep: the program that ran during the record and moves one axis, as from `write_sweep`: its command takes the
             place of the force. The logger's start and clock error are found from the record.
         machine: the machine whose controller ran it.
@@ -86,7 +86,8 @@ def identify(
 
     Raises:
         ArgumentError: a number of modes outside 1 to 99; a sweep without its machine; options that cannot be combined.
-        RecordError: no record can be used; the message says why and what is needed. No response along another axis.
+        RecordError: no record can be used, or with `across` no response along another axis was found; the message
+            says why and what is needed.
         MachineError, ProgramError: an invalid machine file, or program of a sweep.
         OSError: a file cannot be read.
 
@@ -190,7 +191,7 @@ def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: 
 
 
 def _turned_if_opposed(ready: Prepared, found: Identification, sought: model_search.Sought) -> Identification:
-    """The modes found; if there are none, but some opposite to the force, those of responses with reversed sign."""
+    """The modes found; if none, and some were opposite to the force: those of the reversed responses, if any."""
     if found.modes or not any(mode.refusal == model_search.OPPOSED for mode in found.refused):
         return found
     text = f"{ready.records[0].source}: {model_search.TURNED}"
@@ -215,7 +216,7 @@ def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record
 
 
 def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: model_search.Sought) -> Identification:
-    """Modes of the stillest third of the stops in ordinary runs, then of all stops that these modes explain."""
+    """Find modes in the stillest third of the stops of ordinary runs, then again in all that these modes explain."""
     forced = [record for record in records if record.force_n is not None]
     if forced:
         raise ArgumentError(f"{forced[0].source}: contains a force: stops are searched in a run without a hammer")
@@ -312,7 +313,7 @@ def find_modes(ready: Prepared, files: tuple[str, ...], sought: model_search.Sou
 
 
 def _few(ready: Prepared, problem: FitProblem, many: FrfModes, narrow: bool) -> int | None:
-    """Number of modes for a fit over time; None unless a few explain the records or `many` supports none."""
+    """Number of modes to expect in a fit over time; None: the fit over frequency, `many`, is to be used."""
     supported = [mode for mode in many.modes if not mode.refusal]
     starts = [(2.0 * np.pi * mode.frequency_hz.value, mode.damping_ratio.value) for mode in supported]
     power = np.mean([np.mean(record.response**2) for record in ready.records])
@@ -362,7 +363,7 @@ def _warnings_of(ready: Prepared) -> list[str]:
 def _choose_course(
     problem: FitProblem, models: model_search.Search, sought: model_search.Sought
 ) -> tuple[FitProblem, model_search.Search, list[Fit]]:
-    """Choose the intersample behaviour of the force by evidence; also returns fits with the other possible ones."""
+    """Choose the intersample behaviour of the force by evidence; also return fits with other possible behaviours."""
     courses = [(problem, models)]
     order = max(sought.order(models), 1)
     for other in problem.other_courses(models.fits[order - 1]):
@@ -484,7 +485,7 @@ def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
 
 
 def _alone(problem: FitProblem, fit: Fit) -> list[Fit]:
-    """The same modes fitted to each record alone; none if there is only one, or a record lacks a mode."""
+    """Fits of the same modes to each record alone; empty if there is a single record, or if one record lacks a mode."""
     count = len(problem.responses)
     try:
         return [problem.record(index).fit(model_search.starts_of(fit)) for index in range(count if count > 1 else 0)]

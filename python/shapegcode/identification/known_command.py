@@ -170,7 +170,7 @@ def _held_at_ends(values: FloatArray) -> bool:
 
 
 class _Clock:
-    """Clock of a record: program time = middle of a part + (logger's time - that of the middle) * (1 + rate)."""
+    """Clock of a record: program time = m + (logger's time - logger's time at m) * (1 + rate), m: middle of a part."""
 
     def __init__(self, command: KnownCommand, record: Record) -> None:
         if record.quantity != "acceleration":
@@ -208,7 +208,7 @@ class _Clock:
         self.correlation = float(np.mean(self.shares))
 
     def _coarse(self) -> tuple[float, float, float, FloatArray]:
-        """Find rate, start, wait, squared correlation of each part, below 40 Hz and 40 % of the sampling rate."""
+        """Find rate and start of the clock, wait per part, and squared correlation of each part, all below 40 Hz."""
         command, period = self.command, self.record.period_s
         thinner = max(1, int(0.4 / period / _COARSE_HZ))
         values = resample_poly(self.values, 1, thinner)
@@ -259,7 +259,7 @@ class _Clock:
         return best[1:]
 
     def aligned(self, band_hz: tuple[float, float] | None, chosen: bool, others: Sequence[Record]) -> _Aligned:
-        """Ratio −response/command with start and clock found; also for other axes of the sensor."""
+        """Find start and clock of the record, and the ratio −response/command, also for other axes of the sensor."""
         rows = self._recorded(self._clear_parts(), _FEWEST_PARTS)
         clear = np.isin(np.arange(len(self.windows)), rows)
         spectra = self._spectra(None)
@@ -339,7 +339,7 @@ class _Clock:
         return rows
 
     def _recorded(self, rows: npt.NDArray[np.intp], fewest: int) -> npt.NDArray[np.intp]:
-        """Parts recorded from their start until they rang down, or until the next one begins."""
+        """Select the parts recorded in full: from their start to the end of ringing, or to the next part."""
         begins, ends = np.array(self.windows).T
         until = np.minimum(ends, np.array(self.command.parts)[:, 1] + _RINGS_S)
         first, last = (self.places_s + (each - self.middles) / (1.0 + self.rate) for each in (begins, until))
@@ -362,7 +362,7 @@ class _Clock:
         )
 
     def _refine(self, rows: npt.NDArray[np.intp], furthest: float) -> None:
-        """Fit the clock error at which neighbouring parts agree best, whatever wait is between them; then that wait."""
+        """Fit the clock error with which neighbouring parts agree best, at any wait between them; then fit the wait."""
         band_hz = _LOWEST_HZ, _CLOCK_HZ
 
         def shares(rate: float) -> Spectra:  # response times conjugate command, over the root of the power of all
@@ -437,7 +437,7 @@ class _Clock:
 
 
 def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
-    """Parts to use: the clear ones; and others at their time in the program, if significant or between clear ones."""
+    """Parts to use: `clear` ones, and parts at their time in the program that stand out or lie between parts to use."""
     lags = np.linspace(-_AWAY_S, _AWAY_S, 401)
     crossed = spectra.response * np.conj(spectra.command)
     height = np.abs(crossed @ np.exp(spectra.turn[:, None] * lags))
@@ -449,7 +449,7 @@ def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.
 
 
 def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
-    """Delay of each part's response relative to the prediction of the others, s."""
+    """Delay of each part's response relative to its prediction from the other parts, s."""
     power = np.abs(spectra.command) ** 2
     own = power > _OWN * np.max(power, axis=1, keepdims=True)
     each = [np.array([part]) for part in range(len(rows))]
@@ -474,7 +474,7 @@ def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
 
 
 def _lag(spectra: Spectra, block: npt.NDArray[np.intp], own: npt.NDArray[np.bool_], longest_s: float) -> float:
-    """Delay of some parts' response relative to the prediction of the others, s; 0 for an unexplained pair."""
+    """Delay of some parts' response to that predicted by the others, s; 0 for several parts not explained by them."""
     others = spectra.of(np.setdiff1d(np.arange(len(own)), block)).ratio() * spectra.command[block]
     expected, response = (np.where(own[block], each, 0.0) for each in (others, spectra.response[block]))
     whole = float(np.sqrt(np.sum(np.abs(expected) ** 2) * np.sum(np.abs(response) ** 2)))

@@ -82,7 +82,7 @@ def search(problem: FitProblem, sought: Sought) -> Search:
 
 
 def evidence_of(problem: FitProblem, fit: Fit | None) -> float:
-    """Evidence of a fit, as in `Search.evidence`; None: of a model without modes."""
+    """Evidence of a fit, as in `Search.evidence`; if *fit* is None, evidence of the model without modes."""
     squares, count, parameters, modes = problem.squares, problem.samples, len(problem.responses), 0
     if fit is not None:
         squares, count, parameters = fit.sum_of_squares, fit.samples, fit.parameters
@@ -101,7 +101,7 @@ def chart_modes(problem: FitProblem) -> Iterator[Starts]:
 
 
 def chart_of(models: Iterable[tuple[int, Starts]]) -> tuple[ChartPole, ...]:
-    """Poles of models by ascending order, each compared with the model before."""
+    """Poles of models of ascending order, each compared with the poles of the model before."""
     chart: list[ChartPole] = []
     before = np.empty((0, 2))
     for order, now in models:
@@ -219,7 +219,7 @@ def _estimates(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Do
 
 
 def mode_estimates(values: FloatArray, spread: FloatArray, refusal: str = "") -> IdentifiedMode:
-    """A mode from logarithms of f (Hz), damping ratio and, if known, m, c, k, and half of their 95 % intervals."""
+    """A mode from logarithms of f (Hz), damping ratio and, if known, m, c, k; *spread*: their 95 % half-widths."""
     estimates = [
         Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
         for value, half in zip(np.exp(values), np.minimum(spread, _UNKNOWN), strict=True)
@@ -235,7 +235,7 @@ LOGARITHMS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, -1], [2, 0, -1]]
 
 @dataclass(frozen=True, eq=False)
 class _Logarithms:
-    """Logarithms of frequency (Hz), damping ratio and, with a force, mass, viscous damping, stiffness; variances."""
+    """Logarithms of a mode's frequency (Hz) and damping ratio, with a force also of m, c, k; and their variances."""
 
     values: FloatArray
     variance: FloatArray
@@ -326,7 +326,7 @@ def _refusal_of(mode: IdentifiedMode, doubts: Doubts) -> str:
 
 
 def lasting_refusal(frequency_hz: float, damping_ratio: float, record_s: float) -> tuple[str, float]:
-    """Refusal of a vibration that does not decay (empty: it decays), and its remaining ratio at the record's end."""
+    """Refusal of a vibration that does not decay (empty: it decays); ratio of its final to its first amplitude."""
     lasting = float(np.exp(-2.0 * np.pi * frequency_hz * damping_ratio * record_s))
     said = (
         f"still at {100.0 * lasting:.0f} % after {record_s:.3g} s: a steady disturbance (mains, pump, "

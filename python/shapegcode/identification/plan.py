@@ -104,7 +104,7 @@ def _round_up(value: float) -> float:
 
 
 def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisRecording:
-    """How to record an axis whose modes are known (Hz, damping ratio); without any, for the usual range."""
+    """How to record an axis whose modes are known (Hz, damping ratio); with none known, for modes of 20 to 200 Hz."""
     known = modes or tuple((frequency, _USUAL_DAMPING) for frequency in _USUAL_HZ)
     highest = max(_LOOK_MIN_HZ, _LOOK_ABOVE * max(frequency for frequency, _ in known))
     pulse = checks.EXCITED_HALF_SINE / highest

@@ -168,10 +168,10 @@ def plot_stabilisation(found: Identification, ax: Axes | None = None) -> Axes:
 
 
 def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
-    """Envelope of the first record in the band of each mode, of four at most, measured and of the model.
+    """Envelope of the first record in the band of each mode (the first four at most), measured and of the model.
 
-    The model is drawn down to three times the noise, which is its residual in the band: below, the curve would show
-    the ringing of the band's filter.
+    The model's envelope is drawn down to three times the noise, which is the residual of the model in the band. Below
+    that, it would show the ringing of the band-pass filter.
 
     Args:
         found: an identification with a mode or more.

@@ -39,7 +39,7 @@ class Thinned:
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """Records over time: taps with force, or free decays without."""
+    """Records to fit over time: impacts with their force, or free decays, for which no force is recorded."""
 
     responses: list[FloatArray]  # (n,) each, in the unit of the quantity
     forces: list[FloatArray] | None  # (n,) each, N; None: decays
@@ -53,7 +53,7 @@ class FitProblem:
     starts_in_pulse: bool = False  # any record begins within its pulse
 
     def fit(self, starts: Starts, *, left_by: Fit | None = None, coloured: bool = False, quick: bool = False) -> Fit:
-        """Fit a model, started at these modes, to the responses or to the residual of another; *quick*: few steps."""
+        """Fit a model, from *starts*, to the responses or to the residual of the fit *left_by*; *quick*: few steps."""
         omega, zeta = np.array(starts).T
         responses, steps = self.left(left_by), _QUICK_STEPS if quick else _STEPS
         if self.forces is None:
@@ -68,7 +68,7 @@ class FitProblem:
         )  # fmt: skip
 
     def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
-        """Indices of the first `kept` candidates, and of the one, if any, that explains most in addition."""
+        """Indices of the first `kept` candidates, and of the further one, if any, that improves their fit most."""
         omega, zeta = np.array(candidates).T
         records = self.responses, self.period_s
         ranking = _core.rank_modes(*records, omega, zeta, kept + 1, self.forces, self.quantity, kept)
@@ -119,7 +119,7 @@ class FitProblem:
         return [float(2.0 * np.pi * frequency[index]) for index in highest]
 
     def other_courses(self, near: Fit) -> list[Self]:
-        """The same taps with each other possible intersample behaviour of the force."""
+        """The same problem, once for each of the other possible behaviours of the force between samples."""
         if self.thinned is None:
             return [replace(self, hold="linear"), replace(self, hold="impulse")]
         if self.hold == "impulse":
@@ -139,7 +139,7 @@ class FitProblem:
 
 
 def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: bool = False) -> FitProblem:
-    """The records of a fit, and the band to search: unless `within`, wider than `band_hz`, as modes outside matter."""
+    """Records of a fit and band to search: `band_hz` if `within`, else widened, as modes outside of it matter."""
     first = ready.records[0]
     responses = [record.response for record in ready.records]
     longest_s = max(len(response) for response in responses) * first.period_s
@@ -181,7 +181,7 @@ _GRID = 8  # points of the filter's transform per coefficient
 
 
 def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
-    """Highest frequency to keep in taps, Hz: the end of the band, or above it the highest response peak with margin."""
+    """Highest frequency to keep in taps, Hz: end of the band or, if higher, that of the highest peak with a margin."""
     excited = max(each.excited_hz or 0.0 for each in ready.usable)
     margin = _MARGIN
     if are_pulses(ready):  # short pulses excite all frequencies up to half the rate
@@ -236,7 +236,7 @@ def are_pulses(ready: Prepared) -> bool:
 
 
 def _filters(factor: int) -> tuple[FloatArray, FloatArray]:
-    """The filter, and the filter for a force linear between samples: its spectrum times (sin x / x)²."""
+    """The decimation filter; and one for a force linear between samples, whose spectrum has a factor (sin x / x)²."""
     count, beta = kaiserord(_STOP_DB, (0.5 - FLAT) * 2.0 / factor)
     count |= 1
     plain = firwin(count, (0.5 + FLAT) / factor, window=("kaiser", beta))

@@ -168,10 +168,10 @@ class Identification(Result):
     Attributes:
         files: as named, or the sources of records.
         modes: those that the data support, by ascending frequency.
-        refused: those above the noise that are not supported, each with its refusal.
+        refused: modes above the noise that the data do not support, each with the reason.
         order: number of modes of the chosen model; 0: no mode.
-        evidence: information criterion (lower is better) by number of modes; empty for a fit to frequency
-            responses, given or of many modes.
+        evidence: information criterion (lower is better) by number of modes; empty if frequency responses were fitted
+            (those given, or those of impacts with many modes).
         fit_percent: 100 * (1 - |measured - fitted| / |measured|), over all records together; null without a model.
         noise_rms: RMS measurement noise of the response in the fitted band, in the unit of the records; null
             if not known.
@@ -181,9 +181,9 @@ class Identification(Result):
         machine_file: where the modes were written; null: nowhere.
         warnings: of the records and of the result.
         notes: remarks, such as on ignored parts of the files.
-        prepared: used and refused taps or decays; None: no usable one, frequency responses, or a sweep.
+        prepared: used and refused taps or decays; None: none usable, or the input is frequency responses or a sweep.
         chart: poles of the stabilisation chart.
-        sweep: spectrum of a sweep or capture; None: neither.
+        sweep: spectrum of a sweep or capture; None: the modes are from other records.
         responses: frequency responses without time record, in the fitted band.
         turned: whether the sign of the frequency responses was reversed.
         options: command-line options that the next step repeats.
@@ -266,7 +266,7 @@ class Identification(Result):
 
     @property
     def records(self) -> tuple[RecordUse, ...]:
-        """Each tap or decay, first the used ones; or each frequency response; or the sweep."""
+        """The records: taps or decays (used ones, then refused ones), or frequency responses, or the one sweep."""
         if self.sweep is not None:
             sweep = self.sweep
             return (RecordUse(sweep.source, True, "", sweep.samples, sweep.period_s, quantity="acceleration"),)

@@ -160,7 +160,7 @@ class Spectra:
         return np.asarray(np.sum(np.conj(self.command) * self.response, axis=0) / np.maximum(self.power, 1e-300))
 
     def in_twos(self, rows: npt.NDArray[np.intp]) -> Self:
-        """Sums of the parts 0 and 1, 2 and 3, ...: ringing of one part in the next is then within one window."""
+        """Add parts 0 and 1, 2 and 3, ...: ringing of the first during the second is then within the same window."""
         first = [np.flatnonzero(rows // 2 == pair) for pair in np.unique(rows // 2)]
         return replace(
             self,
@@ -169,7 +169,7 @@ class Spectra:
         )
 
     def coherent(self) -> tuple[npt.NDArray[np.bool_], FloatArray]:
-        """Mask of the excited lines from first to last on which the parts agree, and the coherence of all lines."""
+        """Mask of the excited lines between the first and the last at which the parts agree; coherence of all lines."""
         ratio, power = self.ratio(), self.power
         left = np.sum(np.abs(self.response - ratio * self.command) ** 2, axis=0) / max(len(self.command) - 1, 1)
         noise = uniform_filter1d(left, _SMOOTH_LINES) / np.maximum(power, 1e-300)
@@ -223,7 +223,7 @@ _MAX_STOPS = 20
 
 
 def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
-    """Strongest frequency of the differences, which suppress slow axis motion; 0: none."""
+    """Strongest frequency of the differences between samples, which suppress slow motion of the axis; 0: none."""
     jerk = np.diff(response)
     count = 4 * len(jerk)
     spectrum = np.abs(np.fft.rfft(jerk - np.mean(jerk), count))
@@ -271,13 +271,13 @@ def _until_next(envelope: FloatArray, starts: npt.NDArray[np.intp]) -> list[tupl
 
 
 def _end_of(envelope: FloatArray, start: int, window_samples: float) -> int:
-    """Last + 1 sample of a decay with known beginning."""
+    """Index after the last sample of a decay that begins at the sample *start*."""
     later = [int(at) for at in _events(envelope) if at > start + window_samples]
     return _until_next(envelope, np.array([start, *later], dtype=np.intp))[0][1]
 
 
 def _longest(envelope: FloatArray) -> tuple[int, int]:
-    """First and last + 1 sample of the longest decay."""
+    """Index of the first sample of the longest decay, and the index after its last sample."""
     return max(_until_next(envelope, _events(envelope)), key=lambda part: part[1] - part[0])
 
 
@@ -338,7 +338,7 @@ def part_of(record: Record, begin: int, end: int, name: str = "") -> Record:
 
 
 def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
-    """One record for each of the 20 strongest stops after which the machine rests, least motion first."""
+    """One record for each stop after which the machine rests (the 20 strongest at most), least slow motion first."""
     quiet = _without_median(record)
     period = 1.0 / ((lowest_hz or _LOWEST_HZ) * record.period_s)
     envelope = _envelope(quiet, period, _ENVELOPE_PERIODS * period)

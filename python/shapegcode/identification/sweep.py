@@ -35,7 +35,7 @@ _MIN_SHARE = 0.02  # least motion of a significant mode, relative to that of the
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """Model of the log power: level, slope in addition to the command's, and share, omega, zeta of each mode."""
+    """Model of the log power: level; slope beyond that of the command; relative weight, omega, zeta of each mode."""
 
     parameters: FloatArray
     covariance: FloatArray
@@ -87,7 +87,7 @@ def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> 
 
 
 def _spectrum(record: Record, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Middles of the frequency bins, and the mean power in each divided by that of the command, which grows as f²."""
+    """Centres of the frequency bins; mean power in each over the power of the command, which is proportional to f²."""
     duration = len(record.response) * record.period_s
     half = 0.5 / record.period_s
     if not 0.0 < band[0] < band[1] - 10.0 * _BIN_HZ:
@@ -260,7 +260,7 @@ def _response(
 
 
 def _windows(trace: ServoTrace, period_s: float) -> list[tuple[FloatArray, FloatArray]]:
-    """Changes of speed of command and actual position in each part between rests; in long parts in tapered windows."""
+    """Changes of speed, commanded and actual, of each part between rests; long parts are split into tapered windows."""
     found: list[tuple[FloatArray, FloatArray]] = []
     after, size = round(_AFTER_S / period_s), round(_WINDOW_S / period_s)
     for command, actual in zip(trace.command, trace.actual, strict=True):

@@ -135,10 +135,10 @@ def write_sweep(
 ) -> SweepProgram:
     """Write a program that shakes one axis over a band of frequencies, for `identify` with `sweep`.
 
-    It consists of back-and-forth moves (G91, G01), whose frequency rises, then falls, band by band, with pauses. Their
-    lengths and feeds are planned on the controller's model: the amplitude of the commanded acceleration stays within
-    the stated ratio to the axis' limit, the moves within the travel, the feed within the maximum. The program
-    ends where it begins, and may be stopped by feed hold at any time.
+    It consists of back-and-forth moves (G91, G01), whose frequency rises, then falls, band by band, with pauses. The
+    lengths and feeds of the moves are planned on the controller's model: the amplitude of the commanded acceleration
+    stays within the stated ratio to the axis' limit, the moves within the travel, the feed within the maximum. The
+    program ends where it begins, and may be stopped by feed hold at any time.
 
     Args:
         file: program file to write.
@@ -238,7 +238,7 @@ class _Planner:
         self._min_mm = _MIN_INCREMENTS * controller.least_increment_mm
 
     def plan(self, low: float, high: float) -> tuple[list[_Move], str]:
-        """Moves from the lowest frequency to the highest reachable one, and its limit."""
+        """Moves from the lowest frequency to the highest that can be reached, and the reason why no higher one can."""
         most = 0.5 / (_SPARE * self._block_s)
         spare = f"with {100.0 * (_SPARE - 1.0):.0f} % margin"
         limit = f"a block lasts {1e3 * self._block_s:g} ms or more, {spare} moves reach {most:.4g} Hz"

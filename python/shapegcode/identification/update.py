@@ -133,7 +133,7 @@ _ORIGIN = re.compile(r"^(from [^:]*|assumed|not known|not measured)")
 
 
 def open_modes(machine: Machine, measured: str | None) -> dict[str, str]:
-    """Modes of the other axes that were neither measured on this machine nor decided on."""
+    """Modes of axes other than `measured` that were neither measured on this machine nor marked as kept, by axis."""
     found: dict[str, list[str]] = {}
     for value in machine.values():
         parts = value.key.split(".")
@@ -144,7 +144,7 @@ def open_modes(machine: Machine, measured: str | None) -> dict[str, str]:
 
 
 def require_decisions(open_axes: Mapping[str, str], keep: str, rigid: str, file: str) -> None:
-    """Refuse modes of other axes without a decision (--keep-modes, --rigid)."""
+    """Refuse unmeasured modes of axes for which neither --keep-modes nor --rigid was given."""
     check_axes(keep, rigid)
     undecided = {axis: modes for axis, modes in open_axes.items() if axis not in keep + rigid}
     if undecided:
@@ -351,7 +351,7 @@ class ModeTables:
         )
 
     def _put(self, entries: list[edit.Entry], values: Mapping[str, tuple[Any, str]]) -> None:
-        """Set values in place of a table's keys or commented keys, else after them."""
+        """Set each value in the line of its key or commented key; if there is none, after the table's own keys."""
         below = next((n for n, (_, item) in enumerate(entries) if isinstance(item, Table)), len(entries))
         places = {edit.commented(entry, edit.COMMENTED_KEY): place for place, entry in enumerate(entries[:below])}
         places |= {key.key: place for place, (key, _) in enumerate(entries[:below]) if key is not None}
@@ -435,7 +435,7 @@ def _rounded(value: float, digits: int = _DIGITS) -> float:
 
 
 def _rounded_up(value: float) -> float:
-    """Round up to four digits; covers rounding of the value itself."""
+    """Round an uncertainty in percent up to four digits; it then also covers the rounding of the estimated value."""
     if not math.isfinite(value):
         return value
     value += 100.0 * 0.5 * 10.0 ** (1 - _DIGITS)
@@ -452,7 +452,7 @@ _NO_PAIR, _SHARE_DIGITS = 1e3, 4
 
 
 def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
-    """Participations that sum to 1, and their meaning: ratios of the residues 1/m, or equal."""
+    """Participations that sum to 1: in the ratio of the residues 1/m, else equal; and a text that says which."""
     masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
     if len(masses) < len(modes):
         return [_rounded(1.0 / len(modes), _SHARE_DIGITS)] * len(modes), "equal shares"
@@ -461,7 +461,7 @@ def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
 
 
 def matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:
-    """Index of the old mode by that of the new: as many pairs within 10 % as possible, with least total distance."""
+    """Index of the old mode for each new mode: most pairs within 10 %, then the smallest sum of distances."""
     if not old_hz or not modes:
         return {}
     new_hz = np.array([mode.frequency_hz.value for mode in modes])

@@ -1,5 +1,5 @@
-"""Reads and writes files. Data files must be regular, with limits of size, unpacked size, depth and text length;
-files are written completely or remain unchanged.
+"""Reads and writes files. Data files must be regular files (no pipe or device), and are limited in size, unpacked
+size, nesting depth and length of strings. A file is written completely, or remains unchanged.
 
 All input files are opened here, or checked here before a library reads them: settings, records, logs, dumps, results,
 programs. So no file of a few megabytes takes gigabytes of memory, and no pipe or device blocks a command.

@@ -208,9 +208,10 @@ class EdgeCapture:
     def position(self, axis: int | str, *, actual: bool = False) -> FloatArray:
         """Position of an axis, with a rotary axis' wraps by whole turns removed.
 
-        No axis moves half a turn within one cycle (90 m/s, 15 000 rpm at 2 ms). A step of more is a wrap if, less whole
-        turns, it continues the steps before. The number of turns in a gap is unknown: after it the file's value is used
-        unchanged. Command and actual position are unwrapped by the same turns, so that their difference is unchanged.
+        No axis moves half a turn within one cycle (90 m/s, 15 000 rpm at 2 ms). A larger step is a wrap if, with whole
+        turns subtracted, it nearly equals the step before. The number of turns in a gap is unknown: after a gap the
+        file's value is used unchanged. Command and actual position are unwrapped by the same turns, so that their
+        difference is unchanged.
 
         Args:
             axis: number or label.
@@ -257,13 +258,13 @@ class EdgeCapture:
 
         Args:
             axis: number or label.
-            actual: speed of the encoder, else of the command.
+            actual: True: speed measured by the encoder; False: commanded speed.
 
         Returns:
             (n,) in mm/s or degrees/s; NaN for a single sample between gaps.
 
         Raises:
-            RecordError: its position is not in the file.
+            RecordError: the position of the axis is not in the file.
         """
         position_of = self.position(axis, actual=actual)
         out = np.full(len(position_of), np.nan)

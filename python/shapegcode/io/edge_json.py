@@ -220,7 +220,7 @@ def _integer(where: str, table: Mapping[str, Any], name: str) -> int | None:
 
 
 def _clock_notes(stamps: Sequence[tuple[int, str]], cycle_s: float) -> list[str]:
-    """Notes where clock and counter disagree between two stamps, or a stamp is invalid."""
+    """One note for each invalid time stamp, and one if clock and counter disagree between two stamps."""
     notes: list[str] = []
     jumps: list[tuple[int, float, float]] = []
     before: tuple[int, datetime] | None = None
@@ -435,8 +435,8 @@ def _axes(signals: tuple[tuple[str, str], ...]) -> tuple[EdgeAxis, ...]:
 def edge_runs(path: Path) -> Iterator[RunLog]:
     """Yield the run of a capture.
 
-    `block` has the line numbers of one program only, the one with most blocks in the capture: lines of cycles and
-    subprograms are counted in files of their own. `block_texts` has all blocks.
+    `block` has line numbers of one program only, the one with most blocks in the capture: those of cycles and
+    subprograms count lines of other files. `block_texts` has the blocks of all programs.
     """
     capture = read_edge_json(path)
     count = Counter(block.path for block in capture.blocks if block.line is not None)

@@ -54,7 +54,7 @@ def part_of(text: str) -> str | None:
 
 
 def is_frf_text(path: Path, options: ReadOptions) -> bool:
-    """Whether a text file is a frequency response: .frf, or a header with a frequency and both parts, but no time."""
+    """Whether a text file is a frequency response: .frf, or columns of frequency and complex values, none of time."""
     if options.time_column is not None or options.period_s is not None:
         return False
     if path.suffix.lower() == ".frf":

@@ -265,7 +265,7 @@ class _Odd:
         self._notes.add("stamp", number, f"{shown!r} is not a time stamp, the line is ignored")
 
     def end(self, readable: bool) -> None:
-        """The end of the file; *readable*: at least one time stamp was readable."""
+        """Refuse a file without a readable time stamp (*readable* is false), or that ends within an asset."""
         if self._unreadable and not readable:
             raise RecordError(f"{self._unreadable}; required: for example 2017-02-10T18:33:01.138Z")
         if self.until:

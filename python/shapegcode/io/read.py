@@ -1,4 +1,4 @@
-"""Reads records of tap tests and decays from any supported file; text with columns (Klipper's too) and WAV here."""
+"""Reads records of tap tests and decays from any supported file; contains the readers of text columns and WAV."""
 
 import io
 import re

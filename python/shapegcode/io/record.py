@@ -226,7 +226,7 @@ class FrequencyResponse:
 
     @property
     def resolution_hz(self) -> float:
-        """Usual line spacing, Hz."""
+        """Median of the line spacings, Hz."""
         return float(np.median(np.diff(self.frequency_hz)))
 
 

@@ -210,7 +210,7 @@ class RunPart:
 
 
 def _began_again(hold: Hold, part: RunPart, tracks: Sequence[Track]) -> bool:
-    """Whether the block numbers return to the start of the run."""
+    """Whether the block numbers after a hold are again those at the start of the run."""
     assert hold.end is not None
     for track in tracks:
         if not track.counts or not track.times:

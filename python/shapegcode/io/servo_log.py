@@ -116,7 +116,7 @@ def _time_unit(table: TextTable, label: Label, step: float) -> float:
 
 
 def _length_factors(table: TextTable, columns: _Columns) -> list[float]:
-    """Factors to mm of the columns after the time; a column without a unit has that of the first other one, else mm."""
+    """Factors to mm of the columns after the time; one without a unit gets that of the first column with a unit."""
     labels = [columns.labels[index] for index in columns.used[1:]]
     units = [unit_of(table.where, label, ("displacement",), "specify it with --units") for label in labels]
     factors = [None if unit is None else factor_between(unit, "mm") for unit in units]

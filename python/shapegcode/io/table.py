@@ -158,7 +158,7 @@ class Layout:
 
 @dataclass
 class _Rows:
-    """Where the rows of numbers start, if this is the delimiter."""
+    """The rows of numbers of a text if its lines are split at one delimiter, and where they start."""
 
     delimiter: str
     start: int

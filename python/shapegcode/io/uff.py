@@ -235,8 +235,9 @@ def whole_values(where: str, data: dict[str, Any]) -> npt.NDArray[Any]:
 def _force_of(path: Path, response: _Channel, forces: list[_Channel], responses: list[_Channel]) -> _Channel:
     """Find the force of a response.
 
-    It is at the response's reference, if a force is. Of several, it has the response's version, load case or function
-    number, if these distinguish measurements; else the order in the file decides.
+    Candidates are the forces at the reference point of the response; without any there, all forces. Of several those
+    with the response's version, load case and function number are taken, as far as these numbers differ between the
+    forces. If several are left, the order in the file decides.
     """
 
     def alike(channel: _Channel, channels: list[_Channel]) -> list[_Channel]:
@@ -323,7 +324,7 @@ def is_frf_uff(path: Path, options: ReadOptions) -> bool:
 
 
 def read_frf_uff(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
-    """Read the frequency responses of a universal file: of several only those at the driving point, if present."""
+    """Read the frequency responses of a universal file; if some of them are at the driving point, only those."""
     file = UffFile(path, options)
     functions = _functions(file)
     units = next((file.dataset(k) for k, kind in enumerate(file.types) if kind == 164), None)
@@ -449,7 +450,7 @@ def _scale(
 
 
 def _coherence(data: dict[str, Any], coherences: list[dict[str, Any]], lines: int) -> FloatArray | None:
-    """Coherence of the same points with as many lines; None: not in the file."""
+    """Coherence between the same points, with the same number of lines; None: not in the file."""
     for other in coherences:
         same = all(_place(other, which) == _place(data, which) for which in ("rsp", "ref"))
         values = np.real(np.asarray(other["data"]))

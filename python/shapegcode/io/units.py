@@ -242,7 +242,7 @@ def tap_label(text: str, unit_text: str = "") -> Label:
 
 
 def _tap_names(name: str) -> Meaning | None:
-    """Meaning of a name that contains an English or German word for time, force or a response, or an axis."""
+    """Meaning of a name that contains an axis, or an English or German word for time, force or a response."""
     words = words_of(name)
     axis = next((word for word in words if word in {"x", "y", "z"}), None)
     found: list[Measured] = []

@@ -204,7 +204,7 @@ class AxisMode(TomlTable):
         return _along(axis) if self.excited_by is None else self.excited_by.as_tuple()
 
     def motion(self, axis: int) -> tuple[float, float, float]:
-        """Mode shape of a mode of an axis (0, 1, 2) in X, Y, Z, without participation."""
+        """Mode shape of this mode in X, Y, Z, without participation; *axis*: the axis (0, 1, 2) that has the mode."""
         return _along(axis) if self.moves is None else self.moves.as_tuple()
 
     @model_validator(mode="after")

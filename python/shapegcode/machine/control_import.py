@@ -48,8 +48,8 @@ def import_parameters(
         tables: files of tool offsets, work offsets and variables that the control punched out (TOOLOFST.TXT,
             EXT_WKZ.TXT, MACRO.TXT).
         name: of the machine; None: from the name of the dump file.
-        keep_modes: axes that keep the modes of the base, because it is the same machine: "xy". The modes of other
-            axes are not adopted: a dump contains no modes.
+        keep_modes: axes ("xy") that keep the modes of the base, if the base is the same machine. Modes of
+            other axes are not adopted: a dump contains no modes.
         rigid: axes declared to have no modes: "z".
         source: names the content in messages.
 
@@ -58,7 +58,7 @@ def import_parameters(
         or a built-in one.
 
     Raises:
-        MachineError: not a dump or table, an implausible value, or a limit of an axis that neither dump nor base has.
+        MachineError: not a dump or table, an implausible value, or an axis limit that is in neither dump nor base.
         ArgumentError: modes to keep for an axis without modes in the base, or for a rigid one.
         OSError: a file cannot be read.
     """
@@ -238,7 +238,7 @@ def read_ini(file: str | Path, *, name: str | None = None) -> IniMachine:
 
 
 def _axes(ini: _Ini, unit_mm: float) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
-    """Limits of the axes: the smallest of axis, joint and path."""
+    """Limits of the axes, each the smallest of those of axis, joint and path; and the origins of the values."""
     axes: dict[str, dict[str, float]] = {}
     remarks: dict[str, str] = {}
     for number, axis in enumerate("xyz"):

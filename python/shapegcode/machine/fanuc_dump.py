@@ -36,7 +36,7 @@ _SYSTEMS = {number: f"G{53 + number}" for number in range(1, 7)}
 
 @dataclass
 class ControlTables:
-    """Contents of the tables, in their units."""
+    """Contents of the control's tables of offsets and variables, in the units of the control."""
 
     # kinds of tool offset by L of G10: 1 (one value), 10 and 11 (geometry and wear; with memory C of the length), 12
     # and 13 (geometry and wear of the radius); a length is its value and whether it has a decimal point
@@ -56,7 +56,7 @@ class ControlTables:
 
 
 def is_table(data: bytes) -> bool:
-    """True if a file is a table of offsets or variables: only harmless words precede the first G10 or assignment."""
+    """True if a file is a table of offsets or variables: nothing else is set before the first G10 or assignment."""
     for _, words in _lines(data):
         if _G10.match(words) or _ASSIGNMENT.fullmatch(words):
             return True
@@ -88,7 +88,7 @@ def _every_line(data: bytes) -> Iterator[tuple[int, str]]:
 
 
 def _lines(data: bytes) -> Iterator[tuple[int, str]]:
-    """Lines with words, and their numbers, up to the % after the first of them."""
+    """Lines with words, and their numbers; a line with % ends them, unless no words came before it."""
     seen = False
     for number, line in _every_line(data):
         words = line.rstrip(";").strip()
@@ -214,7 +214,7 @@ class DumpValues:
         return max(values, default=None)
 
     def per_axis(self, number: int, high: float = _MAX_VALUE, unit: str = "", low: float = 0.0) -> list[float] | None:
-        """The values of X, Y, Z; one without an axis applies to all three. None if one is missing."""
+        """The values of X, Y, Z, or three times the one value without an axis; None if the dump has neither."""
         entries = self.entries(number)
         if len(entries) < 3:
             one = self.dump.get(number)

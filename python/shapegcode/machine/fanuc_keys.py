@@ -99,7 +99,7 @@ def _look_ahead_filter(draft: Draft, time_s: float) -> None:
 
 
 def _cutting_feeds(draft: Draft) -> None:
-    """Use the smallest clamp: 1430 applies with look-ahead off, as in shaped cuts, 1432 with it on, 1422 always."""
+    """Set the maximum feeds: per axis the smallest of parameters 1422 (always), 1430 (look-ahead off), 1432 (on)."""
     values = draft.values
     found = {n: values.per_axis(n, unit="mm/min") for n in (1422, 1430, 1432)}
     for k, name in enumerate("xyz"):
@@ -114,7 +114,7 @@ def _cutting_feeds(draft: Draft) -> None:
 
 
 def _after_interpolation_s(draft: Draft) -> tuple[float, float, str, str] | None:
-    """Time constant, second moving average, shape and note of the filter of 1622; None if it is not in the dump."""
+    """Filter by parameter 1622: time constant, second time constant, shape and note; None: not in the dump."""
     time = draft.values.scalar(1622, LONGEST_MS, "ms")
     if time is None:
         return None

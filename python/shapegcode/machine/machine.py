@@ -222,7 +222,7 @@ class Machine(TomlTable):
 
     @property
     def dial_positions(self) -> tuple[float, ...]:
-        """Override ratios of override-tolerant blocks: ends of [verdict] (or 0.7, 1.2), multiples of 0.1 between."""
+        """Override ratios of override-tolerant blocks: limits of [verdict] (not set: 0.7, 1.2), each 0.1 between."""
         low, high = self.verdict.override_percent
         if low == high == 100.0:
             low, high = _USUAL_DIAL_PERCENT
@@ -233,8 +233,8 @@ class Machine(TomlTable):
     def load(cls, path_or_name: str | Path) -> Machine:
         """Load a machine file, or a built-in machine by its name.
 
-        A string without folder and ``.toml`` that is the name of a built-in machine is that machine;
-        everything else is a path.
+        The name of a built-in machine, a string without folder or ``.toml``, stands for that machine; everything else
+        is a path.
 
         Args:
             path_or_name: the file, or the name.

@@ -278,12 +278,12 @@ class Emission(TomlTable):
 
     @property
     def locking(self) -> tuple[str, ...]:
-        """Lines that switch the feed override off, in the dialect's words; empty: not locked, or by `lock_word`."""
+        """Lines that switch the feed override off, in the dialect's words; empty: no lock, or one by `lock_word`."""
         return self._override_lines(0, self.lock_lines)
 
     @property
     def unlocking(self) -> tuple[str, ...]:
-        """Lines that switch the feed override on again, in the dialect's words; empty: as `locking`."""
+        """Lines that switch the feed override on again, in the dialect's words; empty: see `locking`."""
         return self._override_lines(1, self.unlock_lines)
 
     def _override_lines(self, rank: int, stated: tuple[str, ...]) -> tuple[str, ...]:
@@ -310,7 +310,7 @@ class Emission(TomlTable):
 
     @property
     def leaves_look_ahead(self) -> bool:
-        """True if the prologue leaves a look-ahead mode off: its last such word is G05.1 Q0 or G08 P0."""
+        """True if the prologue leaves a look-ahead mode off: the last of its look-ahead words is G05.1 Q0 or G08 P0."""
         last = [found for line in self.prologue for found in _LOOK_AHEAD.findall(line)]
         return bool(last) and last[-1] == "0"
 

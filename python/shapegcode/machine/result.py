@@ -163,7 +163,7 @@ class ParameterImport(Result):
         return [table for table in found if table.rows]
 
     def _keys_by_table(self) -> Table:
-        """Keys by table of the machine file: those read, and those assumed other than by default."""
+        """Keys by table of the machine file: those read, and those assumed, without those left at their defaults."""
         tables: dict[str, tuple[list[str], list[str]]] = {}
         decided = [row.key for row in self.assumed if row.why != DEFAULT_WHY]
         read = [*(row.key for row in self.read), *(row.key for row in self.tables_read)]
@@ -313,7 +313,7 @@ class MachineDescription(Result):
         ]
 
     def _ranking(self, limit: int | None = None) -> list[Table]:
-        """Unverified values: with a program the important ones, largest effect first; else all by table."""
+        """Unverified values: with a program those that matter, largest effect first; else all, by table of the file."""
         if self.program is not None:
             columns = (
                 Column("matters most", value="key", left=True),
@@ -464,7 +464,7 @@ def machine_difference(first: Machine | str | Path, second: Machine | str | Path
 
     Args:
         first: a machine, its file, or the name of a built-in one.
-        second: likewise.
+        second: the machine to compare with it, in any of these forms.
 
     Returns:
         The differences.

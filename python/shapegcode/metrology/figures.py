@@ -27,7 +27,7 @@ class Sides(Generic[T]):
 
 @dataclass(frozen=True)
 class SidedError:
-    """Deviation of a track from the programmed path, µm: left or right; above or below if it is more along Z."""
+    """Deviation of a track from the programmed path, µm: to the left or right; if mainly along Z, above or below."""
 
     max: float  # distance, any side
     rms: float  # root mean square over the time in which the command moves

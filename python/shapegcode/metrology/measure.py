@@ -59,8 +59,8 @@ def measure(
         machine: controller and modes.
         tool_diameter_mm: diameter of the disc swept along the response.
         plant: "modal" or "feed-drive", see `sg.stream`.
-        against: the program whose path is the nominal one; None: the first of several if shapegcode did not write it
-            and did write all the others, else each program's own path.
+        against: the program whose path is the nominal one; None: the first of several if it has no shaped region
+            and each of the others has one; else each program's own path.
         lines: sections by first and last lines of the nominal program; None: sequences of lines of one direction
             and of arcs about one centre.
         band_um: settled means within this distance of the command.
@@ -246,7 +246,7 @@ def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArra
 
 @dataclass(frozen=True)
 class Job:
-    """A region to simulate, with nominal region and sections."""
+    """A region to simulate, the nominal region against which it is measured, and the sections of the nominal region."""
 
     simulated: _core.Region
     nominal: _core.Region
@@ -256,7 +256,7 @@ class Job:
 
 
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:
-    """Pairs of simulated and nominal region to measure, with sections; regions without any are left out."""
+    """Pairs of simulated and nominal region to measure, with their sections; pairs without a section are left out."""
     pairs = [pair for pair in paired_regions(program, nominal) if pair[1].path.length_mm > 0.0]
     blocks = _BLOCKS_PER_CURVE * machine.controller.block_time_s
     blocks = blocks if program.shaped_regions > 0 and nominal is program else 0.0

@@ -106,7 +106,7 @@ def plot_walls(measurement: Measurement, ax: Axes | None = None, *, region: int 
 
 
 def _worst_region(measurement: Measurement) -> int | None:
-    """Region with the largest wall deviation in any program, among those with walls measured in all."""
+    """Region with the largest wall deviation in any program, of those with walls measured in every program."""
     beside = enumerate(zip(*(program.regions for program in measurement.programs), strict=False))
     found = {index: max(map(_largest_um, regions)) for index, regions in beside if all(map(_walls, regions))}
     return max(found, key=lambda index: found[index], default=None)

@@ -79,7 +79,7 @@ def _worst(sections: Sections, values: Values) -> str:
 
 
 def _figures(band_um: float) -> Iterator[tuple[str, Values]]:
-    """Yield each figure: name with unit, and a function for its values in a section, of which the largest counts."""
+    """Yield each figure: its name with unit, and a function for its values in a section; the largest value counts."""
     yield "contour error of a section µm", lambda s: [s.contour_error_um.response.max]
     for name, key in (("peak vibration", "peak_vibration_um"), ("residual at the stop", "residual_vibration_um")):
         for axis in "xyz":
@@ -399,10 +399,10 @@ class Measurement(Result):
         return "--plots DIR draws the part with its deviations magnified, --lines A-B measures the cut of these lines"
 
     def tables(self, *, every_section: bool = False) -> list[Table]:
-        """A summary and a table of sections of the programs measured against the same path, side by side.
+        """Tables that compare the programs measured against the same path: a summary, and one of the sections.
 
         Args:
-            every_section: show all sections; False: only the worst of many.
+            every_section: show all sections; False: if there are many, only the worst.
 
         Returns:
             Two tables for each path.

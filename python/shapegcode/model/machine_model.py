@@ -281,8 +281,8 @@ class MachineModel:
 
     @cached_property
     def bounds_deviations(self) -> bool:
-        """True if a cheap bound of deviations at overrides exists: no feed drive, filter, planner or moving mode, no
-        material side."""
+        """True if deviations at other overrides have a bound that is quick to compute: not with feed drives, filters,
+        a planner, moving modes or a stated side of the material."""
         moves = modes.moving_axis(self.machine) is not None
         plain = self.machine.verdict.plant == "modal" and not self.shaped.filters and not moves
         return plain and not self.always_plans and self.machine.input.material_side is None
@@ -327,7 +327,7 @@ class MachineModel:
         self, path: _core.Path, *, against: _core.Path | None = None, override: float = 1.0, record_samples: int = 0,
         emitted: bool = False, **given: Unpack[_Given],
     ) -> _core.SimulationFigures:  # fmt: skip
-        """Simulate a cut of an ordinary program; `emitted`: as emitted, where arcs may be chords."""
+        """Simulate an unshaped cut; `emitted`: as left in the emitted program, where chords may replace its arcs."""
         options = self.verdict_options(**given)
         options.record_samples = record_samples
         controller = self._at_override(override, shaped=emitted and self.always_plans)
@@ -407,7 +407,7 @@ _STEPS = 20.0  # a kink ratio is rounded up to a multiple of 1/20
 def ini_lines(
     paths: Iterable[_core.Path], machine: Machine
 ) -> Iterator[tuple[Literal["kink_ratio", "ramp_frequency"], int, str]]:
-    """LinuxCNC settings to change: key, line of the worst kink (0 for ramps), sentence; none for another control."""
+    """LinuxCNC settings to change: key, line of the worst kink (0: ramps), sentence; nothing for other controls."""
     if machine.controller.kind != "linuxcnc":
         return
     model = fanuc_model(machine)

@@ -43,9 +43,9 @@ def moving_modes(
 ) -> list[Pairs]:
     """Modes that move X, Y, Z, each with its variation over the commanded position.
 
-    Each frequency is shifted by `shift` times its uncertainty, damping lowered by |`shift`| times its own. A table over
-    the part's mass is evaluated; for one over a position the mode is the nominal one. A mode of several axes is listed
-    at each.
+    Each frequency is shifted by `shift` times its uncertainty, and damping is lowered by |`shift`| times the
+    uncertainty of damping. A table over the part's mass is evaluated; with a table over a position the nominal mode is
+    listed, with the table. A mode that moves several axes is listed for each of them.
     """
     found: list[Pairs] = [[], [], []]
     for name, axis, mode in numbered_modes(machine):
@@ -62,7 +62,7 @@ def moving_modes(
 
 
 def axis_modes(machine: Machine, shift: float = 0.0, only: str | None = None) -> list[list[_core.Mode]]:
-    """The modes of `moving_modes` without their variation."""
+    """The modes of `moving_modes`, without their variation over the commanded position."""
     return [[mode for mode, _ in pairs] for pairs in moving_modes(machine, shift, only=only)]
 
 
@@ -243,8 +243,9 @@ def drive_parameters(
 ) -> list[_core.FeedDriveParameters]:
     """Feed drives of X, Y and Z, referred to table travel.
 
-    Position gain and velocity feed-forward are those of the controller. Modes that only their own axis excites are
-    attached to its table, with the nominal frequency where it varies with a position.
+    Position gain and velocity feed-forward are those of the controller. A mode that
+    only its own axis excites is attached to the table of that axis; if its frequency varies with a position, with the
+    nominal frequency.
 
     Args:
         machine: with a table ``[axes.x.drive]``, and likewise for y and z.

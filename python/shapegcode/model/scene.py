@@ -1,4 +1,4 @@
-"""Programs simulated for a page: both motions over time, each piece decimated once simulated, to bound the memory."""
+"""Simulates programs for a page; each piece of motion is decimated as soon as it is simulated, to bound the memory."""
 
 from __future__ import annotations
 

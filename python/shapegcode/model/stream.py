@@ -99,8 +99,8 @@ def stream(
         machine: controller and plant.
         plant: "modal" or "feed-drive".
         shaped: the cuts are shaped blocks, see `simulate`.
-        lines: yield only these lines, first and last, of the expanded program, which is simulated from
-            its start in any case.
+        lines: first and last line (of the expanded program) to yield; the simulation begins at the start of the
+            program in any case.
         chunk_samples: largest number of rows of a piece.
 
     Returns:

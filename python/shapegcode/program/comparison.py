@@ -148,7 +148,7 @@ class KindCount:
 
     @property
     def changed(self) -> int:
-        """How many of the original are missing or different; if none is, how many the other program has in addition."""
+        """Number of items of the original that are missing or differ; if 0, number that only the other program has."""
         return self.original - self.unchanged or self.emitted - self.unchanged
 
 
@@ -190,8 +190,8 @@ class Comparison(Result):
         original: name of the first program.
         emitted: name of the second program.
         machine: name of the machine whose controller read them.
-        counts: counts of each kind that occurs in one of them.
-        path_um: largest distance between the two paths of a cut that both programs have, in either direction, µm.
+        counts: counts of each kind that occurs in the first program, the second or both.
+        path_um: largest distance of a point of either path from the other path, in cuts that both programs have, µm.
         differences: all differences; those of compensation and of a missing end come last.
         allow: allowed differences, in the form for `shapegcode.program.comparison.Allowed.of`.
         warnings: none.
@@ -224,7 +224,7 @@ class Comparison(Result):
             kind: its name.
 
         Returns:
-            The counts; zeros if neither program has one.
+            The counts; zeros if neither program has items of this kind.
         """
         return next((each for each in self.counts if each.kind == kind), KindCount(kind, 0, 0, 0))
 

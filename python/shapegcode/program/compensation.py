@@ -103,7 +103,7 @@ def header_lines(radii_mm: Mapping[int, float]) -> list[str]:
 def guard_lines(radii_mm: Mapping[int, float], machine: Machine) -> list[str]:
     """Program lines that stop the control if its offset differs from the expanded radius.
 
-    Offsets set by the program (G10) need no check. Where IF cannot run (drip feed, no macros, another dialect), and
+    Offsets set by the program (G10) need no check. Where IF cannot run (drip feed, no macros, another dialect), or
     with emission.compensation_guard = "stop", the program stops with M00, and the operator compares.
     """
     lines = []

@@ -41,7 +41,7 @@ def require_memory(source: str, needed: int, what: str) -> None:
 
 
 def require_memory_for_lines(text: bytes, source: str, per_line: int = _PER_LINE) -> None:
-    """Refuse a program whose lines need more memory than available; below a megabyte it is not checked."""
+    """Refuse a program whose lines need more memory than is available; texts below a megabyte are not checked."""
     if len(text) > _SMALL_BYTES:
         lines = text.count(b"\n")
         require_memory(source, lines * per_line, f"{lines} lines are to be read")

@@ -60,7 +60,7 @@ class Expansion(Result):
 
     @property
     def notes(self) -> list[str]:
-        """The expanded radii, one per line."""
+        """Notes on the expanded cutter compensation, one for each radius."""
         return [
             f"{name} = {radius:g} mm was expanded: the offset in the control has no effect"
             for name, radius in self.expanded_radii_mm.items()

@@ -335,7 +335,7 @@ class Program:
         return f"{file or self.source}:{number}"
 
     def source_lines(self, first: int, last: int) -> tuple[int, int]:
-        """Convert lines of the expanded program to those reported: of the source, if it is for another control.
+        """Convert lines of the expanded program to reported ones: for a program of another control those of its source.
 
         Args:
             first: first line, from 1.
@@ -482,7 +482,7 @@ def end_off_grid_mm(region: _core.Region, increment_mm: float) -> list[float]:
 
 
 def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
-    """Mask of axes that rest in a region at a position between two increments: no word may command it."""
+    """Mask of axes that stand still in a region, between two increments: no word may command such a position."""
     off_mm = end_off_grid_mm(region, increment_mm)
     return [extent <= 0.0 < off for extent, off in zip(map(float, region.path.extent_mm), off_mm, strict=True)]
 

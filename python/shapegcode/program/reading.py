@@ -181,7 +181,7 @@ class Reading:
 
     @property
     def has_absolute_arc_centres(self) -> bool:
-        """Whether I, J, K are positions, unless the text was translated from another control's."""
+        """True if I, J, K are positions; does not apply to a translated program, where they are distances."""
         if self.absolute_arc_centres is None:
             return self.machine.input.arc_centre == "absolute" and not self.emitted
         return self.absolute_arc_centres
@@ -348,7 +348,7 @@ def given_text(program: str | Path, machine: Machine) -> tuple[bytes, str, Path 
 
 
 def program_loader(folders: Sequence[Path], most: int) -> Finder:
-    """Make a finder of called programs' files: O0123, O123, 0123 with a usual suffix."""
+    """Make a finder of called programs' files: O0123, O123 or 0123, with any of `PROGRAM_SUFFIXES`."""
 
     def load(number: int) -> tuple[str, bytes] | None:
         stems = (f"O{number:04d}", f"O{number}", f"o{number:04d}", f"{number:04d}", f"O{number:08d}")
@@ -376,7 +376,7 @@ _LIKELY = (
 
 
 def signs_of_turning(text: bytes) -> tuple[int, str] | None:
-    """Line and words that show a turning program; None if there are too few, or with Y words or M06."""
+    """Line and words that show a turning program; None: too few such words, or a Y word or M06, which show a mill."""
     code = COMMENT.sub(b"", text[:LOOKED_AT_BYTES].upper())
     sure = [(found, meaning) for sign, meaning in _SURE if (found := sign.search(code))]
     likely = [(found, meaning) for sign, meaning in _LIKELY if (found := sign.search(code))]

@@ -141,7 +141,7 @@ class Stamp:
         return [first, _PENDING.decode(), *rest]
 
     def difference(self, other: Stamp) -> str:
-        """The first difference from the machine of another header, as text; empty: nothing relevant differs."""
+        """First difference between the machines of two headers, as text; empty: nothing relevant differs."""
         pairs = (
             ("machine", self.machine, other.machine),
             ("modes", ", ".join(self.modes) or "none", ", ".join(other.modes) or "none"),

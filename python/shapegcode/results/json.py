@@ -226,8 +226,8 @@ def schema(result: type) -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of the output of `plain` for a dataclass, from its annotations and docstrings.
 
     Args:
-        result: the class. With `json_extra` (names to types) it has these keys too, and, if the command wrote
-            pictures and a program, their names in `plots` and `output`; command, version and files in `provenance`.
+        result: the class. If it has `json_extra` (names to types), the schema has these keys too, and three optional
+            ones: `plots` and `output` (names of the files written), `provenance` (command, version and files).
 
     Returns:
         The schema.

@@ -34,7 +34,7 @@ class Trace:
         stops: the record contains the final stop; False if it ends before.
         largest_mm: largest distance of the table from the programmed path over the whole run, as measured
             by the core; None: not measured.
-        residual_mm: largest |response - command| of each axis after the stop, likewise.
+        residual_mm: largest |response - command| of each axis after the stop, from the core; None: not measured.
 
     Raises:
         ValueError: a wrong shape, fewer than two samples, a value that is not finite, or a period that is not
@@ -95,11 +95,11 @@ class Trace:
 
         Args:
             begin_s: instant of the first sample; limited to the record.
-            end_s: instant of the last sample, likewise.
+            end_s: instant of the last sample; limited to the record.
             zero_s: instant that becomes time zero.
 
         Returns:
-            At least two samples; its `stops` is true if the stop is among them.
+            A trace of at least two samples; its `stops` is true if it contains the stop.
         """
         count = len(self.command_mm)
         ranks = (np.array([begin_s, end_s]) - self.start_s) / self.period_s

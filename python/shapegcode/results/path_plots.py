@@ -50,8 +50,8 @@ def plot_path(
     """Plot the deviation of the table from the programmed path, magnified.
 
     Each curve is the programmed path plus the magnified deviation of every sample; the title gives the
-    magnification. The legend has the figure measured by the core over the whole run; without it, that of
-    the samples drawn.
+    magnification. The legend states the largest deviation: of the table over the whole run, if the core measured it,
+    else of the samples drawn.
 
     Args:
         programmed_mm: the programmed path as a polyline, shape (m, 3), fine enough for its arcs.
@@ -135,8 +135,9 @@ def _at_corners(along: FloatArray, polyline: FloatArray, curve: FloatArray, apar
     """Samples before which the nearest point, and the plotted curve with it, changes from one side of a corner to the
     other.
 
-    A table that rounds a corner on the inside is nearest to one side, then, from one sample to the next, to the
-    other. Magnified, the two are far apart, and a line between them would draw a loop that was not traversed.
+    If the machine table rounds a corner on the inside, the nearest point jumps from one side of the corner to the
+    other. The two samples are far apart when magnified, and a line between them would draw a loop that was not
+    traversed.
     """
     steps = np.diff(polyline, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
@@ -157,7 +158,7 @@ def _style(number: int, curve: FloatArray, polyline: FloatArray) -> dict[str, An
 
 
 def _path_label(trace: Trace, deviation: FloatArray, quantity: str, *, is_part: bool) -> str:
-    """Name and figures of a trace: those of the core, which include motion between and beyond the samples drawn."""
+    """Name and largest deviation of a trace; that of the core, if known, includes motion outside the samples drawn."""
     here = f"{1e3 * float(np.linalg.norm(deviation, axis=1).max()):.1f} µm"
     if trace.largest_mm is None or quantity != "response":
         return f"{trace.label}, largest {here} in this picture"
@@ -225,9 +226,9 @@ COARSE_STEP_RAD = 0.05  # angle of an arc between two points of a coarse polylin
 def follow(
     command_mm: FloatArray, points: FloatArray, polyline_mm: FloatArray, *, complete: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Nearest points of a polyline to samples that follow it: distances along it, and positions.
+    """For each sample of a motion along a polyline, the nearest point of the polyline: distance along it, position.
 
-    If it passes a point twice, the distance travelled decides; `complete`: the command travels all of it.
+    Where the polyline passes a point twice, the distance travelled decides. `complete`: the command covers all.
     """
     from scipy.spatial import KDTree
 

@@ -93,7 +93,7 @@ def aligned(panels: Sequence[Axes]) -> Axes:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Format a number for a title: *digits* significant digits or all before the point, never as a power of ten."""
+    """Format a number for a title: *digits* significant digits, or an integer if that has more; no power of ten."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
     places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
@@ -102,7 +102,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def round_below(value: float) -> float:
-    """The largest of 1, 2 and 5 times a power of ten that does not exceed a value."""
+    """Round a value down to 1, 2 or 5 times a power of ten."""
     decade = 10.0 ** math.floor(math.log10(value))
     return float(max(step * decade for step in (1, 2, 5) if step * decade <= value * (1 + 1e-9)))
 

@@ -117,7 +117,7 @@ class Result(Outcome):
         return page_of(self, self.light, self.page_sections(provenance), scene, provenance, problems)
 
     def _completed(self, scene: Scene) -> Scene:
-        """The motion, with data that only the result has; overridden by results that have such data."""
+        """Add data of the result to the motion for a page; here none, overridden by results that have such data."""
         return scene
 
     def report(self, path: str | Path, script: Script = "inline") -> list[str]:

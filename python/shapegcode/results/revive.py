@@ -112,7 +112,7 @@ def provenance_in(report: Mapping[str, Any]) -> Provenance:
 
 
 def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingProxyType({})) -> Result:
-    """A result from its JSON, with *kept*: values of fields that are not in it."""
+    """Restore a result from its JSON; *kept*: values of those fields that the JSON does not contain."""
     provenance = provenance_in(report)
     package = importlib.import_module("shapegcode")  # every kind of result is public
     cls = getattr(package, provenance.result) if provenance.result in package.__all__ else None
@@ -226,7 +226,7 @@ def _fields(cls: Any, data: Mapping[str, Any], where: str, bound: Mapping[Any, A
 
 
 def _from_properties(cls: Any, data: Mapping[str, Any], where: str) -> Mapping[str, Any]:
-    """Hidden fields computed from properties in the JSON, for classes with `hidden_from_json(data)`."""
+    """Compute fields that the JSON leaves out from properties in it, for classes with `hidden_from_json(data)`."""
     read = getattr(cls, "hidden_from_json", None)
     if read is None:
         return {}

@@ -34,8 +34,8 @@ class Column:
         left: left-aligned and never wrapped: a column of names.
         style: rich style of a cell from the row; None: plain.
         link: link target of a cell on a page: attribute or function of the row, as for `value`; empty: none.
-        priority: columns with the highest priority are dropped first if the table is too wide, the last one first; 0
-            is never dropped, nor is the first column.
+        priority: in a table that is too wide, columns of the highest priority are dropped first; of equal ones, the
+            rightmost first. A column of priority 0 and the first column are never dropped.
     """
 
     name: str
@@ -193,7 +193,7 @@ def _min_width(columns: Sequence[Column], rows: Sequence[Sequence[str]], *, whol
 
 
 def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int) -> list[int]:
-    """Widths of the columns without cut words; rich would shrink all columns alike and cut the last ones."""
+    """Column widths that cut no word, if possible; rich would shrink all columns alike and cut the last ones."""
     least, most = _min_and_max(columns, rows)
     found = list(least)
     spare = width - (2 * len(columns) - 1) - sum(least)

@@ -135,7 +135,7 @@ def toml_schema(model: type[keys.TomlTable], title: str, *, origins: bool = Fals
 
 
 def _allow_origins(model: type[keys.TomlTable], found: dict[str, Any], defs: dict[str, Any]) -> None:
-    """Allow a table of origins, or an origin at each value (such values are checked only on load)."""
+    """Allow a table of origins, or an origin at each value (values with an origin are checked only on load)."""
     defs["Origin"] = {"type": "string", "pattern": keys.ORIGIN_TEXT, "description": "origin of the value"}
     stated = {"$ref": "#/$defs/Origin"}
     defs["Origins"] = {"type": "object", "additionalProperties": {"anyOf": [stated, {"$ref": "#/$defs/Origins"}]}}

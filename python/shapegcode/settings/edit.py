@@ -85,7 +85,7 @@ def origin_lines(remarks: Mapping[str, str]) -> list[str]:
 
 
 def with_origin_table(text: str, remarks: Mapping[str, str] | None = None) -> str:
-    """Move the origins of values to a table at the end; besides, only values with an inline origin change."""
+    """Move the origins of values into a table at the end; the only other change is that inline origins are removed."""
     remarks = remarks_of(text) if remarks is None else remarks
     text = without_origins(text)
     newline = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"

@@ -67,7 +67,7 @@ def inherited(name: str, remark: str) -> str:
 
 @dataclass(frozen=True)
 class KeyLine:
-    """A line with a table, a key, or a missing key in a comment ``# name = ...``."""
+    """A line with the heading of a table, a key, or a key that is not set: a comment ``# name = ...``."""
 
     kind: Literal["table", "key", "unset"]
     key: str  # dotted name
@@ -199,7 +199,7 @@ _KNOWN = object()
 
 
 def key(meaning: str, *, unit: str = "", fanuc: str = "", assumed: Any = _KNOWN, **field: Any) -> Any:
-    """A pydantic field with the documentation of a key; *unit* only if its name does not end in it.
+    """A pydantic field with the documentation of a key; *unit*: needed unless the name of the key ends in it.
 
     *assumed*: a default that is an assumption, instead of ``default``; without both the key is mandatory.
     """

@@ -192,7 +192,7 @@ def _answered_values(answers: Answers) -> Iterator[tuple[str, tuple[object, str]
 
 
 def _for_axes(machine: Machine, remarks: dict[str, str]) -> dict[str, str]:
-    """Remarks of existing keys, with those of modes from answers and of axes without modes."""
+    """The remarks of keys that the machine has; adds remarks of modes, and of axes without modes."""
     held = {value.key for value in machine.values()}
     found = {key: remark for key, remark in remarks.items() if key in held and remark}
     for axis, table in zip("xyz", machine.axes.as_tuple(), strict=True):

@@ -44,7 +44,7 @@ class MachineSetup(Result):
 
     @property
     def answer(self) -> str:
-        """Number of known values, and axes with unknown vibration."""
+        """How many values were answered and imported, and the axes whose vibration is not known."""
         count = len(self.answered)
         sentence = f"{self.machine}: {count} value{'' if count == 1 else 's'} answered, {len(self.imported)} imported"
         unknown = [each.key.split(".")[1].upper() for each in self.open if each.key.endswith(".modes")]

@@ -40,8 +40,8 @@ class ModeBand:
 
     Attributes:
         mode: nominal frequency and damping.
-        uncertainty: the frequency lies within (1 - uncertainty) to (1 + uncertainty) times the nominal one;
-            0 to below 1, 0: only the nominal frequency is designed for.
+        uncertainty: the frequency lies within (1 - uncertainty) to (1 + uncertainty) times the nominal one. At least
+            0 and below 1; with 0 a shaper is designed for the nominal frequency only.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {"frequency_hz": float, "damping_ratio": float}
@@ -61,13 +61,13 @@ class ModeBand:
 
     @staticmethod
     def hidden_from_json(data: Mapping[str, float]) -> dict[str, Mode]:
-        """Restore the mode from JSON.
+        """Restore the field `mode`, which is not in the JSON, from frequency and damping ratio.
 
         Args:
             data: JSON of a `ModeBand`.
 
         Returns:
-            The hidden field.
+            Value of the field by its name.
         """
         return {"mode": Mode(data["frequency_hz"], data["damping_ratio"])}
 

@@ -68,11 +68,12 @@ def choose_shaper(
             bands; one or several; empty: those of the machine.
         machine: source of the modes, unless given, and of the block periods to try.
         uncertainty: relative half width of the band of modes given without a band.
-        periods_s: grids on which the impulses may lie, s; None among them: also continuous times. None: with a machine
-            its block period or the best few, without one continuous times and the best few multiples of 1 ms.
+        periods_s: grids on which the impulses may lie, s; an item None stands for continuous times. No list: with a
+            machine its block period or the best few; without a machine continuous times and the best few multiples
+            of 1 ms.
         families: names of the families to compare; None: all.
         max_duration_s: longest shaper in s; None: three periods of the slowest mode; with a machine its
-            `shaping.max_duration_s` if that is shorter, or if no shaper of three periods keeps the limits.
+            `shaping.max_duration_s` if that is shorter, or if no shaper within three periods keeps the limits.
         max_abs_sum: largest sum of the impulses' magnitudes.
         vibration_limit: limit of the worst residual ratio; None: the machine's
             `shaping.vibration_limit`, without a machine 0.05.
@@ -85,7 +86,7 @@ def choose_shaper(
         Every design with its figures, the recommended one and the reason.
 
     Raises:
-        ArgumentError: neither modes nor a machine with modes, equal modes, or a value outside its range.
+        ArgumentError: no modes, given or of a machine; two equal modes; or a value outside its range.
         DesignError: a mode cannot be cancelled on any of the grids, or no family has a design within the limits.
     """
     machine = None if machine is None else Machine.of(machine)
@@ -234,9 +235,9 @@ def _least_worst(
     options: DesignOptions,
     found: Sequence[Design],
 ) -> list[Design]:
-    """On each grid the design of the longest duration with the smallest worst residual.
+    """On each grid the design within the longest duration that has the smallest worst residual.
 
-    None of them if a non-negative design keeps the limit.
+    Empty if a non-negative design keeps the limit, no mode is uncertain, or robust designs are not to be compared.
     """
     wanted = any(row.name == _ROBUST for row in rows) and any(band.uncertainty for band in bands)
     if not wanted or any(not each.negative and is_within(each, options.vibration_limit) for each in found):

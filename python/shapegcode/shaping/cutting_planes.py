@@ -135,7 +135,7 @@ class TapProgram:
         self._program = LinearProgram(least, np.full(matrix.shape[1], largest), (matrix, right))
 
     def add_planes(self, planes: FloatArray, above: FloatArray) -> None:
-        """Add planes with their limits plus the excess."""
+        """Add planes; each may exceed its limit in `above` by at most the excess."""
         self._program.add_below(np.hstack([*self._parts(planes), np.full((len(planes), 1), -1.0)]), above)
 
     def limit_magnitudes(self, total: float) -> None:
@@ -143,7 +143,7 @@ class TapProgram:
         self._program.add_below(np.append(np.ones(2 * self._count), 0.0)[None, :], np.array([total]))
 
     def solve(self, cost: FloatArray | None, most: float) -> tuple[FloatArray, float] | None:
-        """Taps of least cost with at most that excess, and the excess; without a cost the taps of least excess."""
+        """Taps of least cost with an excess up to *most*, and their excess; without a cost: taps of least excess."""
         objective = np.zeros(self._count) if cost is None else cost
         width = len(objective) * (1 + self._signed)
         self._program.set_cost(np.append(np.resize(objective, width), 1.0 if cost is None else 0.0))
@@ -186,8 +186,8 @@ class Bounds(NamedTuple):
 class CutPool:
     """Planes found so far, per band: angular frequency and direction. Valid for every duration.
 
-    Directions are relative to the phase of an impulse in the middle of the shaper: so those of the best design hardly
-    depend on its duration.
+    Directions are relative to the phase of an impulse in the middle of the shaper: so the directions of the best design
+    hardly depend on its duration.
     """
 
     omegas: list[list[float]]
@@ -268,7 +268,7 @@ class TapProblem:
         self._rows = [[] for _ in self.bands]
 
     def least_worst(self, limit: float | None = None) -> Bounds | None:
-        """Taps with the smallest worst residual, or None; a search with a limit ends once it is met or disproved."""
+        """Taps with the smallest worst residual, or None; a search with a limit ends once that is met or impossible."""
         best = np.zeros(self.last + 1)
         lower, upper = 0.0, math.inf
         # far below the limit the program would be degenerate, and the solver may cycle
@@ -293,7 +293,7 @@ class TapProblem:
         )
 
     def cheapest(self, cost: FloatArray, limit: float) -> FloatArray | None:
-        """Taps of least cost (sum of magnitudes if signed) with a residual below the limit, or None."""
+        """Taps of least cost with a residual below the limit, or None; signed taps: the cost of their magnitudes."""
         for _ in range(_MAX_ROUNDS):
             found = self._solve(cost, limit)
             if found is None:

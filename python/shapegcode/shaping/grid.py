@@ -74,9 +74,9 @@ def choose_block_period(
     fewest blocks.
 
     A mode without a band is cancelled exactly; if any has a band, the residual ratio is at most `vibration_limit`
-    within the bands. If no period has such a design within `max_duration_s`, the one with the smallest worst residual
-    of that duration is used, and reported in `note`; among worst residuals within 2 % of the smallest the
-    longest period wins.
+    within the bands. If no period has such a design within `max_duration_s`, designs of this
+    duration are compared: the period with the smallest worst residual wins (within 2 % of it the longest period) and
+    is reported in `note`.
 
     Args:
         modes: modes to cancel, with or without bands, at least one.
@@ -191,7 +191,7 @@ def _candidate(
 def _fallback(
     refused: BlockPeriodCandidate, bands: Sequence[ModeBand], max_duration_s: float, limit: float
 ) -> BlockPeriodCandidate:
-    """The design of the longest duration with the smallest worst residual, with a note; else the unchanged refusal."""
+    """Design of the least worst residual within the longest duration, and a note; the given refusal if none exists."""
     from shapegcode.shaping.robust import Task, best_within, unreachable
 
     task = Task.checked(bands, refused.period_s)
@@ -356,7 +356,7 @@ def choose_grid(
 
 
 def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
-    """Add a shaper for each axis if the machine file requests it; else note their duration if it is shorter."""
+    """Add shapers per axis if the machine file requests them; else note their duration if below the common shaper's."""
     wanted = machine.shaping.per_axis
     possible = exact and grid.track is None and machine.shaping.contour != "off"
     if not possible:

@@ -42,7 +42,7 @@ def plots_of(result: Recommendation) -> dict[str, Plot]:
 
 
 def selected(result: Recommendation) -> list[Design]:
-    """Designs to draw, at most six: the recommended ones, then one of each other family, first of the Pareto front."""
+    """Designs to draw, at most six: those recommended, then one per other family; those of the Pareto front first."""
     indices = list(dict.fromkeys(each for each in (result.recommended, result.recommended_on_grid) if each is not None))
     negative = result.allow_negative or result.design.negative
     shown = [index for index in result.shown() if negative or not result.designs[index].negative]
@@ -68,7 +68,7 @@ def _taps(each: Design) -> tuple[float, ...]:
 def _shapers_and_bands(
     result: Shapers, modes: Sequence[float | str | Mode | ModeBand]
 ) -> tuple[Mapping[str, Shaper], Sequence[ModeBand]]:
-    """Shapers to draw by name in the legend, and the modes."""
+    """Shapers to draw, with their names in the legend as keys; and the modes."""
     if isinstance(result, Recommendation):
         shapers = {
             f"{each.family}, {each.duration_s * 1e3:.4g} ms"

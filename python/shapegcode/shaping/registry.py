@@ -81,7 +81,7 @@ def repeated(name: str, zeros: int) -> Solve:
 
 
 def hump_ei(name: str, humps: int) -> Solve:
-    """EI with *humps* humps; on a grid the shortest impulses with its zeros, and its limit between the outer ones."""
+    """EI with *humps* humps; on a grid the shortest impulses with EI's zeros, and its limit between the outer zeros."""
 
     def conditions(mode: _core.Mode, options: DesignOptions) -> Conditions:
         zeros_hz = _core.extra_insensitive(mode, options.vibration_limit, humps).zeros_hz
@@ -159,7 +159,7 @@ def simultaneous_zv(modes: Sequence[_core.Mode], max_duration_s: float) -> _core
 
 
 def _merged(shaper: _core.Shaper, distance_s: float) -> tuple[FloatArray, FloatArray]:
-    """Merge neighbouring taps at their mean time; times and amplitudes."""
+    """Times and amplitudes after merging taps at most `distance_s` apart at their weighted mean time."""
     groups: list[list[int]] = []
     for index, time_s in enumerate(shaper.times_s):
         if groups and time_s - shaper.times_s[groups[-1][-1]] <= distance_s:

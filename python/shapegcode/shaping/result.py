@@ -70,12 +70,16 @@ def recommend(
 ) -> int:
     """Index of the recommended design.
 
-    Candidates are the designs without negative impulses (all, with `allow_negative` or if every design has some) with a
-    worst residual within the limit; of these, if any, those that cancel the modes without a stated band. The best by
-    the objective is taken; without a candidate, the one with the smallest worst residual. If it is on a grid, and the
-    objective is "shortest" or there is no candidate, of all within 2 % of its duration (without a candidate: residual)
-    the one with the longest period is taken (fewest blocks); of equal ones first the family that `convert` uses, then
-    one made for grids.
+    Designs with negative impulses are excluded, except with `allow_negative` or if every design has some. Candidates
+    are the others whose worst residual is within the limit. If some of them exactly cancel the modes without a
+    stated band, only these are candidates.
+
+    With candidates, the best one by the objective is taken. If it is on a grid and the objective is "shortest", a
+    longer period (fewer blocks) is preferred: of the candidates whose duration is at most 2 % longer, the one with the
+    longest period is taken. Without candidates, the design with the smallest worst residual is taken; if it is on a
+    grid, by the same preference among designs whose worst residual is at most 2 % larger.
+
+    If candidates are equal, a family that `convert` uses comes first, then one made for grids.
     """
     if not designs:
         raise ArgumentError("there is no design to choose from: 0 given")
@@ -92,7 +96,7 @@ def recommend(
 
 
 def _competing(designs: Sequence[Design], limit: float, allow_negative: bool) -> tuple[list[int], list[int]]:
-    """Allowed designs, or all if none is; of these, those within the limit: the `exact` ones, if any is."""
+    """Indices of the allowed designs (of all if none is), and of those within the limit: only `exact` ones, if any."""
     indices = [index for index, each in enumerate(designs) if allow_negative or not each.negative]
     indices = indices or list(range(len(designs)))
     good = [index for index in indices if is_within(designs[index], limit)]
@@ -252,7 +256,7 @@ class Recommendation(Result):
         return f"shapegcode convert part.nc -m {self.machine} {options}"
 
     def notes(self) -> list[str]:
-        """Reason of the recommendation; best design for blocks, if it is another; best of each grid."""
+        """Reason of the recommendation; best design for blocks, if that is another design; best design of each grid."""
         lines = [f"{_MARK} {'recommended' if self.ok else 'best available'}: {self.reason}"]
         index = self.recommended_on_grid
         if index is not None and index != self.recommended:

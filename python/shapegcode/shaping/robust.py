@@ -58,9 +58,9 @@ def least_worst(
 ) -> RobustDesign:
     """Design taps on a grid with the smallest worst residual over the bands, for a given duration.
 
-    The optimum is proven to 0.1 %: `worst_residual` is at most that much above `min_possible` (a residual below
-    1e-6 counts as zero). The exception is a damped mode whose optimum has no taps in its last periods:
-    the residual counts from the last tap on, so the shaper is then shorter, or gets a last tap of 0.001.
+    The optimum is proven to 0.1 %: `worst_residual` is at most 0.1 % above `min_possible` (a residual below 1e-6
+    counts as zero). There is one exception: with a damped mode the optimum may have no taps at the end of the duration.
+    As the residual counts from the last tap on, the shaper is then shorter, or gets a last tap of 0.001.
 
     Source: this project.
     """
@@ -284,9 +284,9 @@ def _below(task: Task, last: int, limit: float) -> Bounds | None:
 def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, precision: float = 0.0) -> int | None:
     """Smallest number of periods of a design below the limit, or None if it exceeds `most`.
 
-    Further zero taps keep a design valid, so growing and then bisection finds it. The search starts at the duration
-    of the convolved ZV, and above `too_few`, which is known not to suffice. With a relative `precision` the result
-    suffices, but may exceed the smallest by that much.
+    A design stays valid with zero taps added: the number of periods is raised until it suffices, then bisected. The
+    search starts at the duration of the convolved ZV, or at a multiple of `too_few` (known not to suffice) if that is
+    longer. With a relative `precision` the result suffices, but may exceed the smallest number by that ratio.
     """
     start = max(1.0, sum(0.5 / band.mode.frequency_hz for band in task.bands) / task.period_s, _GROWTH * too_few)
     return smallest_enough(
@@ -342,7 +342,7 @@ def unreachable(task: Task) -> str:
     """Message: a frequency that no non-negative shaper of this grid can reduce; empty if none.
 
     At a frequency with a whole number of cycles per period all taps add in phase: a shaper then reduces vibration only
-    by its decay during the shaper.
+    because the vibration decays during the shaper.
     """
     if task.max_abs_sum is not None:
         return ""

@@ -132,7 +132,7 @@ def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s:
 def taps_of_mean(
     modes: Sequence[Mode], period_s: float, periods: int, mean_s: float
 ) -> tuple[NDArray[np.intp], FloatArray, Shaper] | None:
-    """Delays in periods and taps as in `shaper_of_mean`, and the shaper; only the delays may begin above 0."""
+    """Delays in periods and taps as in `shaper_of_mean`; and their shaper, moved so that its times begin at 0."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
     matrix = np.vstack([matrix, steps / periods])
@@ -153,7 +153,7 @@ def taps_of_mean(
 
 
 def _vertices(matrix: FloatArray, right: FloatArray, *costs: FloatArray) -> list[FloatArray | None]:
-    """Non-negative taps that meet the conditions, of least value for each cost; None: infeasible."""
+    """For each cost: the non-negative taps that meet the conditions at least cost; None: there are none."""
     count = matrix.shape[1]
     program = LinearProgram(np.zeros(count), np.full(count, math.inf), (matrix, right))
     found: list[FloatArray | None] = []
@@ -205,7 +205,7 @@ def mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[fl
 
 
 def _worst_between(left: TrackNode, right: TrackNode, modes: Sequence[MovingMode]) -> float:
-    """Largest residual ratio of a mode with the mixed shapers between two nodes."""
+    """Largest residual ratio of any mode at positions between two nodes, where their shapers are interpolated."""
     times = sorted({*left.shaper.times_s.tolist(), *right.shaper.times_s.tolist()})
     first, second = (
         np.array([dict(zip(s.times_s.tolist(), s.amplitudes.tolist(), strict=True)).get(t, 0.0) for t in times])
@@ -222,8 +222,9 @@ def _worst_between(left: TrackNode, right: TrackNode, modes: Sequence[MovingMode
 def design_per_axis(axis_modes: Sequence[Sequence[Mode]], period_s: float, max_duration_s: float) -> list[Fir] | None:
     """Shortest non-negative filters, one per axis, with a common mean delay and zero residual at the axis' own modes.
 
-    The longest of them is as short as the grid permits; of nine mean delays possible for all axes, the one with the
-    least sum of second central moments is chosen. An axis without modes is only delayed. None if none exist.
+    The longest filter is as short as the grid permits. Nine mean delays that are possible for all axes are compared;
+    the one with the smallest sum of the filters' second central moments is chosen. An axis without modes is only
+    delayed. None: no such filters exist within `max_duration_s`.
 
     Source: this project.
     """

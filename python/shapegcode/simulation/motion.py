@@ -46,7 +46,7 @@ class MotionEnvelope:
             self._merge()
 
     def _merge(self) -> None:
-        """Merge intervals in pairs; one left over becomes samples that are not yet in an interval."""
+        """Merge pairs of intervals; if their number is odd, the last interval goes back to the waiting samples."""
         pairs = len(self._low) // 2
         if len(self._low) % 2:
             # Its two extremes represent it until its interval is full.
@@ -211,7 +211,7 @@ def csv_file(path: str | Path) -> Iterator[WriteMotion]:
 
 @contextlib.contextmanager
 def npz_file(path: str | Path) -> Iterator[WriteMotion]:
-    """Open a NumPy archive for `Chunk.columns`, `kind` and its names; needs twice its size in its folder until done."""
+    """Open a NumPy archive for `Chunk.columns` and `kind`; until it is closed, it uses disk space of twice its size."""
     target = Path(path).resolve()
     with named_errors(path), contextlib.ExitStack() as files, replaced_file(path) as stream:
         # Temporary files are in the folder of the archive, which has space, unless the path is that of a device.

@@ -75,17 +75,17 @@ class Motion:
         samples: number of samples.
         end_s: time of the last sample.
         largest_speed_mm_per_min: of the command.
-        largest_acceleration_mm_per_s2: of the command, by second difference.
+        largest_acceleration_mm_per_s2: of the command, from second differences of its positions.
         largest_error_um: largest |response - command|.
         largest_motor_force_n: largest motor force, with feed drives.
-        largest_friction_force_n: largest friction force, likewise.
+        largest_friction_force_n: largest friction force, with feed drives.
         csv: CSV file written.
         npz: NumPy file written.
         program: name of the program.
         times_s: middle of each of n intervals.
         low: minimum in each interval, (n, curves, 3): command and response (mm), speed of the command (mm/s), its
             acceleration (mm/s²), response minus command (mm), with feed drives force of the motor and friction (N).
-        high: maximum, likewise.
+        high: maximum in each interval, in the same form.
     """
 
     lines: tuple[int, int] | None
@@ -141,7 +141,7 @@ class Simulation(Result):
         settling_limit_s: how long the motion after a stop is observed.
         contour_error_um: against the path of `measured_against`.
         orbit_error_percent: of the command on each arc.
-        response_orbit_error_percent: of the table, likewise.
+        response_orbit_error_percent: of the machine table on each arc.
         regions: the cutting regions in order.
         of_shaped: the shaped regions only; None: no shaped regions.
         verdict: with `against`: verdict of the whole program and its original in the relevant operating conditions, as

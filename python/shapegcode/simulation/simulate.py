@@ -47,12 +47,12 @@ def simulate(
         machine: controller and plant.
         plant: "modal" for an ideal servo followed by the modes, "feed-drive" for `axes.*.drive`; vibration figures
             then include servo lag.
-        shaped: the cuts are shaped blocks: simulated at their feed, without look-ahead, through the control's own
-            filter (`controller.shaped_time_constant_s`), with the worse rule of block timing. None: the
-            regions marked as shaped in an emitted program.
+        shaped: True: all cuts are shaped blocks, simulated at their feed, without look-ahead, through the control's own
+            filter (`controller.shaped_time_constant_s`), with the worse rule of block timing. False: none of them is.
+            None: only the regions that an emitted program marks as shaped.
         against: the original of a shaped program: the contour error is measured against its path, and the whole program
-            gets a verdict in the relevant operating conditions, as in `convert`. None: the
-            program's own path, and no verdict.
+            gets a verdict in the operating conditions that count, as in `convert`. None: the contour error is measured
+            against the program's own path, and there is no verdict.
         record_samples: largest number of stored samples per region; 0: figures only.
         on_progress: called with completed and total regions.
 
@@ -232,7 +232,7 @@ def _simulate_region(
 
 
 def _settling_s(simulated: Iterable[_core.SimulationFigures], band_um: float) -> Xyz[float | None]:
-    """Longest settling time of each axis; None: it does not settle, or no band."""
+    """Longest settling time of each axis, s; None: the axis does not settle, or the settling band is zero."""
     rows = [figures.settling_s for figures in simulated]
     longest = np.max(rows, axis=0) if rows else np.zeros(3)
     return Xyz(*(float(value) if band_um > 0.0 and math.isfinite(value) else None for value in longest))

@@ -30,7 +30,7 @@ def plots_of(study: MachineStudy | Optimum) -> dict[str, Plot]:
 
 
 def plot_tornado(study: MachineStudy, ax: Axes | None = None) -> Axes:
-    """Plot the influence of the values, at most 12: bars from smallest to largest median ratio to the limit.
+    """Plot the influence of at most 12 values: bars from the smallest to the largest median of the ratio to the limit.
 
     Args:
         study: the study.

@@ -98,7 +98,7 @@ class BinQuantiles:
 
 @dataclass(frozen=True)
 class Bins:
-    """A measure over one value, bin by bin."""
+    """Quantiles of a measure in bins of one varied value."""
 
     key: str  # key of the value
     measure: str  # name of the measure
@@ -191,7 +191,7 @@ class MachineStudy(Result):
         return {each.name: each for each in self.quantities}[name]
 
     def key_figures(self) -> tuple[Figure, ...]:
-        """Probability, and the 95 % quantile of each measure with its value for the machine file."""
+        """Probability; for each measure its value on the machine as in the file, and its 95 % quantile."""
         figures = [Figure("stay within tolerance", "%", None, self.within * 100, 1, None, "", "within", 100.0)]
         for rank, each in enumerate(self.quantities):
             keys = f"quantities.{rank}.nominal", f"quantities.{rank}.p95"
@@ -307,7 +307,7 @@ class Candidate:
         values: the chosen values.
         time_s: cycle time; None: no emitted program.
         within: ratio of samples within tolerance; None: no emitted program, or a shorter combination is good enough.
-        checked: the same for four times as many new samples; None: `within` is None or below the probability.
+        checked: the same for four times as many new samples; None: `within` is None or below the requested one.
         why: reason without an emitted program.
     """
 
@@ -331,10 +331,10 @@ class Optimum(Result):
         program: name of the program.
         machine: name of the varied machine.
         probability: required probability of staying within tolerance.
-        draws: machines on which a candidate is simulated; four times as many new ones confirm it.
-        best: the best candidate; None: none has the required probability.
-        as_it_is: candidate with the settings of the machine file; None: no emitted program.
-        candidates: all converted ones, shortest first.
+        draws: number of machines on which a candidate is simulated; it is confirmed on four times as many others.
+        best: the best candidate; None: no candidate has the required probability.
+        as_it_is: the settings of the machine file as a candidate; None: they give no emitted program.
+        candidates: all candidates that were converted, shortest first; those without an emitted program last.
         combinations: number of possible combinations.
         warnings: always empty.
         machine_words: the machine as argument of -m.
@@ -403,7 +403,7 @@ class Optimum(Result):
 
     @property
     def shown(self) -> tuple[Candidate, ...]:
-        """The shortest candidates with an emitted program."""
+        """The first candidates by cycle time, without those that have no emitted program."""
         return tuple(each for each in self.candidates[:_SHOWN] if each.time_s is not None)
 
     def tables(self) -> list[Table]:

@@ -53,8 +53,8 @@ def study(
     """Simulate a program on machines with sampled values, and compute the probability of staying within tolerance.
 
     The program is converted once, for the machine file. A mode, drive, filter or time in `vary` is changed only in the
-    simulated machine. For a value that only the converter reads, or one that is `known`,
-    the program is converted for each value.
+    simulated machine; but for a key that only the converter reads, or whose distribution is `known`, the program is
+    converted for each sampled value.
 
     >>> sg.study("part.nc", machine, {"axes.x.modes.1.frequency_hz": sg.normal(46, 2)}, n=10_000)
 
@@ -100,7 +100,7 @@ def study(
 
 
 def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> None:
-    """Check, before any conversion, the machines with the lowest and highest value of each key, or each of a list."""
+    """Before any conversion, check machines with lowest and highest value of each key, or with each listed value."""
     for each, column in zip(varied, columns, strict=True):
         if isinstance(each.distribution, Listed):
             ends = {toml(value): index for index, value in enumerate(column)}.values()
@@ -114,7 +114,7 @@ def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> 
 
 @dataclass(frozen=True)
 class _Text:
-    """An emitted program and its samples; without a program the reason."""
+    """An emitted program and the samples that it serves; or the reason why there is no such program."""
 
     draws: tuple[int, ...]
     values: Mapping[str, object]
@@ -181,7 +181,7 @@ class _StudyRun:
         self.measured[list(text.draws)] = replays.simulate_all(text.replay, job, self.pool, tell)
 
     def _simulate_nominal(self, texts: Sequence[_Text]) -> None:
-        """Simulate the program converted for the machine file on that machine."""
+        """Convert the program for the unvaried machine file, and simulate it on the unvaried machine."""
         try:
             held = next((text.replay for text in texts if not text.values), None)
             replay = held or replays.Replay.of(self.program, self.machine, shape_all=self.shape_all)
@@ -259,7 +259,7 @@ def quantity(name: str, values: FloatArray, nominal: float) -> results.Quantity:
 
 
 def within(shares: FloatArray) -> npt.NDArray[np.bool_]:
-    """Mask of the samples within every limit, from the largest ratio to a limit of each."""
+    """Mask of the samples that keep every limit; *shares*: the largest ratio to a limit, of each sample."""
     return shares <= _WITHIN
 
 
@@ -274,7 +274,7 @@ def interval_of(good: int, count: int) -> tuple[float, float]:
 
 
 def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple[results.BinQuantiles, ...]:
-    """Quantiles of a measure over a varied value: in up to ten bins of equally many samples, or at each listed one."""
+    """Quantiles of a measure over a varied value: in up to ten bins of equally many samples, or per listed value."""
     if isinstance(each.distribution, Listed):
         groups = [
             (rank, str(choice), [index for index, value in enumerate(column) if value == choice])

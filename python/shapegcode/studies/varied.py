@@ -92,8 +92,8 @@ def lognormal(median: float, percent: float, *, known: bool | None = None) -> Di
 
     Args:
         median: in the unit of the key.
-        percent: increase at one standard deviation above the median; below, it is smaller by the same
-            factor.
+        percent: one standard deviation above the median the value is larger by this percentage; one below, it is
+            smaller by the same factor.
         known: see `Distribution`.
 
     Returns:

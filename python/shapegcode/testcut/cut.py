@@ -129,7 +129,7 @@ class Deepest:
 
 @dataclass(frozen=True)
 class DeeperSection:
-    """Range where passes are over 1 µm deeper than in the corner, as the tool milling the edge is round."""
+    """Range where passes are more than 1 µm deeper than in the corner, since a round tool milled the stock edge."""
 
     from_mm: float  # X at its start
     to_mm: float  # X at its end
@@ -278,7 +278,7 @@ def unrolled_edge(
 
 
 def offset_line(line: Edge, radius: float, start: float, end: float, *, inwards: bool = False) -> Edge:
-    """Path of a tool's axis that mills an edge, within 0.1 µm; inwards: the edge milled on such a path."""
+    """Tool path (axis of the tool) that mills an edge, within 0.1 µm; *inwards*: edge that a given tool path mills."""
     side = -1.0 if inwards else 1.0
     if len(line.x_mm) == 2:
         slope = float(np.diff(line.height_mm)[0] / np.diff(line.x_mm)[0])

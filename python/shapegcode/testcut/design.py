@@ -301,7 +301,7 @@ def _blocks(
 
 
 def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[FloatArray, FloatArray]:
-    """Distance along the path from the start of section S2 (paper 001), and the radial depth until it is constant."""
+    """Distances from the start of section S2 (paper 001) to where the radial depth stays constant, and the depths."""
     allowance, rough, finish = sizes
     before = 2.0 * (rough + finish)
     cut = _core.CornerCut(given.tool.radius_mm, rough, finish, allowance, before_mm=before, after_mm=before)

@@ -111,7 +111,7 @@ def _poor(fit: forces.CoefficientFit) -> Iterator[str]:
 
 
 def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
-    """Rows per revolution; 0 for means at known radial depths."""
+    """Samples of a record per revolution; 0 if its rows are means at known radial depths."""
     if record.radial_depth_mm is not None:
         return 0.0
     turn = _PER_MINUTE / cut.spindle_rev_per_min

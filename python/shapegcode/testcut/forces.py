@@ -34,7 +34,7 @@ class Engagement:
 
 
 def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: FloatArray, *, up: bool) -> Engagement:
-    """Engagement in a pass at each X of the tool's axis, exact for stock edges of straight lines."""
+    """Engagement in a pass at each X of the tool's axis; exact if the stock edge consists of straight lines."""
     radius = tool.radius_mm
     edge_x, edge_y = np.array(measuring.edge_x_mm), np.array(measuring.edge_height_mm)
     x = np.asarray(x_mm, dtype=np.float64)
@@ -50,7 +50,7 @@ def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: FloatArray, *, up:
 
 
 def _crossing(x: FloatArray, begin: FloatArray, edge_x: FloatArray, edge_y: FloatArray, radius: float) -> FloatArray:
-    """Distance ahead of the axis where the tool's front leaves the edge; `begin` if it has left there already."""
+    """Distance ahead of the tool's axis, `begin` or more, at which the front of the tool leaves the stock edge."""
     open_ = np.interp(x + begin, edge_x, edge_y) > radius - np.sqrt(np.maximum(radius**2 - begin**2, 0.0))
     found = np.where(open_, radius, begin)
     slopes = np.diff(edge_y) / np.diff(edge_x)
@@ -127,7 +127,7 @@ class ForceLaw:
 def mean_chip_mm(
     tool: CutTool, spindle_rev_per_min: float, axial_depth_mm: float, met: Engagement, feed_mm_per_min: FloatArray
 ) -> FloatArray:
-    """Mean chip thickness at each engagement, mm: torque for exponent 1 of the law divided by that for 0."""
+    """Mean chip thickness at each engagement, mm: ratio of the torques that force laws of exponents 1 and 0 give."""
     laws = (ForceLaw(tool, CuttingLaw(1.0, exponent), spindle_rev_per_min, axial_depth_mm) for exponent in (0.0, 1.0))
     once, twice = (law.forces(met, feed_mm_per_min).mean_torque_nm for law in laws)
     return np.asarray(np.divide(twice, once, out=np.zeros_like(once), where=once > 0.0))
@@ -393,7 +393,7 @@ def _of_position(model: ForceModel, parameters: FloatArray, weighted: FloatArray
 def _with_intervals(
     model: ForceModel, parameters: FloatArray, covariance: FloatArray, free: int, chip_mm: float
 ) -> tuple[Coefficient, ...]:
-    """Values with intervals; the factors k1 and k2 at a chip thickness."""
+    """Coefficients with 95 % intervals; the factors k1 and k2 are evaluated at one chip thickness."""
     from scipy.stats import t as student
 
     quantile = float(student.ppf(0.975, max(free, 1)))

@@ -68,7 +68,7 @@ def plot_taper(result: TaperResult, ax: Axes | None = None) -> Axes:
 
 
 def plot_coefficients(result: TaperResult, ax: Axes | None = None) -> Axes:
-    """k1 and k2 over the chip thickness, with the law known before.
+    """k1 and k2 over the chip thickness, with those of the force law known before the test cut.
 
     Args:
         result: result of a taper.

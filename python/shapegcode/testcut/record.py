@@ -171,7 +171,7 @@ def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, f
 
 
 def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[FloatArray, FloatArray]:
-    """Time of each sample, and the travel since the first one: as measured, else at the first commanded feed."""
+    """Time of each sample, and travel since the first one; if one is not recorded, computed from the commanded feed."""
     if record.position_mm is not None:
         x = record.position_mm
         if record.time_s is not None:
@@ -187,7 +187,7 @@ def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) 
 
 
 def _spindle_speed(force_n: FloatArray, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
-    """Spindle speed from the clearest line of spindle, teeth or harmonics, and True; without one: commanded, False."""
+    """Speed by the clearest spectral line of spindle, teeth or harmonics, and True; else the commanded one, False."""
     count = len(force_n)
     turns = count * period_s * commanded / _PER_MINUTE
     if turns < _MIN_FOR_SPEED:
@@ -310,7 +310,7 @@ def _shift(forecast: Expected, x: FloatArray, size: FloatArray, side: float) -> 
 
 
 def _vertex(three: FloatArray) -> float:
-    """Minimum of the parabola through three values, in steps from the middle one."""
+    """Position of the minimum of the parabola through three values, in steps from the middle value."""
     left, middle, right = three.tolist()
     bend = left - 2.0 * middle + right
     return 0.5 * (left - right) / bend if bend > 0.0 else 0.0

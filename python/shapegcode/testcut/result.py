@@ -76,7 +76,7 @@ RATIO_LIMIT = 0.10  # largest difference of measured and expected effect of the 
 
 @dataclass(frozen=True)
 class ChipRange:
-    """Mean chip thicknesses of the mean forces."""
+    """Range of the mean chip thickness over the mean forces of a fit."""
 
     min: float  # thinnest, mm
     max: float  # thickest, mm
@@ -157,7 +157,7 @@ class TaperResult(Result):
 
     @property
     def answer(self) -> str:
-        """k1 and k2 at the mean chip, and the residual."""
+        """k1 and k2 at the middle chip thickness, and the residual."""
         k1, k2 = (each.value for each in self.at_chip)
         chip = self.chip_mm
         sentence = (
@@ -261,7 +261,7 @@ class CornerResult(Result):
 
     @property
     def answer(self) -> str:
-        """Scale and ratio."""
+        """Measured over expected resultant; ratio of the largest resultants with modified and with constant feed."""
         sentence = f"the measured resultant is {self.scale:.2f} times the expected one in the first recorded pass"
         if self.ratio is None:
             return sentence
@@ -316,8 +316,8 @@ class IntervalResult(Result):
     Attributes:
         program: program of the test cut.
         machine: name of the machine.
-        interval_mm: shortest interval that is followed, as are all longer ones measured; None: the longest is not.
-        lag_interval_mm: travel for 90 % of a step with the median lag, at the largest feed.
+        interval_mm: shortest interval from which on every measured one is followed; None: not even the longest.
+        lag_interval_mm: travel at the largest feed until a lag of the median time constant reaches 90 % of a step.
         passes: measured passes, by interval.
         warnings: further remarks.
         kind: kind of the test cut.

@@ -41,10 +41,10 @@ def cycle_time(
     """Compute the cycle time of a program as it is, without shaping.
 
     Shaped regions of an emitted program (by its header) are timed block by block at their feed, with the slower rule
-    of block timing, as in `convert`; by the control's planner if it has one of its own.
+    of block timing, as in `convert`; if the control's planner cannot be switched off, that planner times them.
 
-    For moves of an axis with unknown position (before its first absolute word, after M06, G28, G53)
-    only the known part counts, and `times.unknown_move_s`.
+    Of a move of an axis with unknown position (before its first absolute word, after M06, G28, G53) the known part
+    is timed; for the rest of a rapid `times.unknown_move_s` is added.
 
     Args:
         program: the program, or its file.
@@ -122,7 +122,7 @@ def cycle_time(
 def _log_next(
     interval: TimeInterval | None, programs: Sequence[Program], machine: Machine, overrides: tuple[float, float]
 ) -> tuple[LogNext, ...]:
-    """Interval that remains after logging each of the programs, the smallest first."""
+    """For each program alone: the interval that remains once its run has been logged; the smallest first."""
     found = [(program.source, time_interval(program, machine, *overrides)) for program in programs]
     left = [LogNext(name, interval.after_logging(other)) for name, other in found if interval and other]
     return tuple(sorted(left, key=lambda each: each.half_width_s))
@@ -230,7 +230,7 @@ class TimeInterval:
         return tuple(sorted(parts, key=lambda part: -part.share))
 
     def narrowed_by(self) -> str:
-        """What a program must contain for its log to narrow the interval, apart from scatter between cuts or runs."""
+        """The program that would narrow the interval most if logged; scatter between cuts or runs is left aside."""
         name = next((part.name for part in self.parts() if part.name not in (BETWEEN, RUNS)), CUTS)
         text = next(
             (text for word, text in _REMEDIES.items() if word in name), f"a program in which {name} occurs alone"
@@ -238,7 +238,7 @@ class TimeInterval:
         return text.format(move=self.mean_move_mm)
 
     def after_logging(self, other: TimeInterval) -> float:
-        """Half-width, s, once another program's time is known up to its scatter (least squares)."""
+        """Half-width, s, after logging a run of another program, whose time has its own scatter (least squares)."""
         common = sum(value * other.steps.get(name, 0.0) for name, value in self.steps.items())
         known = sum(value**2 for value in (*other.steps.values(), *other.scatters.values()))
         left = sum(value**2 for value in self.steps.values()) - (common**2 / known if known > 0.0 else 0.0)

@@ -76,7 +76,7 @@ class BlockTime:
 
 @dataclass(frozen=True)
 class OpenPart:
-    """Contribution of one source to the interval of a time."""
+    """Contribution of one source of uncertainty to the 95 % interval of a predicted time."""
 
     name: str  # a parameter, the kind of look-ahead, or a scatter
     half_width_s: float  # half of the 95 % interval from this source alone, s
@@ -118,9 +118,9 @@ class CycleTime(TimeParts, Result):
         program: name of the program.
         machine: name of the machine.
         total_low_s: lower end of the 95 % interval of the total; None: the machine was not calibrated with run logs.
-        total_high_s: upper end; None: likewise.
-        interval_parts: components of the interval, the largest first; empty: likewise.
-        narrowed_by: required contents of a program whose log would narrow the interval most; None: likewise.
+        total_high_s: upper end; None: not calibrated with run logs.
+        interval_parts: components of the interval, the largest first; empty: not calibrated with run logs.
+        narrowed_by: what a program must contain for its log to narrow the interval most; None: not calibrated.
         log_next: programs that could be logged next, the most useful first; empty unless requested.
         full_interpolation_s: total by full interpolation; None: not requested.
         tools: times per tool, in order of first use.
@@ -294,7 +294,7 @@ class CycleTime(TimeParts, Result):
         return Table("slowest", columns, rows, sections=(len(regions),))
 
     def plots(self) -> Mapping[str, Plot]:
-        """`time`: time by tool and by cut; none for a program without time."""
+        """Picture `time`: time by tool and by cut. No picture if the cycle time is zero."""
         return self._drawn_beside() if self.cycle_time_s > 0.0 else {}
 
     def csv_lines(self) -> Iterator[str]:

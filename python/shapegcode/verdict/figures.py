@@ -187,7 +187,11 @@ class RegionVerdict:
     worse: tuple[str, ...] = ()  # missed tolerances in which it is worse than the original
 
     def is_benefit(self, contour_limit_um: float, least_gain_um: float) -> bool:
-        """True if a contour error above its limit or vibration falls by the least gain, and by 30 % or to its limit."""
+        """True if the contour error or a residual vibration falls enough.
+
+        Enough: by the least gain, and either by 30 % or from above its limit to within it. The contour error must have
+        been above its limit, the vibration above its limit or the least gain, whichever is less.
+        """
         pairs = [(self.original_contour_error_um, self.contour_error_um, contour_limit_um, contour_limit_um)]
         residual = self.residual_vibration_um
         pairs += [
@@ -278,7 +282,8 @@ class Case:
     def needs_contour(self, target: Target) -> bool:
         """True if the contour error must be measured in this operating condition.
 
-        With a shifted mode only if it counts and may differ: the mode changes the response, not the command.
+        With a shifted mode only if the condition counts, and the target is the response or the override is not 100 %:
+        the mode does not change the command.
         """
         return self.mode is None or (self.counts and (self.override != 1.0 or target == "response"))
 
@@ -351,10 +356,11 @@ def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]
 def stated_cases(machine: Machine) -> list[Case]:
     """Operating conditions of the verdict for a machine; the nominal ones come first (ceil, carry).
 
-    Overrides from 50 to 120 % and at the ends of the range (none if the override is locked); each mode, and all of
-    them, shifted up and down by their uncertainty with the lowest damping; both together at the corners of
-    the range; the look-ahead mode left on (for a controller that has one); and a block buffer that runs empty once. A
-    control whose planner cannot be switched off uses it in all of them, and stops in time if its buffer runs empty.
+    Feed overrides from 50 to 120 % and at both ends of `verdict.override_percent` (none if the override is locked);
+    each mode, and all modes at once, shifted up and down by the uncertainty with the lowest damping; all modes shifted
+    at both ends of the override range; look-ahead left on (for a controller that has it); and a buffer underrun. The
+    last two are left out for a control whose planner cannot be switched off: it plans in every condition, and stops in
+    time if its buffer runs empty.
     """
     band, kind = machine.verdict, machine.controller.kind
     low, high = band.override_percent
@@ -508,7 +514,7 @@ class CaseSimulation:
         return self.model.simulate_planned(self.blocks, self.path, offset=self.offset, tracker=self.tracker)
 
     def _beside(self, case: Case) -> bool:
-        """True if the contour of a case is computed with the nominal case."""
+        """True if the simulation of the nominal case also computes the contour error of this case."""
         return case.override != 1.0 and case.mode is None and self.model.bounds_deviations
 
     def _whole(self, case: Case) -> bool:
@@ -519,7 +525,7 @@ class CaseSimulation:
         return case.needs_contour(self.target) and not spared and not self._beside(case)
 
     def groups(self) -> list[list[Case]]:
-        """Groups of overrides and shifted modes: one task for each full simulation, one for all short ones."""
+        """Cases of other overrides or modes, in groups: each full simulation alone, all short ones together."""
         others = [case for case in self.cases if case.override != 1.0 or case.mode is not None]
         whole = [[case] for case in others if self._whole(case)]
         return [*whole, [case for case in others if not self._whole(case)]]
@@ -593,7 +599,7 @@ def case_figures(run: _core.SimulationFigures, *, contour: bool = True, response
 
 
 def _starved(run: _core.SimulationFigures, waited_s: float) -> CaseFigures:
-    """Largest figures of the run without an underrun and of those with one, at each of its positions."""
+    """Largest figures of several runs: one without an underrun, and one for each position of the underrun."""
     runs: list[_core.SimulationFigures | _core.StarvedFigures] = [run, *run.starved]
     return CaseFigures(
         np.max([each.residual_mm for each in runs], axis=0),

@@ -63,7 +63,7 @@ class RegionFigures:
 
     @property
     def feed_excess(self) -> FeedExcess | None:
-        """Largest ratio of speed to programmed feed, with the worse rule; None: not shaped."""
+        """Largest ratio of speed to programmed feed, by the worse rule of block timing; None: cut not shaped."""
         if not self.is_shaped:
             return None
         worst = max((run.feed_excess for run in self.emitted), key=lambda each: each.ratio)
@@ -71,12 +71,12 @@ class RegionFigures:
 
     @property
     def emitted_s(self) -> float:
-        """Time until the set-points rest, with the slower rule."""
+        """Time until the set-points rest, with the slower rule of block timing."""
         return max(run.duration_s for run in self.emitted)
 
     @property
     def gain_um(self) -> float:
-        """Gain of shaping: the larger reduction of residual vibration and contour error, with the worse rule."""
+        """Gain with the worse rule of block timing: reduction of residual vibration or contour error, the larger."""
         after = np.max([_figures_um(run) for run in self.emitted], axis=0)
         return max(0.0, float(np.max(np.asarray(_figures_um(self.original)) - after)))
 
@@ -121,7 +121,7 @@ class Judge:
         pool: Executor,
         on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
-        """Simulate every emitted region, and add the figures of its original: `begin` and `figures`."""
+        """Simulate every emitted region, and add the figures of its original; calls `begin`, then `figures`."""
         trackers = [_core.ContourTracker(place.region.path) for place in placed]
         return self.figures(self.begin(emitted, placed, trackers, pool), originals, on_step)
 
@@ -174,9 +174,9 @@ class Judge:
         return results
 
     def contour_um(self, figures: RegionFigures, *, turned: bool = True) -> float:
-        """Largest deviation of the target, µm, in cases that count and a lower feed improves.
+        """Largest deviation of the target, µm, in conditions that count; not with look-ahead left on or an underrun.
 
-        Without *turned* only those at 100 % feed override.
+        A lower feed does not improve those two. Without *turned* only conditions at 100 % feed override are used.
         """
         deviations = [
             simulated.command if self.target == "command" else simulated.response
@@ -254,7 +254,7 @@ class Judge:
         return None if worst is None else worst.lines
 
     def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
-        """Limits of a region, the same in every case; that of the residual: a ratio of the original's, or the floor."""
+        """Limits of a region, equal in all cases; for the residual: a ratio of the original's, at least the floor."""
         tolerance, floor_um = self._machine.tolerance, residual_floor_um(place.region, self._machine)
         limit_um = np.maximum(tolerance.residual_ratio * (figures.original.residual_mm * 1e3), floor_um)
         return RegionLimits(limit_um, tolerance.contour_um, self.target)
@@ -354,8 +354,9 @@ def _largest(deviations: Iterable[Deviation | None]) -> Deviation | None:
 def _haste(figures: RegionFigures, place: Placed, block_period_s: float) -> list[str]:
     """The missed limit of a region that is faster than programmed.
 
-    At feeds so slow that an increment takes several blocks, F words cannot represent whole periods. A rapid
-    may take longer than its replacement, and an original longer than its feeds require: neither means too fast.
+    At feeds so slow that an increment takes several blocks, F words cannot represent whole periods. A time
+    below that of the original alone is not too fast: a rapid may take longer than its replacement, and an original
+    longer than its feeds require.
     """
     was_s, now_s = figures.original.duration_s, figures.emitted_s
     if now_s >= _HASTE * was_s or now_s >= _HASTE * place.region.path.programmed_time_s:
@@ -401,11 +402,11 @@ def judge_program(
 def simulate_unchanged(
     judge: Judge, model: MachineModel, mine: _core.Region, region: _core.Region, original: _core.SimulationFigures
 ) -> RegionFigures:
-    """Simulate a cut left unchanged in every operating condition that counts for it.
+    """Simulate an unchanged cut in every operating condition that counts for it.
 
-    Block timing, buffer underrun and look-ahead left on affect shaped blocks only: there the nominal result is
-    used. Other feed overrides and uncertain modes are simulated where they count. The path is that of the emitted
-    program, which may have chords instead of an arc.
+    Three conditions affect shaped blocks only, and get the nominal result: the other block timing, a buffer underrun,
+    and look-ahead left on. Other feed overrides and uncertain modes are simulated where they count. The path is
+    that of the emitted program, which may have chords instead of an arc.
     """
     path, offset = mine.path, model.offset(region)
     same = path.moves_as(region.path)
@@ -451,7 +452,7 @@ def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:
 
 
 def _rapids_before_cuts(program: Program) -> Iterator[tuple[_core.Region, FloatArray, FloatArray]]:
-    """Every rapid with only functions and dwells between it and the next cut: this cut, start and end."""
+    """Yield each cut that follows a rapid with only functions and dwells between, with start and end of the rapid."""
     moves = program.core.other_moves
     last: _core.Segment | None = None
     regions = program.regions

@@ -192,7 +192,7 @@ class _Reader:
         return ""
 
     def _feed_mm_per_s(self, travel_mm: FloatArray, units: int) -> float:
-        """Largest feed along a travel, whole number in F: each axis within its limit, the path within their largest."""
+        """Largest feed along a travel, whole number in F: each axis keeps its limit, the path the largest of these."""
         share = np.abs(travel_mm) / np.linalg.norm(travel_mm)
         moved = share > 0.0
         along = float((self._largest_mm_per_s[moved] / share[moved]).min())
@@ -297,7 +297,7 @@ class OpenGap:
                 kept[reason] += 1
 
     def drop_useless(self, kept: Counter[str]) -> None:
-        """Leave every rapid unchanged whose replacement does not start the next cut sooner; tried in program order."""
+        """Leave each rapid unchanged, in program order, if its replacement does not let the next cut start sooner."""
         # Start with all replaced: of two rapids with equal settling times, replacing one alone gains nothing.
         flags = [bool(choice.text) for choice in self.choices]
         ready_s = self._ready_s(flags)
@@ -321,7 +321,7 @@ _LAG_MEMORY = 20.0  # time constants of the servo loop after which earlier motio
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """Times of one step between two cuts."""
+    """Times of a rapid, or of another step, between two cuts."""
 
     motion_s: float  # until the set-points rest, s
     arrival_s: float  # wait for in-position after them, s
@@ -375,7 +375,7 @@ class RapidPlant:
         self._known: dict[tuple[float, ...], Timing] = {}
 
     def rapid(self, rapid: Rapid) -> Timing:
-        """Simulate a rapid as G00; without a region, whose work offset is not known, with the nominal modes."""
+        """Simulate a rapid as G00; if it has no region, its work offset is unknown, and the nominal modes are used."""
         travel = rapid.travel_mm
         key = tuple(np.round(travel, 9))
         if not self._moving and key in self._known:
@@ -390,7 +390,7 @@ class RapidPlant:
         return self._machine_model.simulate_rapid(rapid.start_mm, rapid.end_mm, self._options(rapid.region))
 
     def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:
-        """Times of a replacement, with the rule of block timing that settles later. `stops_s`: dwells before it."""
+        """Times of a replacement after dwells of `stops_s`, with the rule of block timing by which it settles later."""
         period = self.model.period_s
         offset = self._machine_model.offset(region)
         runs = []

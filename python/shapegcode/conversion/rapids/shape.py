@@ -1,4 +1,4 @@
-"""Shaped rapids: G00 moves written as shaped G01 blocks where the table then settles sooner for the next cut.
+"""Shaped rapids: G00 moves written as shaped G01 blocks, if the table then settles sooner before the next cut.
 
 The time until the table has settled is compared: after a G00 the control waits for in-position only.
 """

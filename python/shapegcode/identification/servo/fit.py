@@ -146,7 +146,7 @@ def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) 
 def lag_estimates(
     fit: LoopFit, halves: Sequence[LoopFit], trace: ServoTrace, use: Masks, period_s: float
 ) -> tuple[ServoEstimate, ...]:
-    """Servo lag with dead time; 95 % intervals at least as wide as the halves of the record differ."""
+    """Parameters of servo lag with dead time; 95 % intervals, no narrower than the halves of the record differ."""
 
     def model(values: FloatArray) -> FloatArray:
         late = values[0] / period_s
@@ -217,7 +217,7 @@ _STARTS = ((150.0, 0.02), (40.0, 0.005))  # bandwidth, integral time
 
 
 def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, tell: Callable[[], None]) -> DriveFit:
-    """Fit the drive, started at the fitted servo lag with dead time."""
+    """Fit the drive model; *start*: fit of the model "servo lag with dead time", whose parameters it starts from."""
     top_speed = max(float(np.abs(np.diff(motion)).max()) for motion in trace.command) / period_s
     acceleration = max(float(np.quantile(np.abs(np.diff(motion, 2)), 0.99)) for motion in trace.command) / period_s**2
 
@@ -277,7 +277,7 @@ def _drive_motions(trace: ServoTrace, values: FloatArray, period_s: float, top_s
 
 
 def range_of_three(name: str, values: Sequence[float], unit: str) -> ServoEstimate:
-    """A parameter of the fits to all samples and to the halves: unknown if one exceeds another by half."""
+    """Estimate of a parameter from fits to all samples and to each half; unknown if one is over 1.5 times another."""
     low, high = min(values), max(values)
     if high > 1.5 * low:
         return ServoEstimate(name, None, low, high, unit, "the halves disagree")
@@ -296,7 +296,7 @@ def torque_friction(
     columns = [np.column_stack([np.tanh(v / sign), np.gradient(v, period_s), v, np.ones_like(v)]) for v in late]
 
     def fit(use: Masks) -> tuple[float, float]:
-        """T_c/J, and the fraction that T_c explains of the torque power left by the other terms."""
+        """T_c/J, and the fraction by which T_c reduces the residual power of a torque fit without it."""
         basis, values = counted(columns, use), counted(torque, use)
         scale = np.linalg.norm(basis, axis=0)
         scale[scale == 0.0] = 1.0
@@ -346,7 +346,7 @@ def fit_servo(
         machine: machine that gets gain and feed-forward of X, Y and Z; None: none.
         axes: axes of the log that are X, Y, Z of the machine, such as "X=1,Y=6,Z=2"; None: by their names.
         units: of time and length in a CSV, for example "ms,um"; None: from its header.
-        drive: fit the drive too (about ten seconds for each axis and half).
+        drive: fit the drive too (takes about ten seconds for each axis and each half of the log).
         on_progress: called with the completed fraction, 0 to 1.
 
     Returns:

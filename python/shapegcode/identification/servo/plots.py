@@ -18,7 +18,7 @@ def plots_of(found: ServoFit) -> dict[str, Plot]:
 
 
 def plot_servo(found: ServoFit, ax: Axes | None = None) -> Axes:
-    """One panel per axis: the control's contour deviation, and the best model's residual when fitted to the other half.
+    """One panel per axis: the control's contour deviation; the best model's residual in samples not used for its fit.
 
     Args:
         found: fit of the log.

@@ -142,7 +142,7 @@ class ServoFit(Result):
 
     @property
     def answer(self) -> str:
-        """Following error of each axis with a model, and the residual of its best model."""
+        """For each axis with a fitted model: its following error, and the residual of its best model."""
         fitted = [axis for axis in self.axes if axis.models]
         if not fitted:
             return f"{self.source}: no model can be fitted to any axis, for the reasons in the last table"

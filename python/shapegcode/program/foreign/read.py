@@ -96,7 +96,7 @@ def shown_name(file: str) -> str:
 
 @contextmanager
 def located_errors(file: str) -> Iterator[None]:
-    """Add file, line and column to errors of a reader in the core; the program's own file has its original name."""
+    """Add file, line and column to errors of a reader in the core; the program is named *file*, unescaped."""
     try:
         yield
     except ProgramError as error:
@@ -189,9 +189,10 @@ class Recognition:
 
 
 def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]:
-    """The first sign of every control for which a program may be written.
+    """For each control for which the program may have been written: its first sign in the program.
 
-    Words of FANUC are sought only with `of_fanuc`, or if there are signs of another control; a Haas knows them too.
+    Words of FANUC are sought only with `of_fanuc`, or if there are signs of another control. If that is a Haas, they
+    are ignored, as a Haas knows them too.
     The first 64 KiB are searched, without comments, up to the second line `%`.
     """
     code = re.sub(rb";[^\n]*", b"", COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
@@ -239,10 +240,10 @@ def doubtful_word(text: bytes) -> tuple[int, str] | None:
 
 
 def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | None) -> ForeignProgram | None:
-    """Translate a program for another control into one for FANUC; None: it is one already.
+    """Translate a program for another control into one for FANUC; None: the program is for FANUC already.
 
-    The dialect is that of `controller.dialect`; "auto": it is recognized by words that only one control knows; without
-    such words it is LinuxCNC's if `controller.kind` is "linuxcnc".
+    `controller.dialect` states the dialect. If it is "auto", words that only one control knows decide; a program
+    without such words is taken as LinuxCNC's if `controller.kind` is "linuxcnc".
     """
     dialect, reason = input_dialect(data, machine, source)
     if dialect == "fanuc":

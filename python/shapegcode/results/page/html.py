@@ -1,7 +1,7 @@
 """A page as one HTML file, readable offline; its parts are readable without scripts. Every text is escaped here.
 
-Its Content-Security-Policy forbids every connection and allows only scripts with the listed hashes; with "beside" also
-scripts in files.
+Its Content-Security-Policy forbids every connection and allows only scripts with the listed hashes; if `script` is
+"beside", also scripts in files.
 """
 
 import base64
@@ -119,7 +119,7 @@ def _plotly_source() -> str:
 
 @cache
 def _plotly() -> tuple[str, str]:
-    """Hash of the script, and the script compressed in base64: a third of its size, unpacked only for curves."""
+    """Hash of the script, and the script compressed in base64: a third of its size; pages unpack it to draw curves."""
     source = _plotly_source()
     return _hash(source), base64.b64encode(gzip.compress(source.encode(), 9, mtime=0)).decode()
 

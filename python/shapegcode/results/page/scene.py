@@ -1,7 +1,7 @@
 """Motion of a page: programs over time, decimated for display (Douglas and Peucker 1973), packed.
 
-Maxima of the curves are kept; `Scene.thinned` states how far they may be off. Figures are never computed from these
-data.
+Each curve keeps its maximum; `Scene.thinned` states how accurate the rest is. Figures are never computed from these
+decimated data.
 """
 
 import base64
@@ -253,7 +253,7 @@ class Thinner:
 
 
 def _path_factor(factor: float) -> float:
-    """By how much to loosen the path's tolerance if that of the curves is loosened by a factor."""
+    """Factor on the path's tolerance if the tolerance of the curves is multiplied by *factor*."""
     return max(factor / _PATH_LAST, min(factor, _STEP))
 
 

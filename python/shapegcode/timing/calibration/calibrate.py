@@ -152,7 +152,7 @@ def _observed(file: RunsFile, machine: Machine) -> list[logs.ObservedRun]:
 
 
 def _folds(runs: Sequence[logs.ObservedRun]) -> list[list[logs.ObservedRun]]:
-    """Cross-validation groups: the runs of a program; with a single program (weaker) every other run.
+    """Cross-validation groups: all runs of one or more programs; with a single program (weaker) two groups of its runs.
 
     Empty if there is only one group.
     """
@@ -387,7 +387,7 @@ _KNOWN = 4.0  # ratio to the value: an interval that reaches it on either side d
 
 
 def _feed_override(run: logs.ObservedRun) -> float:
-    """Feed override of most of a run's cutting."""
+    """Feed override at which a run cut most of its lines."""
     return logs.longest((each.feed_override, each.lines[1] - each.lines[0]) for each in run.cut_sections)[0]
 
 

@@ -1,4 +1,4 @@
-"""Fits the times of cuts and rapids (kinds of look-ahead, misfit, search, intervals), and the times between cuts."""
+"""Fits, for each kind of look-ahead, the times of cuts and rapids with intervals; then the times between cuts."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class LookAhead:
-    """A rule for corners with its limits."""
+    """A kind of look-ahead: its rule for corners, and the limits to be fitted."""
 
     name: str  # displayed name
     meaning: str
@@ -347,8 +347,9 @@ def parameter_covariance(
 ) -> tuple[FloatArray, FloatArray]:
     """Covariance (n, n) of the logarithms of a fit's parameters, and variances (n,) by the runs alone.
 
-    From derivatives of the durations of windows of some seconds; the scatter is that of the sections, each of which
-    counts as one (cluster sandwich estimator). In the covariance undetermined parameters keep their prior spread.
+    Computed from derivatives of the durations of windows of some seconds. For the scatter each section counts as one
+    observation (cluster sandwich estimator). In the covariance, parameters that the runs do not determine keep their
+    prior spread.
     """
     from scipy.stats import t as student
 
@@ -397,12 +398,12 @@ def _seen(runs: Sequence[ObservedRun]) -> dict[str, float]:
 
 
 def _typical_spread(parameters: Sequence[Parameter], seen: Container[str]) -> FloatArray:
-    """Standard deviation (n,) of each parameter's logarithm: of usual machines, or of values shown in logs."""
+    """Standard deviation (n,) of each parameter's logarithm over machines; smaller for parameters that logs show."""
     return np.array([_SEEN_SPREAD if parameter.name in seen else _TYPICAL_SPREAD for parameter in parameters])
 
 
 def _windows(section: SeenSection) -> IntArray:
-    """Readings some seconds apart."""
+    """Indices of readings some seconds apart."""
     points = [0]
     for index, time_s in enumerate(section.time_s):
         if time_s - section.time_s[points[-1]] >= _WINDOW_S:
@@ -428,7 +429,7 @@ _TABLE_KRPM = 30.0  # range of a spindle's table above its first speed
 
 @dataclass(frozen=True)
 class FunctionFit:
-    """Times in addition to the motion."""
+    """Fitted times of M codes, tool changes, spindle starts, program start and moves of unknown length."""
 
     # by name: "start", "tool change", "M8", "move xy", "move z" in s; "spindle start from" and "spindle stop from" in
     # 1000/min, "spindle start" and "spindle stop" in s per 1000/min above
@@ -442,7 +443,7 @@ class FunctionFit:
 
 @dataclass(frozen=True, eq=False)
 class _Span:
-    """A part of a run from one reading to another, with functions between."""
+    """The time between two logged lines of a run, with M, S or T functions between them."""
 
     run: ObservedRun
     begin: int  # line; 0: cycle start
@@ -453,7 +454,7 @@ class _Span:
 def whole_model(
     machine: Machine, motion: MotionFit, values: dict[str, float], last_tool_in_spindle: bool
 ) -> _core.FanucModel:
-    """Controller model with motion and functions."""
+    """Controller model with fitted motion, and *values*: times of tool changes, M codes, spindle and unknown moves."""
     model = motion.model(machine)
     model.program_start_s = values.get("start", 0.0)
     model.tool_change_s = values.get("tool change", 0.0)

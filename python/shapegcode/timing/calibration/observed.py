@@ -47,7 +47,7 @@ class TimedProgram:
     sections: tuple[tuple[int, int], ...]  # (first line, last line) of the parts without functions
 
     def starts(self, model: _core.FanucModel) -> FloatArray:
-        """Start times of the lines in a model, s, (line_count + 2,): NaN without a move; the last one is the end."""
+        """Start time of each line in a model, s, (line_count + 2,); NaN: no move; last item: end of the program."""
         timed = _core.time_program(self.program.core, model, True)
         found = np.full(self.line_count + 2, np.nan)
         # A line may have several moves: the first one counts.
@@ -157,7 +157,7 @@ def lines_at(signal: Signal, log: RunLog, timed: TimedProgram) -> IntArray:
 
 
 def longest(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
-    """Of pairs of value and duration: the value with the longest total time, and its ratio to the whole time."""
+    """From pairs of value and duration: the value with the longest total time, and its fraction of the whole time."""
     held: dict[float, float] = defaultdict(float)
     for value, duration in pairs:
         held[value] += duration
@@ -211,7 +211,7 @@ def steady_value(values: FloatArray) -> float | None:
 def cut_sections_of(
     entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float, notes: list[str]
 ) -> list[CutSection]:
-    """Feed override of each section: from steady cuts, else as stated, else that of the run, else 1."""
+    """Feed override of each section: by its steady feed, else as stated, else by the run's steady feed, else 1."""
     ratio, line = np.empty(0), np.empty(0, dtype=np.int64)
     if log.feed is not None and math.isfinite(unit):
         line = lines_at(log.feed, log, timed)
@@ -242,7 +242,7 @@ def cut_sections_of(
 
 
 def to_whole_percent(ratio: float) -> float:
-    """Round to whole percent, as on an override switch, if within the accuracy of a reading."""
+    """Round a ratio to whole percent, as on an override switch, if that is less than 0.2 % away; else to 0.01 %."""
     whole = round(ratio, 2)
     return whole if abs(ratio - whole) < 0.002 else round(ratio, 4)
 
@@ -271,7 +271,7 @@ class ObservedRun:
 
     @property
     def duration_s(self) -> float | None:
-        """From start to completion; None: not both are in the log."""
+        """From start to completion, s; None: the log lacks one of them, or both."""
         return self.log.duration_s if self.log.complete and self.whole else None
 
 
@@ -435,7 +435,7 @@ def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
 
 
 def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
-    """Rapid rate, mm/s (NaN: unknown), by the logged feeds of rapids, and the runs with their overrides."""
+    """Rapid rate, mm/s, from the logged feeds of rapids (NaN: unknown); and the runs, each with its rapid override."""
     shown = {id(run): _shown_rate(run) for run in runs}
     plateaus = [plateau for plateau, _ in shown.values() if math.isfinite(plateau)]
     if not plateaus:

@@ -1,6 +1,6 @@
 """Directions of a calibrated cycle-time model that run logs do not determine, as rows for the machine file.
 
-Each row is a step of one standard deviation, or of a part of it with more weight, independent of the others. The
+Each row is a step of one standard deviation, or of a fraction of it with a larger weight; rows are independent. The
 directions are those of the symmetric root of the covariance, each nearest to one parameter (Zuber and Strimmer, 2011,
 "CAR scores"): so the squared changes of a time are the contributions of the parameters to its variance.
 """
@@ -43,7 +43,7 @@ def kind_weights(scores: Sequence[float], best: int) -> list[float]:
 
 
 def motion_rows(fit: MotionFit, covariance: FloatArray, runs: Sequence[ObservedRun], machine: Machine) -> list[_Row]:
-    """A row for each parameter of the motion, and for look-ahead without a block time one for that."""
+    """A row for each parameter of the motion; for look-ahead without a block time, also a row for the block time."""
     base, parameters = fit.file_values(), fit.family.parameters
     rows = []
     for index, step in enumerate(_symmetric_root(covariance).T):
@@ -65,7 +65,7 @@ def motion_rows(fit: MotionFit, covariance: FloatArray, runs: Sequence[ObservedR
 
 
 def _unnoticed_block_time(fit: MotionFit, runs: Sequence[ObservedRun], machine: Machine) -> float:
-    """Largest block time of a usual machine that the logs do not contradict, s."""
+    """Largest block time that the logs do not contradict, s; at most that of common controls."""
     sections, model = sections_of(runs), fit.model(machine)
     before, block_time = misfit(sections, model), _USUAL_BLOCK_TIME_S
     while block_time > 1e-4:
@@ -120,7 +120,7 @@ def _symmetric_root(covariance: FloatArray) -> FloatArray:
 
 
 def cut_scatter(runs: Sequence[ObservedRun], fit: MotionFit, machine: Machine) -> float:
-    """Relative standard deviation of the cutting time of a tool, independent between tools."""
+    """Relative standard deviation of a tool's cutting time; deviations of different tools are independent."""
     from scipy.stats import t as student
 
     sums: dict[tuple[int, int], list[float]] = defaultdict(lambda: [0.0, 0.0])

@@ -130,7 +130,7 @@ class CalibrationRun(OldNames):
 
     @property
     def cross_validated_percent(self) -> float | None:
-        """Error of the model calibrated with the others, %."""
+        """Error, %, of the model calibrated only with the other programs (or runs)."""
         return _error(self.cross_validated_s, self.measured_s, self.held_s)
 
     @property

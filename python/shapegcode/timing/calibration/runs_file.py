@@ -191,7 +191,7 @@ class _Found:
         self._users: dict[Path, list[tuple[int, Path]]] = {}  # by log: number and program of its entries
 
     def entry(self, number: int, row: _RunsRow) -> RunEntry:
-        """Check an entry; adds its problems unless it is unused."""
+        """Check an entry; its missing or repeated files are added to the problems unless the entry is left out."""
         where = f"runs.{number}"
         program = self._folder / row.program
         if row.leave_out is None and not program.is_file():
