@@ -60,6 +60,10 @@ TEST_CASE("a segment behind a corner at which filters leave the tolerance is not
   for (const std::uint32_t seed : some_of({842U, 1619U})) keeps_its_limits(seed);
 }
 
+TEST_CASE("a motion that may not accelerate as planned accelerates less, instead of slowing down") {
+  keeps_its_limits(4469U);
+}
+
 TEST_CASE("a motion that begins in a rounding finds it as it was, though less is planned there") {
   for (const std::uint32_t seed : some_of({559U})) keeps_its_limits(seed);
 }

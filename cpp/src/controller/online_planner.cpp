@@ -35,19 +35,23 @@ constexpr double stations_for_new_if_tight = 64.0;
 constexpr std::size_t stations_of_period = 32;
 // A window is short if what a stop from the mean speed takes is a larger share of it.
 constexpr double short_share = 0.4;
-// What is tried while the motion is under way: a share of its speed, and of the limits for the stop behind the section,
-// which no plan has checked; and how often from rest, with less each time.
+// What is tried while the motion is under way: a share of its speed, of the limits for the section, and of those for
+// the stop behind it, which no plan has checked; and how often from rest, with less each time. Less acceleration is
+// tried before the motion slows down: it would crawl where it may go on, but may not accelerate as fast as it was
+// planned.
 struct Trial {
-  double speed, stop_share;
+  double speed, share, stop_share;
 };
-constexpr std::array<Trial, 8> trials{{{no_limit, 1.0},
-                                       {no_limit, 0.99},
-                                       {no_limit, 0.9},
-                                       {no_limit, 0.7},
-                                       {no_limit, 0.4},
-                                       {0.9, 1.0},
-                                       {0.6, 1.0},
-                                       {0.0, 1.0}}};
+constexpr std::array<Trial, 10> trials{{{no_limit, 1.0, 1.0},
+                                        {no_limit, 1.0, 0.99},
+                                        {no_limit, 1.0, 0.9},
+                                        {no_limit, 1.0, 0.7},
+                                        {no_limit, 1.0, 0.4},
+                                        {no_limit, 0.3, 0.3},
+                                        {no_limit, 0.1, 0.1},
+                                        {0.9, 1.0, 1.0},
+                                        {0.6, 1.0, 1.0},
+                                        {0.0, 1.0, 1.0}}};
 constexpr int attempts_at_rest = 12;
 // Plans that are made at once, with less each time where limits would be passed.
 constexpr int plans = 4;
@@ -333,6 +337,7 @@ bool OnlinePlanner::next_section(Section& section, std::uint64_t pushed, const F
     const Trial& trial = trials[rests ? 0 : static_cast<std::size_t>(n)];
     double max_speed = rests ? no_limit : trial.speed * from.state.speed;
     if (is_faster) max_speed = std::min(max_speed, below_feed * feed);
+    motion_.limit_to(trial.share);
     int settle = settle_;
     const bool is_whole = fill(section, max_speed, trial.stop_share, settle);
     if (is_whole && section.count == 0) return false;
