@@ -57,9 +57,9 @@ def _batch(args: argparse.Namespace) -> int:
 
 BATCH = Interface(
     "Runs a command over many programs and machines, each run in a separate process. Options of the command come "
-    "after --. Results, each complete or absent, go into the folder of -o, with batch.jsonl (finished runs) "
-    "and summary.csv (all rows). Exit code 0 if all are within tolerance, 1 if some are not, were refused or failed, 2 "
-    "if none could be started.",
+    "after --. Results, each complete or absent, go into the folder of -o, with batch.jsonl (finished runs) and "
+    "summary.csv (one row per run). Exit code 0: all within tolerance; 1: some are not, were refused or failed; 2: "
+    "none could be started.",
     (
         ("programs", "PROGRAMS", {"nargs": "+"},
          "files, folders (with subfolders), patterns in quotes ('parts/**/*.nc'), or @LIST: a file with one of "
@@ -73,7 +73,7 @@ BATCH = Interface(
         ("--jobs", "N", count, "parallel processes (default: one per processor)", 0),
         ("--time-limit", "TIME", seconds, "time limit of each run (default: 3600s)", 3600.0),
         ("--memory-limit", "SIZE", size,
-         "memory limit of each run, such as 2G, beyond what shapegcode itself needs (default: none; Linux only)", 0),
+         "memory limit of each run, such as 2G, on top of what shapegcode itself needs (default: none; Linux only)", 0),
         *cluster("run"),
         ("--json", "FILE", None, "write all rows as JSON; - for standard output"),
         ("--html", "DIR", None, "write a page for each run into this folder, with an index"),
@@ -121,7 +121,8 @@ def _study(args: argparse.Namespace) -> int:
 
 STUDY = Interface(
     "Converts a program and simulates it on sampled machines (Monte Carlo): probability of staying "
-    "within tolerance, quantiles, most influential value. Exit code 1 if the probability is below the file's at_least.",
+    "within tolerance, quantiles, most influential parameter. Exit code 0: the probability is at_least of the file or "
+    "more; 1: it is less; 2: bad input.",
     (
         *_study_options("program, machine, varied parameters", "number of samples"),
         ("--csv", "FILE", None, "write one line per sample; -: standard output"),
@@ -145,9 +146,9 @@ def _optimize(args: argparse.Namespace) -> int:
 
 
 OPTIMIZE = Interface(
-    "Chooses block period, shaper, planned tolerance and arc feed (or the keys under [choose]) for the shortest "
-    "cycle time that keeps the tolerance on enough sampled machines. Reads the same file as `shapegcode study`. "
-    "Exit code 1 if no combination reaches the probability.",
+    "Chooses block period, shaper, contour tolerance for shaping and arc feed (or the keys under [choose]) for the "
+    "shortest cycle time that keeps the machine's tolerance on enough sampled machines. Reads the same file as "
+    "`shapegcode study`. Exit code 0: found; 1: no combination reaches the probability; 2: bad input.",
     (
         *_study_options(
             "program, machine, varied parameters, settings to choose", "sampled machines per combination"

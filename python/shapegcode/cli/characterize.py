@@ -94,17 +94,18 @@ def _machine_file(args: argparse.Namespace, found: Any) -> tuple[str, bytes] | N
 
 CHARACTERIZE = Interface(
     "Writes short test programs (air moves inside a given box) with instructions, then fits the machine file to "
-    "their stopwatch times or servo logs: interpolation period, block time, time constants, in-position times. "
+    "their stopwatch times or servo logs: interpolation period, block time, time constants, in-position waits. "
     "--servo takes any log of commands and actual positions: dead time, position gain, feed-forward, friction. "
     "--runs calibrates the cycle-time model (look-ahead, tool changes, M codes, spindle) with programs and their "
-    "logs. Exit code 1: results contradict each other, no axis changes its speed, or a time is off by over 2 %.",
+    "logs. Exit code 0: done; 1: results contradict each other, no axis of the log gives a model, or a predicted "
+    "time is wrong by more than 2 %; 2: bad input.",
     (
         OneOf("what to do", (
             ("--write", "DIR", None, "write the test programs, RESULTS.toml to fill in, and README.txt"),
-            ("--fit", "RESULTS", None, "fit a filled-in RESULTS.toml, a folder with it and logs, or one log"),
+            ("--fit", "RESULTS", None, "fit to a filled-in RESULTS.toml, to a folder with it and logs, or to one log"),
             ("--servo", "LOG", None,
-             "fit the position loops to a log, and validate fits to each half with the other: a capture of a Sinumerik "
-             "control (JSON, gzip, zip), or a CSV with columns of commands and actual positions"),
+             "fit the position loops to a log, and test the fit to either half on the other; the log: a capture of a "
+             "Sinumerik control (JSON, gzip, zip), or a CSV with columns of commands and actual positions"),
             ("--runs", "RUNS.toml", None,
              "calibrate the cycle-time model from programs and the logs of their runs (SHDR text, MTConnect streams, "
              "Sinumerik Edge, CSV), listed in pairs in this file"),
@@ -120,7 +121,7 @@ CHARACTERIZE = Interface(
         ("--units", "TIME,LENGTH", None,
          "with --fit, --servo: units of CSV logs, for example ms,um (default: from their headers)"),
         ("--box", "X0:X1,Y0:Y1,Z0:Z1", None,
-         "range of the tests, in mm from their start point (default: %(default)s); write "
+         "range of the test moves, in mm from their start point (default: %(default)s); write "
          "--box=-50:0,... if it begins with a minus sign", "0:100,0:100,0:20"),
         *RESULT,
     ),
@@ -210,7 +211,7 @@ def _pair(text: str) -> tuple[float, float]:
 _CUT = (
     *MACHINE,
     ("--tool", "T.toml", None, "tool file", NEEDED),
-    ("-o --output", "OUT.NC", None, "program; the side file is OUT.json", NEEDED),
+    ("-o --output", "OUT.NC", None, "program to write; next to it OUT.json, which describes the cut", NEEDED),
     ("-S --spindle", "REV", positive, "rev/min (default: feed.spindle_rev_per_min of the tool file)"),
     ("-a --axial-depth", "MM", positive, "axial depth", NEEDED),
     ("--program", "O1234", program_number, "number of the program (default: O7101)", 7101),
@@ -234,51 +235,53 @@ _INTERVAL = (
 )
 _FIT = (
     ("files", "CSV", {"nargs": "+"},
-     "record of a pass: columns time_s, position_mm or radial_depth_mm, and fx_n, fy_n; 2=FILE sets the pass"),
-    ("--cut", "OUT.json", None, "side file of the test cut", NEEDED),
+     "record of a pass: columns time_s, position_mm or radial_depth_mm, and fx_n, fy_n; 2=FILE: that of pass 2"),
+    ("--cut", "OUT.json", None, "description of the test cut, written with its program", NEEDED),
     ("--forces-on", None, ("workpiece", "tool"),
-     "body on which the measured forces act; a dynamometer measures those on the workpiece (default: %(default)s)",
+     "body on which the measured forces act; under the workpiece a dynamometer measures those on it (default: "
+     "%(default)s)",
      "workpiece"),
     ("--chip-thickness", None, ("mean", "local"),
      "taper: chip thickness used in the power laws (default: %(default)s)", "mean"),
-    ("--edge-forces", None, bool, "taper: fit the forces of the edge, K_te and K_re, too"),
+    ("--edge-forces", None, bool, "taper: fit the edge force coefficients K_te and K_re too"),
     ("-o --output", "FILE", None, "taper: write the table [cutting] (TOML)"),
     plots("write pictures (PNG and SVG) of measured and expected forces into this folder"),
     *RESULT,
 )  # fmt: skip
 
 TESTCUT = Interface(
-    "Writes test cuts (paper 001) as programs with instructions as comments at the start, and a side file (JSON) "
-    "that describes the cut; `fit` reads it and the measured forces. Exit code 0; 1: the fit is poor or the result "
-    "not as expected; 2: bad input.",
+    "Writes test cuts (Kim and Ko 2001, paper 001) as programs with instructions in comments at the start, and next to "
+    "each a JSON file that describes the cut; `fit` reads that file and the measured forces. Exit code 0: done; 1: the "
+    "fit is poor, or the result not as expected; 2: bad input.",
     actions={
         "taper": (
             "increasing radial depth: for the coefficients of the cutting force (figure 4)",
             Interface(
-                "Mills a tapered edge, then makes passes along it, each at one feed: for k1, k2 of the cutting force.",
+                "Mills a tapered edge, then cuts along it in passes, each at one feed, to fit k1 and k2 of the force.",
                 (*_CUT, *_TAPER, *_END), _write_cut,
             ),
         ),
         "corner": (
-            "a corner mapped to a straight edge: constant feed, then modified (figure 7)",
+            "the radial depths of a corner along a straight edge: at constant, then at modified feed (figure 7)",
             Interface(
-                "Mills an edge on which a straight pass meets the radial depth of a corner, and cuts it with "
-                "constant feed, then with the feed of equation 7.", (*_CUT, *_SHAPE, *_CORNER, *_END), _write_cut,
+                "Mills an edge on which a straight pass has the radial depths of a corner, and cuts it at "
+                "constant feed, then at that of equation 7 (paper 001).", (*_CUT, *_SHAPE, *_CORNER, *_END), _write_cut,
             ),
         ),
         "interval": (
             "feeds that change every 0.2, 0.4 and 0.6 mm: shortest interval that the control follows (figure 8)",
             Interface(
-                "Makes passes of constant radial depth; the feed changes as in a corner, at another interval in each.",
+                "Cuts passes of constant radial depth; the feed changes as in a corner, each time at another interval.",
                 (*_CUT, *_SHAPE, *_INTERVAL, *_END), _write_cut,
             ),
         ),
         "fit": (
             "evaluate the measured forces of a test cut",
             Interface(
-                "Reads the side file of a test cut and the records of its passes, in their order: for a taper the "
-                "coefficients with 95 % intervals, for a corner measured and expected resultant, for an interval "
-                "test the shortest interval that the controller follows.", _FIT, _fit_cut,
+                "Reads the JSON file of a test cut and the records of its passes, in their order. Gives, for a taper, "
+                "the coefficients with 95 % intervals; for a corner, measured and expected resultant; for an interval "
+                "test, the shortest interval that the control follows. Exit code 0: done; 1: the fit is poor, or the "
+                "result not as expected; 2: bad input.", _FIT, _fit_cut,
             ),
         ),
     },

@@ -131,7 +131,7 @@ def _scheduled(args: argparse.Namespace, program: Program, machine: Machine, bar
 CONVERT = Interface(
     "Rewrites the cutting moves of a program so that they no longer excite the machine's vibration modes, and "
     "simulates the emitted program for its verdict: vibration, contour error, time. The input is never "
-    "overwritten; a program that must not be run is written next to OUT with another suffix (exit code 1).",
+    "overwritten; a program that must not be run is written as OUT.out-of-tolerance instead (exit code 1).",
     (
         ("input", "IN", None, "CNC program"),
         *options.MACHINE,
@@ -144,7 +144,7 @@ CONVERT = Interface(
          "unchanged"),
         ("--only", "A-B,...", line_ranges,
          "shape nothing but the cuts in these lines, numbered as by `shapegcode expand`, for example 12-80,95-240"),
-        ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines unchanged, numbered likewise", ()),
+        ("--leave", "A-B,...", line_ranges, "leave the cuts in these lines unchanged; numbered as for --only", ()),
         ("--tolerance-curve", None, {"action": argparse.BooleanOptionalAction},
          "compute the cycle time at other contour tolerances (default: %(default)s)", True),
         ("--block-period", "TIME", seconds,
@@ -156,9 +156,9 @@ CONVERT = Interface(
         ("--baud", "N", positive,
          "speed of the serial line; if it is too low, longer block periods are used; if they are not enough, cuts are "
          "left unchanged"),
-        ("--max-blocks-per-second", "N", positive, "blocks per second that the control can read; effect as --baud"),
+        ("--max-blocks-per-second", "N", positive, "blocks per second that the control can read; effect of --baud"),
         ("--feed-schedule", None, bool,
-         "first set the feeds so that the shaped program keeps the tool's limits, as `shapegcode feed`; "
+         "first set the feeds as `shapegcode feed` does, so that the shaped program keeps the tool's limits; "
          "needs --tool and --stock"),
         *options.cutting(required=False),
         options.PROGRAM,

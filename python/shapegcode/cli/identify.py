@@ -123,25 +123,25 @@ IDENTIFY = arguments.Interface(
         ("files", "FILE", {"nargs": "*"},
          "CSV, UFF (dataset 58), WAV, .frf, .mat, SINUMERIK tuning (XML), capture of command and encoder; several "
           "files of the same point are fitted together"),
-        ("--sweep", "PROGRAM", None, "program that ran during the record (shapegcode sweep), on the control of -m"),
+        ("--sweep", "PROGRAM", None, "program (of shapegcode sweep) that the control of -m ran during the record"),
         ("--axis", None, ("x", "y", "z"),
          "use the response along this axis; if the file names no axis, its response is assumed to be along this one"),
         ("--across", "FILE", {"nargs": "*"},
-         "also find the mode shape along the other axes (for a rocking tool), from a triaxial sensor or from these "
-          "files: impacts at the same point, sensor turned"),
+         "also find the mode shape along the other axes, for a tool that rocks: from a triaxial sensor, or from these "
+          "files of impacts at the same point with the sensor turned"),
         ("--update", "MACHINE.toml", None, "write the supported modes to this machine file"),
         *options.MODES,
         ("--tap-plan", None, bool, "print instructions for the test (for the modes of -m MACHINE), and exit"),
         *options.MACHINE_OR_NONE,
         ("--modes", "N", arguments.count, "number of modes (default: by information criterion)"),
         ("--max-modes --most-modes", "N", {"dest": "max_modes", "type": arguments.count},
-         "largest number (default: frequency fit 40, time fit 8, sweep without force 4)"),
+         "largest number of modes (default: frequency fit 40, time fit 8, sweep without force 4)"),
         ("--force", None, bool, "write modes with --update even if the verdict is 'do not use'"),
-        ("--frequencies", "LOW:HIGH", arguments.frequency_band, "find modes between these frequencies, Hz"),
+        ("--frequencies", "LOW:HIGH", arguments.frequency_band, "find modes only between these frequencies, Hz"),
         ("--decay --ignore-force", None, {"dest": "ignore_force", "action": "store_true"},
          "treat the record as a free decay: ignore a force channel"),
         ("--stops", None, bool,
-         "record of an ordinary run: use its 20 strongest stops after which the machine rests"),
+         "record of an ordinary program: use the 20 strongest of its stops that are followed by rest"),
         ("--start", "TIME", arguments.start_time,
          "start of the decay in the file, for example 250ms (default: found automatically)"),
         *_OF_FILES,
@@ -167,8 +167,8 @@ def _sweep(args: argparse.Namespace) -> int:
 
 SWEEP = arguments.Interface(
     "Writes a program that shakes one axis: moves back and forth whose frequency rises and falls, band by band, "
-    "with pauses. Reports the band that the control can reach and the acceleration of each part, simulated from "
-    "the emitted program. Record the acceleration with any logger while it runs; `identify --sweep` finds the "
+    "with pauses. Reports the band that the control can reach and, by simulation of the written program, the "
+    "acceleration in each part. Record the acceleration with any logger while it runs; `identify --sweep` finds the "
     "modes. Exit code 0; 2: bad input, or a band that the control does not reach.",
     (
         *options.MACHINE,

@@ -187,10 +187,10 @@ _INIT_ACTION = Interface(
 )
 _IMPORT_ACTION = Interface(
     "Make a machine file from a FANUC parameter dump, and list what was read, assumed and missing. "
-    "Exit code 1 if nothing was read.",
+    "Exit code 0: done; 1: nothing was read, no file is written; 2: bad input.",
     (
         ("dump", "DUMP", {"nargs": "+"},
-         "parameter dump as punched by the controller; optionally with its tables of tool offsets, work offsets "
+         "parameter dump as punched by the control; optionally also its tables of tool offsets, work offsets "
          "and variables (TOOLOFST.TXT, EXT_WKZ.TXT, MACRO.TXT)"),
         ("-o --output", "FILE", None, "file to write (default: %(default)s)", _DEFAULT_FILE),
         ("--from", "MACHINE", {"dest": "base"}, "machine for values that are not in the dump, such as the modes"),
@@ -202,22 +202,22 @@ _IMPORT_ACTION = Interface(
     _import,
 )  # fmt: skip
 _SHOW_ACTION = Interface(
-    "Print every value with its unit, meaning and origin: measured, from the control's dump, inherited "
+    "Print every value with its unit, meaning and origin: measured, from the parameter dump, inherited "
     "from another machine, assumed, a choice, set in the file, or a default.",
     (
         ("machine", "FILE_OR_NAME", None, "machine file, or name of a built-in machine"),
         ("--for", "PROGRAM", {"dest": "input"},
          "convert this program, and rank the unverified parameters by their effect on its verdict"),
         ("--write-origins", None, bool,
-         "write the origins of the values into the file as a table [origin]: for a file with origins in comments, "
-         "or for values with an origin next to them"),
+         "write the origins that the file gives in comments or next to its values into a table [origin] of the "
+         "file"),
         *RESULT,
     ),
     _show,
 )  # fmt: skip
 _DIFF_ACTION = Interface(
-    "List the values in which two machines differ, defaults included. Exit code 0 if they have the "
-    "same values, 1 if not; origins are not compared.",
+    "List the values in which two machines differ, defaults included; origins are not compared. "
+    "Exit code 0: no difference; 1: some; 2: bad input.",
     (("files", "MACHINE", {"nargs": 2}, "machine file, or name of a built-in machine"), *RESULT),
     _diff,
 )
@@ -236,7 +236,7 @@ MACHINE = Interface(
     "",
     actions={
         "init": ("write a commented machine file as a start", _INIT_ACTION),
-        "import": ("make a machine file from a controller's parameter dump (CNC-PARA.TXT)", _IMPORT_ACTION),
+        "import": ("make a machine file from a control's parameter dump (CNC-PARA.TXT)", _IMPORT_ACTION),
         "show": ("print every value with its unit, origin and meaning", _SHOW_ACTION),
         "diff": ("list the values in which two machines differ", _DIFF_ACTION),
         "schema": ("print the JSON Schema of machine, tool, stock or study files, for editors", _SCHEMA_ACTION),
@@ -265,10 +265,10 @@ def _set_up(args: argparse.Namespace) -> int:
 
 
 SETUP = Interface(
-    "Asks for the machine data of a shop, explains what each answer changes, reads the control's parameter "
+    "Asks for the data of your machine, explains what each answer changes, reads the control's parameter "
     "file and tap tests if there are any, and writes a short machine file with the answers and their provenance; "
-    "everything else is a default. Enter means `not known yet` at every question, and < goes back to the one "
-    "before. Another machine's modes are never used.",
+    "everything else is a default. At every question Enter means `not known yet`, and < goes back to the previous "
+    "question. Another machine's modes are never used.",
     (
         ("-o --output", "FILE", None, "machine file to write (default: %(default)s)", _DEFAULT_FILE),
         ("--answers", "FILE", None,

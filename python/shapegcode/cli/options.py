@@ -37,7 +37,7 @@ PROGRAM = (
 JSON = ("--json", "FILE", None, "write the result as JSON to FILE; -: to standard output, without other output")
 SCRIPT = (
     "--html-script", None, ("inline", "beside"),
-    "script inside the page (default), or in a separate file, shared by the pages of the folder", "inline",
+    "script of the page: inside it (default), or in a file that the pages of the folder share", "inline",
 )  # fmt: skip
 QUIET = ("-q --quiet", None, bool, "only the answer, warnings and errors")
 AMOUNT = OneOf("verbosity", (
@@ -92,7 +92,7 @@ def cutting(*, required: bool) -> tuple[Row, ...]:
          "has a T number"),
         ("--stock", "S.toml", {"required": required},
          "stock file: shape of the workpiece before the first block (docs/reference/tool_files.md)"),
-        ("--margin", "RATIO", share, "safety margin kept to each limit of the tool, for example 3%% (default: 1.5%%)"),
+        ("--margin", "RATIO", share, "margin of the new feeds to each limit of the tool, such as 3%% (default: 1.5%%)"),
         ("--resolution", "LENGTH", micrometres,
          "grid spacing of the simulated material, for example 50um (default: 1 %% of the smallest tool's diameter)"),
     )  # fmt: skip

@@ -53,7 +53,7 @@ def _shaper(args: argparse.Namespace) -> int:
 SHAPER = Interface(
     "Designs every family of input shapers for some vibration modes and compares them: duration, residual "
     "vibration at other frequencies, contour cost (error on arcs), negative impulses; and recommends one. "
-    "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input.",
+    "Exit code 0: the recommended one is within the vibration limit; 1: it is not; 2: bad input.",
     (
         ("--mode", "HZ[:DAMPING][±BAND]", [None],
          "a mode to cancel, such as 46:0.02±5%%, 46:0.02+-2Hz or 46:0.02-5%%+8%%, from 0.1 to 10000 Hz; once for each "
@@ -62,17 +62,17 @@ SHAPER = Interface(
         ("--uncertainty", "RATIO", share,
          "uncertainty of the frequency of modes given without a band, for example 5%% (default: 0)", 0.0),
         ("--block-period", "TIME", [seconds],
-         "block period: the times of the impulses are multiples of it, such as 5ms; may be repeated (default: the "
-         "machine's, or the best few)", []),
+         "block period: the times of the impulses are multiples of it, such as 5ms; may be repeated (default: that of "
+         "the machine file, else the best few)", []),
         ("--continuous", None, bool,
-         "also design shapers whose impulses may lie at any time (continuous time); without --block-period only "
-         "these are designed. Default without -m and --block-period: continuous time and the best few periods"),
+         "also design shapers whose impulses may lie at any time (continuous time); without --block-period design no "
+         "others. Default without -m and --block-period: continuous time and the best few periods"),
         ("--family", "NAME", {"action": "extend", "nargs": "+"},
          f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"),
         ("--list-families", None, bool, "list the families with meaning and source, and exit"),
         ("--max-duration", "TIME", seconds,
          "longest shaper, for example 50ms (default: three periods of the slowest mode; with -m at most "
-         "shaping.max_duration_s, which applies also if no shorter shaper is good enough)"),
+         "shaping.max_duration_s, and just that if no shaper of three periods is good enough)"),
         ("--max-abs-sum", "N", positive, "largest sum of the impulses' magnitudes (default: %(default)g)", 10.0),
         ("--vibration-limit", "RATIO", ratio,
          "maximum residual ratio within the bands (default: the machine's "
@@ -150,9 +150,9 @@ def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[flo
 
 
 REPORT = Interface(
-    "Makes the page of --html later: figures from the JSON, and, if the programs and the "
-    "machine file are unchanged, also their motion. Changed files are reported on the page and here (exit "
-    "code 1). Files are searched at their original paths, and in the folder of the JSON.",
+    "Makes the page of --html later: figures from the JSON and, if the programs and the machine file are "
+    "unchanged, the motion too. They are looked for at their original paths and in the folder of the JSON. Exit "
+    "code 0: done; 1: done, with a problem, such as a changed file, that the page names; 2: bad input.",
     (
         ("inputs", "RESULT.json", {"nargs": "+"}, "file written by --json"),
         ("-o --output", "PAGE.html", None, "page to write (default: RESULT.html in the same folder)"),
@@ -190,9 +190,9 @@ def _demo(args: argparse.Namespace) -> int:
 
 
 DEMO = Interface(
-    "Reproduces the figures of a paper with this program's models, and shows both. Other papers are pages of the "
-    "documentation: docs/evidence/figures.md. Exit code 1 if a statement of the paper differs for an unknown reason, "
-    "or an emitted program is out of tolerance.",
+    "Repeats the figures of a paper with the models of shapegcode, and compares them with the published ones. Other "
+    "papers: docs/evidence/figures.md. Exit code 0: they agree, or why not is known; 1: one differs for an unknown "
+    "reason, or an emitted program is out of tolerance; 2: bad input.",
     (
         ("name", "NAME", {"type": _name, "choices": ("path",)},
          "path: line, arc, line, at two feeds and two feed reductions: Ko, Lim and Hong, 2023 (paper 000)"),

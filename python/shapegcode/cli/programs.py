@@ -41,8 +41,8 @@ def _simulate(args: argparse.Namespace) -> int:
 
 SIMULATE = Interface(
     "Simulates a program: the controller's model, then the machine's plant. Reports the time of the cuts, their "
-    "largest residual and peak vibration, settling time, contour error of command and response; and for the whole "
-    "program with its rapids, dwells and waits the motion of the axes in time, as table, files and pictures.",
+    "largest residual and peak vibration, settling time, contour error of command and response. For the whole program "
+    "with rapids, dwells and waits: the motion of the axes over time, as table, files and pictures.",
     (
         *options.program_input(),
         ("--shaped", None, bool,
@@ -54,14 +54,14 @@ SIMULATE = Interface(
         ("--plant", None, ("modal", "feed-drive"),
          "modal: ideal servo followed by vibration modes; feed-drive: motor, ball screw, table, friction and servo "
          "loops of [axes.x.drive] (default: %(default)s)", "modal"),
-        ("--csv", "FILE", None, "write the motion in time, one line per period; - for standard output"),
-        ("--npz", "FILE", None, "write the same columns as a NumPy archive"),
+        ("--csv", "FILE", None, "write the motion, one line per interpolation period; - for standard output"),
+        ("--npz", "FILE", None, "write the columns of --csv as a NumPy archive"),
         ("--every", "N", count, "write every N-th sample only (default: %(default)d)", 1),
         ("--lines", "A-B", line_range,
-         "motion in time of these lines only, numbered as by `shapegcode expand`; the program is simulated from its "
+         "motion of these lines only, numbered as by `shapegcode expand`; the program is simulated from its "
          "start in any case"),
         options.plots(
-            "write pictures (PNG and SVG) into this folder: the motion in time, and path, feed and vibration of the "
+            "write pictures (PNG and SVG) into this folder: the motion over time, and path, feed and vibration of the "
             "cut that vibrates most"
         ),
         *RESULT,
@@ -94,8 +94,8 @@ FEED = Interface(
         *options.cutting(required=True),
         ("-o --output", "OUT", None, "program to write", NEEDED),
         options.plots(
-            "write pictures (PNG and SVG) into this folder: force, feed and engagement along the path, the path "
-            "coloured by force before and after, the error of the wall"
+            "write pictures (PNG and SVG) into this folder: force, feed and engagement along the path; the path "
+            "coloured by force, before and after; surface error of the wall"
         ),
         *RESULT,
     ),
@@ -114,8 +114,8 @@ def _expand(args: argparse.Namespace) -> int:
 
 
 EXPAND = Interface(
-    "Writes a program with subprogram calls, custom macros, coordinate modes (G16, G51, G51.1, G68), corner words "
-    "and cutter compensation expanded into plain blocks that any control runs, also from DNC. Nothing is "
+    "Expands subprogram calls, custom macros, coordinate modes (G16, G51, G51.1, G68), corner words (,R ,C) and "
+    "cutter compensation of a program into plain blocks that any control runs, also from DNC. Nothing is "
     "shaped. The input is never overwritten.",
     (
         *options.program_input(),
@@ -148,11 +148,11 @@ def _measure(args: argparse.Namespace) -> int:
 
 
 MEASURE = Interface(
-    "Simulates programs on the machine's model and measures the response like a part. For each section of the "
-    "path: vibration and settling time, contour error, fitted radius, the walls that the tool leaves, their roughness "
+    "Simulates programs on the machine's model and measures the response as if it were a part. Gives for each section "
+    "of the path vibration and settling time, contour error, fitted radius, walls that the tool leaves, with roughness "
     "and waviness. If the first program is an original and shapegcode wrote all others, they are measured against "
-    "the original's path. Exit code 0: the response of every program is within tolerance.contour_um of its path; "
-    "1: that of one is not (if shaped programs are measured against their original, only the shaped ones count); "
+    "the original's path. Exit code 0: every response is within tolerance.contour_um of the path; "
+    "1: at least one is not (if shaped programs are measured against their original, only the shaped ones count); "
     "2: bad input.",
     (
         ("inputs", "PROGRAM", {"nargs": "+"}, "CNC program; several are compared side by side"),
@@ -160,7 +160,8 @@ MEASURE = Interface(
         options.PROGRAM,
         ("--tool-diameter", "LENGTH", micrometres, "tool diameter, for example 3mm", NEEDED),
         ("--plant", None, ("modal", "feed-drive"),
-         "modal: ideal servo followed by vibration modes; feed-drive: [axes.x.drive] (default: %(default)s)", "modal"),
+         "modal: ideal servo followed by vibration modes; feed-drive: drives of [axes.x.drive] (default: %(default)s)",
+         "modal"),
         ("--against", "ORIGINAL", None,
          "measure against the path of this program (default: the first one if shapegcode wrote the others, else each "
          "program's own path)"),
@@ -222,9 +223,9 @@ def _time(args: argparse.Namespace) -> int:
 
 TIME = Interface(
     "Predicts the cycle time of a program in closed form, and checks it by computing every set-point. Reports the "
-    "time of cutting, rapids, in-position waits, dwells, acceleration, tool changes; by tool; slowest cuts and blocks. "
-    "For a machine calibrated with run logs also the 95 % interval, and which log would narrow it. "
-    "Exit code 0; 1: closed form and full interpolation differ by more than 0.5 %; 2: bad input.",
+    "time of cutting, rapids, in-position waits, dwells, acceleration, tool changes, each also by tool; and the "
+    "slowest cuts and blocks. For a machine calibrated with run logs also the 95 % interval, and which log would "
+    "narrow it. Exit code 0: both agree; 1: they differ by more than 0.5 %; 2: bad input.",
     (
         *options.program_input("PROGRAM"),
         ("--override", "RATIO", override,
@@ -236,8 +237,8 @@ TIME = Interface(
          "show the 95 %% interval that would remain if a run of this program were logged too; may be repeated: the "
          "program that narrows it most is listed first"),
         ("--no-full", None, bool, "closed form only, no full interpolation"),
-        ("--blocks", None, bool, "write every block into the JSON"),
-        ("--csv", "FILE", None, "write one line per block; - for standard output"),
+        ("--blocks", None, bool, "write the times of every block into the JSON too"),
+        ("--csv", "FILE", None, "write the times, one line per block; - for standard output"),
         options.plots("write a picture of the time components (PNG and SVG) into this folder"),
         *RESULT,
     ),
@@ -257,8 +258,8 @@ def _check(args: argparse.Namespace) -> int:
 
 
 CHECK = Interface(
-    "Lists what the control would refuse, several alarms in one run, each with number and position; and what it "
-    "would not run as programmed: stops inside of cuts, blocks shorter than the block time, feeds above the "
+    "Lists what the control would refuse, each alarm with number and position, not only the first; and what the "
+    "control would not run as programmed: stops inside of cuts, blocks shorter than the block time, feeds above the "
     "limits of the axes, program memory, speed of the serial line. Exit code 0: no alarms and no warnings; 1: "
     "warnings; 2: at least one alarm.",
     (*options.program_input("PROGRAM"), *RESULT),
@@ -279,9 +280,9 @@ def _compare(args: argparse.Namespace) -> int:
 
 
 COMPARE = Interface(
-    "Compares two programs by what they do: distance of the paths of each cut, order of cuts, rapids, tool calls, "
+    "Compares two programs by what they do: distance between the paths of each cut, order of cuts, rapids, tool calls, "
     "spindle, coolant, offsets, modal state, calls, feeds, other functions, dwells and stops. Every difference is "
-    "listed with its lines. Exit code 1 if there is one that --allow does not cover.",
+    "listed with its lines. Exit code 0: --allow covers all; 1: not all; 2: bad input.",
     (
         ("input", "A", None, "first program, for example the original"),
         ("against", "B", None, "second program, such as the output of convert"),

@@ -90,7 +90,7 @@ def restart_table(points: Sequence[RestartPoint]) -> Table:
     columns = (
         Column("restart", value=lambda point: f"N{point.number}", left=True, priority=0),
         Column("line", value="line", priority=0),
-        Column("of cut", value=lambda point: "{} to {}".format(*point.lines), left=True, priority=2),
+        Column("original lines", value=lambda point: "{} to {}".format(*point.lines), left=True, priority=2),
         Column("T", value="tool"),
         Column("H", value="length_offset"),
         Column("system", value="coordinate_system", left=True),
@@ -117,7 +117,7 @@ def _line(loads: Mapping[int, TransferLoad], machine: Machine) -> str:
 
 def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_period_s: float) -> str:
     rate = max((load.blocks_per_second for load in loads.values()), default=0.0)
-    needs = f"up to {rate:.0f} blocks/s, one every {block_period_s * 1e3:g} ms"
+    needs = f"the control must read up to {rate:.0f} blocks/s, one every {block_period_s * 1e3:g} ms"
     prologue = " ".join(machine.emission.prologue)
     if (own := dialect_of(machine.emission.dialect)) is not None:
         before = f"; {prologue} before each shaped cut" if prologue else ""
@@ -156,8 +156,8 @@ def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFi
     lines = "{} to {}".format(*region.emitted_lines)
     marks = f" and leave marks of up to {mark_um:.0f} µm" if mark_um >= 1.0 else ""
     return (
-        f"in single block, lines {lines} would take {_duration(time_s)} instead of {_duration(region.time_s.emitted)} "
-        f"({len(blocks)} stops, two presses of cycle start a second){marks}"
+        f"in single block, emitted lines {lines} would take {_duration(time_s)} instead of "
+        f"{_duration(region.time_s.emitted)} ({len(blocks)} stops, two presses of cycle start a second){marks}"
     )
 
 

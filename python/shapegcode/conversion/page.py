@@ -105,13 +105,13 @@ def _tried(pair: Pair[N], cut: CutOutcome) -> Pair[N | None]:
 
 def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[model.Section]:
     if len(conversion.cuts) > 1:
-        how = "The command below shapes only the ticked cuts. Gain: residual or contour falls by this at most."
+        how = "The command below shapes only the ticked cuts. Gain: the larger reduction of residual and contour."
         parts, many = (_picker(conversion, provenance),), len(conversion.cuts) > _SHOWN_CUTS
         yield model.Section("cuts", "Cut by cut", parts, how=how, folded=many, printed=False)
     if conversion.tolerance_curve is not None:
         sentence = conversion.tolerance_curve.sentence
         how = f"{sentence}. " if sentence else ""
-        how += "The time at the requested tolerance was simulated, others estimated; [price] limits the increase."
+        how += "The time at the requested tolerance was simulated, other times are estimated. Limits: table [price]."
         yield model.Section("price", "Tolerance against time", (curve_table(conversion.tolerance_curve),), how=how)
 
 
@@ -159,7 +159,7 @@ def _cases(conversion: Conversion) -> model.Section:
                "worst figure, % of its limit")  # fmt: skip
     rows = tuple(_case(rank, case, axes, conversion) for rank, case in enumerate(conversion.cases))
     how = (
-        "Each line is an operating condition under which the emitted program was simulated. The colour is the ratio "
+        "Each row is an operating condition under which the emitted program was simulated. The colour is the ratio "
         "to the limit: up to 100 % is within. A condition in brackets does not count in the verdict."
     )
     counted = sum(case.counts for case in conversion.cases)
@@ -195,7 +195,7 @@ def _times(conversion: Conversion) -> model.Section:
         times.append(("cut in lines {} to {}".format(*region.lines), region.time_s, f"regions.{rank}.time_s"))
     rows = tuple((name, (pair.original, pair.emitted)) for name, pair, _ in times)
     keys = tuple((f"{key}.original", f"{key}.emitted") if key else ("", "") for _, _, key in times)
-    how = "Two bars each, original above emitted."
+    how = "Two bars for each part: the original above the emitted program."
     bars = model.Bars("s", rows, ("original", "emitted"), digits=2, keys=keys)
     return model.Section("time", "Where the time goes", (bars,), how=how)
 

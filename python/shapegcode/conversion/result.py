@@ -399,7 +399,7 @@ class Conversion(ProgramFigures, Result):
 
     def _sizes(self) -> list[BeforeAfter]:
         rows = [
-            BeforeAfter("blocks (read, shaped)", "", self.blocks.read, self.blocks.emitted, 0),
+            BeforeAfter("blocks (original: all, emitted: shaped)", "", self.blocks.read, self.blocks.emitted, 0),
             BeforeAfter("size of the program", "bytes", self.bytes_read, self.bytes_emitted, 0),
             BeforeAfter("block period", "ms", None, self.block_period_s * 1e3, 3),
         ]

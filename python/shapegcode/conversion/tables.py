@@ -332,13 +332,13 @@ def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
     columns = (
         Column("key", left=True),
         Column(
-            "assumed → tested", value=lambda row: unbroken(f"{row.value} {row.origin} → {row.tested_value}"), text=True
+            "value → tested", value=lambda row: unbroken(f"{row.value} {row.origin} → {row.tested_value}"), text=True
         ),
         Column("figure, µm", value=_figure, text=True),
         Column("limit", value="limit_um", digits=1),
     )
     return Table(
-        "sensitivity to unverified parameters: assumed values, changed one at a time",
+        "sensitivity to unverified parameters: assumed or inherited values, changed one at a time",
         columns,
         rows,
         caption=f"{tried} tested in the cut closest to a limit; small effects left out",

@@ -72,7 +72,7 @@ class Drive(TomlTable):
         "speed within which the friction changes its sign (stribeck only)", assumed=0.1
     )
     friction_bristle_stiffness_n_per_um: Positive = key(
-        "force over displacement before the table slides (lugre only); static friction over it: presliding distance",
+        "force over displacement before the table slides (lugre only); static friction / this: presliding distance",
         assumed=30.0,
     )
     friction_bristle_damping_n_s_per_m: NonNegative = key(
@@ -166,12 +166,12 @@ class AxisMode(TomlTable):
     frequency_hz: _Hertz = key("natural frequency; from a tap test, or from the decay after a rapid stop")
     damping_ratio: _Ratio = key("damping ratio (1 = critically damped)")
     participation: Annotated[Positive, Field(le=1000)] = key(
-        "participation factor of this mode in the axis' deflection; those of one axis need not add up to 1",
+        "participation factor of this mode in the axis' deflection; the factors of one axis need not add up to 1",
         unit="1",
         default=1.0,
     )
     excited_by: Direction | None = optional(
-        "factors of the accelerations of X, Y and Z that excite this mode, { y = 1, z = 0.2 }; left out: that of its "
+        "factors of the accelerations of X, Y and Z that excite this mode, { y = 1, z = 0.2 }; left out: its own "
         "axis alone, { y = 1 } under axes.y. A mode that several axes excite is listed under one of them only"
     )
     moves: Direction | None = optional(
@@ -241,9 +241,8 @@ class Axis(TomlTable):
         "vibration modes, one table each; none: the axis is simulated as rigid", default=()
     )
     rigid: Bool = key(
-        "whether it is certain, by a test or by your decision, that this axis has no significant vibration mode. false "
-        "without modes: it is not known whether it has one; the axis is simulated as rigid, and every verdict reports "
-        "that",
+        "whether this axis is known, from a test or by your decision, to have no significant vibration mode. false "
+        "without modes: not known; the axis is then simulated as rigid, and every verdict reports it",
         default=False,
     )
     drive: Drive | None = optional(

@@ -113,7 +113,7 @@ class Controller(TomlTable):
 
     kind: ControllerKind = key(
         'control whose planner executes programs. "fanuc": by the keys below. "linuxcnc", "klipper", "grbl": by the '
-        "rules of that control, with the limits of the axes and the table of its name; shaped programs too, since its "
+        "rules of that control, with the limits of the axes and its own table below; shaped programs too, since such a "
         "planner cannot be switched off. motion, law, corner_rule and their keys are then used only with "
         'shaping.planner = "look-ahead"',
         default="fanuc",
@@ -228,7 +228,7 @@ class Controller(TomlTable):
         "an axis is in position when it lags by less than this. One number, or x, y, z", fanuc="1826", assumed=20.0
     )
     position_gain_per_s: PositiveAxisValues = key(
-        "gain of the position loop (the parameter counts 0.01/s); the servo lag is feed / gain. One number, or x, y, z",
+        "gain of the position loop (the parameter: in 0.01/s); the servo lag is feed / gain. One number, or x, y, z",
         fanuc="1825",
         assumed=30.0,
     )
@@ -256,7 +256,7 @@ class Controller(TomlTable):
     )
     program_memory_bytes: Annotated[int, Strict(), Field(gt=0)] = key(
         "memory for programs; a larger output gets a warning. Left out with a kind other than FANUC: 4 GB, "
-        "since they read from a disk",
+        "since such controls read from a disk",
         assumed=262_144,
     )
     dnc_baud: Count = key(
@@ -276,8 +276,8 @@ class Controller(TomlTable):
         assumed=0.01,
     )
     calculator_decimal_point: Bool = key(
-        "X10 without a decimal point: 10 mm or inch if true, 10 least increments if false. LinuxCNC, Klipper and GRBL "
-        "(kind) know only the first: true if left out",
+        "X10 without a decimal point: 10 mm or inch if true, 10 least increments if false. With kind "
+        "LinuxCNC, Klipper or GRBL only true is allowed, and is the default",
         fanuc="3401#0",
         default=False,
     )

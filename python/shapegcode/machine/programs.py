@@ -77,7 +77,7 @@ class Input(TomlTable):
     tool_length_wear_mm: _Lengths = key("wear of the length by offset number H", default={})
     compensation: Literal["refuse", "expand", "keep"] = key(
         'what `convert` does with cutter compensation G41/G42. "refuse": stops with an error; "expand": shapes the '
-        'tool path for tool_radius_mm; the offset in the control is then without effect; "keep": leaves these '
+        'tool path for input.tool_radius_mm; the offset in the control is then without effect; "keep": leaves these '
         "moves unchanged. Cycle time and pictures always use the expanded path where the radius is known",
         default="refuse",
     )
@@ -379,8 +379,8 @@ class Shaping(TomlTable):
         default=15.0,
     )
     part_mass_kg: NonNegative | None = optional(
-        "mass of the part on the worktable, for modes whose frequency depends on it (frequency_over); if neither "
-        "the machine file nor --part-mass gives it: nominal frequency"
+        "mass of the part on the worktable, for modes whose frequency depends on it (frequency_over); "
+        "without a value in the machine file or by --part-mass these have their nominal frequency"
     )
 
 
@@ -439,7 +439,7 @@ class Verdict(TomlTable):
     )
     override_percent: tuple[_Override, _Override] = key(
         "lowest and highest feed override of the program: every override in between must be within tolerance. The "
-        "header of a program asks for 100 %, so only that counts by default",
+        "header of a program asks for 100 %: by default only 100 % counts",
         default=(100.0, 100.0),
     )
     mode_uncertainty: Bool = key(

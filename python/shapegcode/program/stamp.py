@@ -69,7 +69,8 @@ FEED_HOLD = Habit(
 RESTART = Habit(
     "restart",
     "RESTART ONLY AFTER COMMENT SHAPED OR AT N IN RESTART LIST",
-    "restart only where a cut begins, or at a restart point: other blocks of a shaped cut are not valid restart points",
+    "restart only where a cut begins, or at a restart point, with its tool, H, coordinate system and spindle speed in "
+    "force and the tool above its start: other blocks of a shaped cut are not valid restart points",
 )
 FIRST_RUN = Habit(
     "first run",

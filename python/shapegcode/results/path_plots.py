@@ -319,7 +319,7 @@ class SimulatedRegion:
     ) -> SimulatedRegion:  # fmt: skip
         """The region that vibrates most, from core simulations."""
         traces = tuple(_trace(label, run, period_s) for label, run in runs.items())
-        parts = [f"lines {lines[0]} to {lines[1]}, the region that vibrates most after its stop"] if regions > 1 else []
+        parts = [f"lines {lines[0]} to {lines[1]}, the cut that vibrates most after its stop"] if regions > 1 else []
         if not traces[0].stops:
             parts.append(f"first {traces[0].times_s[-1]:.0f} s of {next(iter(runs.values())).duration_s:.0f} s")
         return cls(traces, path, "; ".join(parts))

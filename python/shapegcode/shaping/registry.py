@@ -331,8 +331,8 @@ def _shortest_non_negative(bands: Sequence[ModeBand], options: DesignOptions) ->
 def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
     if not any(band.uncertainty for band in bands):
         raise DesignError(
-            f"no mode has a band to design for (those in a machine file up to {NARROW_PERCENT:g} % count as "
-            "exact): a robust design is the non-negative one"
+            f"no mode has a band to design for (bands in a machine file up to {NARROW_PERCENT:g} % count as "
+            "exact): the robust design is that of family non-negative"
         )
     return _mirrored(bands, options, mirrored=False)
 
@@ -366,7 +366,7 @@ FAMILIES: tuple[Family, ...] = (
     ),
     Family(
         "mzv", "modified zero vibration", "the printer firmware Klipper",
-        "any modes; zeros at each mode and at 5/3 of its damped frequency, half as long again as ZV", True, True,
+        "any modes; zeros at each mode and at 5/3 of its damped frequency, 1.5 times as long as ZV", True, True,
         modified,
     ),
     Family(
@@ -387,7 +387,7 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "si", "specified insensitivity", "Singhose, Seering and Singer 1996; linear programs: this project",
         "any modes with their bands, all at once; residual up to the vibration limit; without a grid its times are "
-        "1/64 of the fastest period apart", True, True, specified,
+        "multiples of 1/64 of the fastest mode's period", True, True, specified,
     ),
     Family(
         "negative-zv", "unity-magnitude ZV with a negative impulse", "Singhose, Singer and Seering 1994",
@@ -414,11 +414,11 @@ FAMILIES: tuple[Family, ...] = (
     ),
     Family(
         "robust", "shortest shaper of a grid below a residual over the bands", "this project",
-        "modes with a band; one without is cancelled exactly; no impulse is negative", False, True, _robust,
+        "modes with a band; others with them are cancelled exactly; no impulse is negative", False, True, _robust,
     ),
     Family(
         "mirrored", "robust and symmetric in time: equal contours in both directions", "this project",
-        "modes with a band or without one, which is cancelled exactly; no impulse is negative; longer than robust",
+        "any modes; those without a band are cancelled exactly; no impulse is negative; longer than robust",
         False, True, _mirrored,
     ),
     Family(

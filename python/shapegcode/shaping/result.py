@@ -339,7 +339,7 @@ class Recommendation(Result):
             Column("Pareto", value=lambda each: "yes" if each.pareto else None, text=True),
         )
         left_out = len(self.designs) - len(rows)
-        caption = f"arc: radius error (too small) of R{radius_mm:g} mm at {speed_mm_per_s:g} mm/s"
+        caption = f"σ²: variance of the impulse times; arc: radius lost by R{radius_mm:g} mm at {speed_mm_per_s:g} mm/s"
         return Table(
             f"shapers for {', '.join(map(str, self.modes))}", columns, rows,
             caption=caption + (f"; {left_out} more designs: --verbose shows them" if left_out else ""),

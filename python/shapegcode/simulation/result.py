@@ -188,13 +188,13 @@ class Simulation(Result):
         """Cycle time, residual vibration and contour error."""
         takes = f"{Path(self.program).name} takes {self.cycle_time_s:.2f} s on {self.machine}"
         if not self.regions:
-            return f"{takes}; no cutting region ({self.plant} plant)"
+            return f"{takes}; no cut ({self.plant} plant)"
         if self.verdict is not None:
             return f"{takes}; {self._judged_answer(self.verdict)}"
         axis = max("xyz", key=lambda each: self.residual_vibration_um[each])
         contour_um = self.contour_error_um.response.max
         return (
-            f"{takes}, {self.cutting_time_s:.2f} s of it in cutting regions; {_NAMES[self.plant][0]} "
+            f"{takes}, {self.cutting_time_s:.2f} s of it in cuts; {_NAMES[self.plant][0]} "
             f"{axis.upper()} {self.residual_vibration_um[axis]:.2f} µm, contour error {contour_um:.2f} µm "
             f"{'against its own blocks ' if self.shaped and self._own_path else ''}({self.plant} plant)"
         )
@@ -260,7 +260,7 @@ class Simulation(Result):
             times = (over if time_s is None else f"{time_s * 1e3:.0f}" for time_s in self.settling_time_s)
             rows.append((f"settling to ±{self.settling_band_um:g} µm, ms", Xyz(*times)))
         columns = (
-            Column("cutting regions, each from rest to rest", value=lambda row: row[0], text=True),
+            Column("largest of the cuts, each from rest to rest", value=lambda row: row[0], text=True),
             *xyz_columns(lambda axis, row: row[1][axis]),
         )
         return Table("", columns, rows)
@@ -268,7 +268,7 @@ class Simulation(Result):
     def _parts(self) -> Iterator[tuple[Simulation | ShapedFigures, str]]:
         yield self, ""
         if self.of_shaped is not None and self.of_shaped.regions < len(self.regions):
-            yield self.of_shaped, f", {self.of_shaped.regions} shaped regions alone"
+            yield self.of_shaped, f", {self.of_shaped.regions} shaped cuts alone"
 
     @property
     def _path_name(self) -> str:
@@ -282,10 +282,10 @@ class Simulation(Result):
             for track, name in CONTOURS.items():
                 error = getattr(figures.contour_error_um, track)
                 rows.append((f"{name} µm{of}", f"{error.max:.2f}", f"{error.rms:.2f}"))
-        orbits = {"command": self.orbit_error_percent, "table": self.response_orbit_error_percent}
+        orbits = {"command": self.orbit_error_percent, "machine table": self.response_orbit_error_percent}
         rows += [(f"orbit error of the {name} %", f"{max(of):.4f}", "") for name, of in orbits.items() if of]
         columns = (
-            Column(f"cutting regions, against {self._path_name}", value=lambda row: row[0], text=True),
+            Column(f"cuts, against {self._path_name}", value=lambda row: row[0], text=True),
             Column("largest", value=lambda row: row[1]),
             Column("RMS", value=lambda row: row[2]),
         )

@@ -178,7 +178,7 @@ class CycleTime(TimeParts, Result):
         if self.difference_percent is None:
             return sentence
         agrees = "agrees" if self.ok else "DIFFERS"
-        return f"{sentence}; full interpolation {agrees} ({self.difference_percent:+.3f} %)"
+        return f"{sentence}; full interpolation {agrees} ({self.difference_percent:+z.3f} %)"
 
     @property
     def next_step(self) -> str:

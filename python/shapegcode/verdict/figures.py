@@ -447,7 +447,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
     shown = sum(not case.counts for case in cases)
     brackets = "; a verdict in brackets does not" if shown else ""
     return Table(
-        "operating conditions: residual X Y Z, contour error of command and machine table, µm",
+        "operating conditions: residual of each axis, contour error of command and machine table, µm",
         columns,
         cases,
         caption=f"{len(cases) - shown} of {len(cases)} operating conditions count (table [verdict]){brackets}; "
@@ -466,7 +466,7 @@ def _known(value: float | None, digits: int) -> str:
 
 
 def _share(share: float | None) -> str:
-    return "no limit but 0" if share is None else f"{share * 100:.0f} %"
+    return "limit is 0" if share is None else f"{share * 100:.0f} %"
 
 
 def _verdict(case: CaseVerdict, worst: bool) -> str:
