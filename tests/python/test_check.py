@@ -259,7 +259,7 @@ def test_short_blocks_in_a_called_file_stand_at_its_lines(tmp_path: Path) -> Non
     (finding,) = check.findings
     assert (finding.code, finding.line, Path(finding.file).name) == ("short_block", 3, "O0002.nc")
     # The call does not stop the motion: both blocks are one run.
-    assert finding.message.startswith("1 of 2 blocks up to line 3")
+    assert finding.message.startswith("1 of the 2 blocks that end with line 3")
 
 
 def test_every_line_runs_once_and_in_order() -> None:

@@ -1,6 +1,6 @@
 """Characterization tests: parts of equal moves in the air, the tests of a machine and box, and their duration.
 
-A test is one program. The fit needs only these data, which ``RESULTS.toml`` repeats.
+A test is one program. The fit needs only its data, which ``RESULTS.toml`` repeats.
 """
 
 from __future__ import annotations

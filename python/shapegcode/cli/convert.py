@@ -156,7 +156,7 @@ CONVERT = Interface(
         ("--baud", "N", positive,
          "speed of the serial line; if it is too low, longer block periods are used; if they are not enough, cuts are "
          "left unchanged"),
-        ("--max-blocks-per-second", "N", positive, "blocks per second that the control can read; effect of --baud"),
+        ("--max-blocks-per-second", "N", positive, "blocks per second that the control can read; acts as --baud"),
         ("--feed-schedule", None, bool,
          "first set the feeds as `shapegcode feed` does, so that the shaped program keeps the tool's limits; "
          "needs --tool and --stock"),

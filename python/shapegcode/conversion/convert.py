@@ -199,7 +199,7 @@ def read_back(plan: ConversionPlan, written: Written) -> ReadBack:
 
 
 def simulate(plan: ConversionPlan, written: Written, text: ReadBack, *, prefetch: bool = False) -> Shaped:
-    """Simulate every shaped cut in the operating conditions, except those whose text is unchanged.
+    """Simulate every shaped cut in the operating conditions, unless its text was simulated before.
 
     `prefetch`: also start the sensitivity analysis if the deciding cut is known already.
     """

@@ -180,8 +180,8 @@ def _restarts(program: Program, emitted: Program, written: Written, machine: Mac
         shakes_um = max(mark.vibration_um for each in restarts for mark in each.marks)
         switched = f", enter {' '.join(before)} by MDI" if before else ""
         yield (
-            f"{count} restart point{'' if count == 1 else 's'} inside long cuts, where the command is nearly at "
-            "rest (table of restart points); to start at one: load its tool, activate its H and coordinate system, "
+            f"{count} restart point{'' if count == 1 else 's'} inside long cuts, where the command is slow "
+            "(table of restart points); to start at one: load its tool, activate its H and coordinate system, "
             f"switch the spindle on{switched}, move to its position from above, then search its N number; such a start "
             f"makes the machine vibrate once, by up to {shakes_um:.1f} µm"
         )
@@ -197,8 +197,8 @@ def _restarts(program: Program, emitted: Program, written: Written, machine: Mac
         if each.longest_s > emission.restart_interval_s
     ]
     for (first, last), each in sorted(long, key=lambda pair: -pair[1].longest_s)[:1]:
-        more = f" (and {len(long) - 1} more cuts)" if len(long) > 1 else ""
-        why = each.reason or "the command does not come nearly to rest there"
+        more = f" (longest gap; {len(long) - 1} more)" if len(long) > 1 else ""
+        why = each.reason or "the command is not slow anywhere there"
         remedy = "" if each.reason or emission.restart_stops else "; emission.restart_stops = true adds a stop"
         yield (
             f"no restart point for {_duration(each.longest_s)} in original lines {first} to {last}{more}: {why}{remedy}"

@@ -1,4 +1,4 @@
-"""Restart points inside long cuts: full modal blocks where the shaped command is nearly at rest.
+"""Restart points inside long cuts: full modal blocks where the shaped command is slow.
 
 A start from rest lacks the table's speed and deflection at that block, which excites the slowest mode.
 """

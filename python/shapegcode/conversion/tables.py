@@ -338,7 +338,7 @@ def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
         Column("limit", value="limit_um", digits=1),
     )
     return Table(
-        "sensitivity to unverified parameters: assumed or inherited values, changed one at a time",
+        "sensitivity to unverified parameters (assumed or inherited), one at a time",
         columns,
         rows,
         caption=f"{tried} tested in the cut closest to a limit; small effects left out",

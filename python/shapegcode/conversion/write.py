@@ -503,7 +503,7 @@ def linear_lines(
 
 
 def joints_of(lines: Mapping[int, str], numbers: Sequence[int]) -> list[int] | None:
-    """Indices of blocks that begin a new joined block (N word, or after other lines); None: a line is no mere move."""
+    """Indices of blocks at which a joined block must begin (N word, or after other lines); None: not only moves."""
     if not all(_MERE_MOVE.fullmatch(lines[number]) for number in numbers):
         return None
     pairs = enumerate(pairwise(numbers), start=1)

@@ -29,7 +29,7 @@ _ROWS = 31
 
 @dataclass(frozen=True)
 class Load:
-    """Load along a path, one value per station, (n,); the feed is the one the machine really reaches."""
+    """Load along a path, per station, (n,); feed: as reached, outside of regions as programmed."""
 
     feed_mm_per_min: Vector  # largest on the interval before the station
     time_s: Vector  # on that interval

@@ -208,7 +208,7 @@ class _Clock:
         self.correlation = float(np.mean(self.shares))
 
     def _coarse(self) -> tuple[float, float, float, FloatArray]:
-        """Find rate and start of the clock, wait per part, and squared correlation of each part, all below 40 Hz."""
+        """Find the clock's rate and start, wait per part, and squared correlation of each part, from below 40 Hz."""
         command, period = self.command, self.record.period_s
         thinner = max(1, int(0.4 / period / _COARSE_HZ))
         values = resample_poly(self.values, 1, thinner)

@@ -106,7 +106,7 @@ class FitProblem:
         return [response - np.real(model) for response, model in zip(self.responses, last.fitted, strict=True)]
 
     def peaks_left(self, last: Fit | None) -> list[float]:
-        """Angular frequencies (rad/s) of the two highest peaks of the residual's spectrum in the band, descending."""
+        """Frequencies (rad/s) of the two highest peaks of the residual's spectrum in the band, by falling height."""
         residuals = self.left(last)
         length = 2 * max(map(len, residuals))
         power = np.zeros(length // 2 + 1)

@@ -196,11 +196,11 @@ class Emission(TomlTable):
     )
     restart_interval_s: Positive = key(
         "longest cutting time between restart points of a shaped cut, which are at positions where its command is "
-        "nearly at rest; a block period or more; longer than the cuts: no restart points",
+        "slow; a block period or more; longer than the cuts: no restart points",
         default=60.0,
     )
     restart_stops: Bool = key(
-        "let a shaped cut stop for a restart point if it is not nearly at rest within restart_interval_s: costs "
+        "let a shaped cut stop for a restart point if it is never slow within restart_interval_s: costs "
         "time, and the tool dwells in the cut",
         default=False,
     )

@@ -134,8 +134,8 @@ def plot_sensitivity(
 
     Args:
         result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, or shapers by name.
-        modes: modes to mark if shapers are given, as for `choose_shaper`; empty: undamped, up to 2.5 cycles in
-            the duration of the longest shaper.
+        modes: modes to mark if shapers are given, as for `choose_shaper`; empty: curves without damping, to 2.5
+            cycles in the longest shaper.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -262,8 +262,8 @@ def plot_branches(result: Recommendation, ax: Axes | None = None) -> Axes:
         The axes of the plot.
 
     Raises:
-        ValueError: another number of modes, or no minimal shaper within the longest duration and a cycle of the
-            slower mode.
+        ValueError: another number of modes, or no minimal shaper in a cycle of the slower mode, or in the
+            longest duration.
     """
     branches = _branches(result)
     if branches is None:

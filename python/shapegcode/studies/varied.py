@@ -1,6 +1,6 @@
 """Varied values: their distributions, and whether the converter knows them.
 
-A value that only the converter reads needs another program; others change only the simulated machine.
+A value that the converter knows needs a program of its own; others change only the simulated machine.
 """
 
 from __future__ import annotations

@@ -354,8 +354,8 @@ def _largest(deviations: Iterable[Deviation | None]) -> Deviation | None:
 def _haste(figures: RegionFigures, place: Placed, block_period_s: float) -> list[str]:
     """The missed limit of a region that is faster than programmed.
 
-    At feeds so slow that an increment takes several blocks, F words cannot represent whole periods. A time
-    below that of the original alone is not too fast: a rapid may take longer than its replacement, and an original
+    At feeds so slow that an increment takes several blocks, F words cannot represent whole periods. Less
+    time than the original takes is not yet too fast: a rapid may take longer than its replacement, an original
     longer than its feeds require.
     """
     was_s, now_s = figures.original.duration_s, figures.emitted_s
