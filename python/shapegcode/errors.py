@@ -30,7 +30,7 @@ class Problem:
 
     Attributes:
         key: dotted name of the key, for example ``axes.x.max_feed_mm_per_min``; empty: no single key.
-        value: the offending value as written in TOML; empty for a missing key.
+        value: the offending value as written in TOML; empty: the key is missing, or no single value is wrong.
         limit: rule for the value.
         line: line number in the file, None if unknown.
     """

@@ -8,6 +8,7 @@ import pytest
 import shapegcode as sg
 from command import run
 from ordinary_run import PERIOD_S, ordinary_run
+from shapegcode.identification.spectra import split_stops
 
 MODES = [(0.6, 27.0, 0.02), (0.3, 61.0, 0.03)]
 
@@ -31,6 +32,18 @@ def test_what_moves_behind_a_stop_is_left_out() -> None:
     """Some pauses are so short that a stop holds the next start: the modes of the stillest stops do not explain it."""
     found = sg.identify([record(7)], stops=True)
     assert any("do not explain it" in use.reason for use in found.records)
+
+
+def test_the_stillest_stops_of_all_records_come_first() -> None:
+    t = np.arange(0.0, 12.0, 1e-3)
+    since = [np.clip(t - (1.0 + 2.7 * k), 0.0, None) for k in range(4)]
+    decays = sum(np.exp(-6.0 * each) * np.sin(2.0 * np.pi * 40.0 * each) for each in since)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(t))
+    drift = 0.05 * np.sin(2.0 * np.pi * 1.3 * t)
+    moving, still = (sg.Record(name, 1e-3, decays + noise + more) for name, more in (("moving", drift), ("still", 0.0)))
+    for records in ([moving, still], [still, moving]):
+        names = [stop.source.split()[0] for stop in split_stops(records)]
+        assert names == ["still"] * 4 + ["moving"] * 4
 
 
 def test_moves_at_steady_speed_are_rests_too() -> None:

@@ -187,7 +187,7 @@ class Runs:
         prepare: Callable[[process.BatchJob, Mapping[str, bytes]], process.Packed],
         run: Callable[[process.Packed], process.JobOutcome],
     ) -> str:
-        """Do all runs; return the reason for an early stop, or an empty string."""
+        """Do all runs that are not done yet; return the reason for an early stop, or an empty string."""
         waiting: dict[Future[process.JobOutcome], tuple[int, str]] = {}
         self._ctrl_c.begin()
         try:
@@ -238,7 +238,7 @@ class Runs:
             self._keep(rank, fingerprint, outcome)
 
     def _is_done(self, rank: int, key: str, fingerprint: str) -> bool:
-        """True if an earlier batch did the same run and its output files are unchanged; the run then counts as done."""
+        """True if an earlier batch has this run, not as "failed", and its files are unchanged; it is then counted."""
         row = self._manifest.earlier(key) if self._resume else None
         if row is None or row.get("fingerprint") != fingerprint or row["ended"] == "failed":
             return False
@@ -330,7 +330,7 @@ def batch(
 
     Args:
         programs: files, folders, patterns, and ``@LIST`` files, see `find_programs`.
-        machines: files or built-in names; with several, every program runs on each, in folders of their names.
+        machines: files or built-in names; with several, every program runs on each: one folder per machine.
         output: folder of the results.
         command: "convert", "time", "check", "feed", "measure" or "simulate".
         options: further arguments of the command line; files among them are sent with each run.

@@ -122,7 +122,11 @@ def _only_returns(path: str) -> bool:
 
 
 def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterator[tuple[str, str]]:
-    """Names and paths of the files a program may call, recursively: any number after P in a program with calls."""
+    """Names and paths of the files a program may call, recursively.
+
+    These are the programs of bound codes and of tool changes, and in a program with calls any number after P; if one is
+    computed, all programs in the folders.
+    """
     beside = Path(path).parent
     folders = [beside, *(Path(base, Path(name).expanduser()) for name in machine.input.program_folders)]
     load = program_loader(folders, machine.controller.max_program_bytes)
@@ -191,7 +195,7 @@ class Plan:
         return len(self.sources) * len(self.lines)
 
     def job(self, rank: int) -> BatchJob:
-        """Make the run with a number."""
+        """Make the job of run number *rank*, from 0."""
         line, source = self._of(rank)
         target = os.path.join(self.output, line.below, source.place)
         page = os.path.join(self.html, line.below, f"{source.place}.html") if self.html else ""

@@ -31,7 +31,7 @@ class BatchRow(OldNames):
     Attributes:
         program: program as given.
         machine: machine as given.
-        ended: end of the run.
+        ended: how the run ended: "ok", "not ok", "refused" or "failed".
         answer: the first line of the command's output, or why there is none.
         residual_um: residual vibration of the worst axis; None: the command does not compute it.
         contour_um: contour error; None: the command does not compute it.
@@ -69,7 +69,7 @@ class BatchRow(OldNames):
 
     @property
     def longer_percent(self) -> float | None:
-        """Increase of the cycle time, %."""
+        """Increase of the cycle time, %; None: unknown, or no change."""
         pair = self.cycle_time_s
         if pair is None or pair.original <= 0.0 or pair.original == pair.emitted:
             return None
@@ -180,7 +180,7 @@ class Batch(Result):
 
     @property
     def ok(self) -> bool:
-        """True if every run is done and within tolerance."""
+        """True if every run is done, and ended "ok"."""
         return not self.not_done and self.counts["ok"] == len(self.rows)
 
     @property

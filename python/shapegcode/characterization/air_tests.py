@@ -1,6 +1,6 @@
 """Characterization tests: parts of equal moves in the air, the tests of a machine and box, and their duration.
 
-A test is one program. The fit needs only its data, which ``RESULTS.toml`` repeats.
+A test is one run of a program. The fit needs only the data of the tests, which ``RESULTS.toml`` repeats.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ class _Maker:
         return self._signed(axis, max(increments, 1))
 
     def stops(self, pattern: Pattern, axis: str, count: int, side: int, slower: float = 1.0, log: bool = False) -> Part:
-        """Moves of nearly the same duration, each ending in a stop."""
+        """Equal moves of about `_STOP_S` each (*log*: `_LOG_STOP_S`), each ending in a stop."""
         base, dwell = (_LOG_STOP_S, _LOG_DWELL_S) if log else (_STOP_S, _STOP_DWELL_S)
         length = self._length(axis, base, self.feed / slower, side)
         return Part(pattern, axis, count, length, self.feed / slower, dwell_s=dwell if pattern == "dwell" else 0.0)

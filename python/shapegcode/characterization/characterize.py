@@ -1,4 +1,4 @@
-"""Fits controller parameters to the results of the tests, and writes them to a machine file."""
+"""Fits controller parameters to the results of the tests, and returns the machine with them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def characterize(
         on_progress: called with the completed fraction, 0 to 1.
 
     Returns:
-        Known parameters with 95 % intervals, and the machine with them.
+        Parameters with 95 % intervals, unknown ones with the reason, and the machine with the known ones.
 
     Raises:
         ArgumentError, FileError: bad input, with file, line, value and limit.

@@ -258,7 +258,7 @@ class LogFacts(Facts):
 
     @property
     def tick(self) -> float:
-        """The period, or one too short to round anything."""
+        """The interpolation period; if it is unknown, one too short to round anything."""
         return self.period or 1e-6
 
     @property
@@ -441,7 +441,7 @@ def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
 
 
 def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, float] | None:
-    """Command, following error and time step, one row for each period of constant command."""
+    """Command, following error and time step, one row for each period of constant command; None without such data."""
     if log.actual_mm is None or np.isnan(log.actual_mm[0, index]) or np.isnan(log.command_mm[0, index]):
         return None
     count, first = moves.held_samples(log)

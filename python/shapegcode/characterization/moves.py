@@ -172,7 +172,7 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
 
 
 def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> FloatArray:
-    """Fraction of the travel over time: a rectangle of speed, then moving averages; *boxes*: durations of all, s."""
+    """Fraction of the travel over time: a rectangle of speed, then moving averages; *boxes*: durations of these, s."""
     used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
     power, out = len(used), np.zeros_like(times)
     if not power:

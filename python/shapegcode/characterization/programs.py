@@ -40,7 +40,7 @@ def write_characterization_tests(
         box: range of the tests, mm from their start point, "X0:X1,Y0:Y1,Z0:Z1".
 
     Returns:
-        The tests with their expected durations, in the order written.
+        The tests with their expected durations, in the order of ``RESULTS.toml``.
 
     Raises:
         ArgumentError: the box or the feeds are too small; the folder contains a RESULTS.toml, which may be filled in.

@@ -1,4 +1,4 @@
-"""Parameters of a controller with intervals, its tests, and results."""
+"""Results of characterization: the parameters of a controller with intervals, and its tests."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ControllerFact:
         return 0.0 if self.low is None or self.high is None else self.high - self.low
 
     def contradicts(self, other: ControllerFact) -> bool:
-        """Whether both are numbers whose intervals do not overlap, or different texts."""
+        """Whether both are numbers whose intervals do not overlap, or texts of which neither contains the other."""
         if self.value is None or other.value is None:
             return False
         if isinstance(self.value, str) or isinstance(other.value, str):

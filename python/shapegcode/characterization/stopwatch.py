@@ -1,7 +1,8 @@
 """Fits controller parameters to stopwatch times of the test programs; method: this project.
 
 Each time is one equation. For every candidate period and both rules of block timing the other parameters are fitted; a
-period or rule is known only if the alternatives fit clearly worse. Rapids are fitted last, for every time constant.
+period or rule is known only if the alternatives fit clearly worse. Rapids are fitted afterwards, for each candidate
+time constant.
 """
 
 from __future__ import annotations
@@ -194,7 +195,7 @@ def _discrete(fits: Sequence[_Fit], facts: WatchFacts) -> tuple[_Fit, float | No
 
 
 def _cutting(best: _Fit, exponential: bool, facts: WatchFacts) -> None:
-    """Time constants of cutting moves, and the waits after exact stops."""
+    """Sum of the time constants of cutting moves (not if exponential), and the waits after exact stops."""
     if not exponential:
         note = "a stopwatch measures only the sum"
         key = "controller.time_constant_s"

@@ -1,6 +1,6 @@
 """Find what a controller would refuse in a program on reading it, and where it would not run it as programmed.
 
-Where it would not run it as programmed follows mainly from the time that each block takes at its feed.
+The latter follows mainly from the time that each block takes at its feed.
 """
 
 from __future__ import annotations
@@ -51,10 +51,11 @@ def check(
             `shapegcode.program.reading`; None: the first.
 
     Returns:
-        The findings, and the effect of short blocks and serial line.
+        The findings, with the time lost by short blocks and the data rate required of the serial line.
 
     Raises:
         ProgramError: it is too large, or it cannot be read at all, without a position to report.
+        ArgumentError: the program was read with settings that differ from the machine's.
         OSError: the file cannot be read.
     """
     machine = Machine.of(machine)
@@ -86,7 +87,7 @@ def check_text(
         folder: further folder to search for called programs.
 
     Returns:
-        The findings, and the effect of short blocks and serial line.
+        The findings, with the time lost by short blocks and the data rate required of the serial line.
 
     Raises:
         ProgramError: it is too large, or it cannot be read at all, without a position to report.

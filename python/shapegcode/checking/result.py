@@ -209,7 +209,7 @@ class Check(Result):
         return "shapegcode time predicts its cycle time, shapegcode simulate its vibration."
 
     def tables(self) -> list[Table]:
-        """Table of findings by position: the first of each kind, and for each code the number of those not shown."""
+        """Table of findings by position: the first few of each kind; its caption counts the others by code."""
         if not self.findings:
             return []
         columns = (

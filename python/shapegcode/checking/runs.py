@@ -94,7 +94,7 @@ class Breaker:
 
 
 def block_table(program: Program, machine: Machine) -> BlockTable:
-    """Time every cutting block at its feed."""
+    """Time every cutting block at its feed, except those that move rotary axes only."""
     limited = _timed(program, machine, with_limits=True)
     # A move of rotary axes only has no length here, and so no comparable time.
     cutting = np.flatnonzero((limited["kind"] == _CUTTING) & (limited["duration_s"] > 0.0))
@@ -151,7 +151,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
 
 
 def _shaper_s(program: Program, machine: Machine) -> float:
-    """Window of the highest character rate, s: shaper duration by a program's header, at least the block time."""
+    """Time over which the character rate is averaged, s: the header's shaper duration, at least the block time."""
     min_s = machine.controller.block_time_s
     try:
         return max(float(program.stamp.shaper_ms) * 1e-3, min_s) if program.stamp else min_s
@@ -173,7 +173,7 @@ def _clamped_feeds(line: npt.NDArray[np.int64], feed: FloatArray, ratio: FloatAr
 
 
 def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDArray[Any]:
-    """Time every move (length over feed, no acceleration), one row per move, at a very low feed override."""
+    """Time each move (length over feed, no acceleration), dwell and function at a very low override, one row each."""
     model = fanuc_model(machine, feed_override=_SLOW_MOTION, shaped=False)
     model.planner = _core.PlannerRules()
     model.motion = _core.MotionKind.after_interpolation
@@ -198,7 +198,7 @@ def _line_offsets(program: Program) -> npt.NDArray[np.int64]:
 
 
 def look_ahead_breakers(program: Program, machine: Machine, table: BlockTable) -> Iterator[Breaker]:
-    """Yield words that stop the look-ahead between two cutting moves without a rapid between them, once per gap."""
+    """Yield words that may stop the look-ahead, once for each two cutting moves without a rapid between them."""
     gaps: dict[int, list[tuple[int, str, str]]] = {}
     cutting = table.cutting_lines
 

@@ -123,7 +123,7 @@ def _follow(parent: int) -> None:
 
 
 def _limit_memory(more_bytes: int) -> None:
-    """Limit the memory of the process to its present size plus *more_bytes*."""
+    """On Linux limit the data memory of the process to its present size plus *more_bytes*."""
     if sys.platform != "linux":
         return  # only Linux counts memory from mmap in RLIMIT_DATA
     import resource

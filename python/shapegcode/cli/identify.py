@@ -1,4 +1,4 @@
-"""``shapegcode identify``: find vibration modes from a tap test or a decay, and write them to the machine file.
+"""``shapegcode identify``: find vibration modes from a tap test, a decay or a sweep, and update a machine file.
 
 ``shapegcode sweep``: write a program that shakes an axis, to find modes without a hammer.
 """

@@ -25,7 +25,7 @@ _WITH_MOTION = ("Check", "Conversion", "CycleTime", "FeedSchedule", "Measurement
 
 
 def changes(provenance: Provenance, folder: Path) -> tuple[dict[tuple[str, str], Path], list[str]]:
-    """Search for the files of a run at their former paths and in a folder; return them and the problems found."""
+    """Search for the input files of a run at their former paths and in a folder; return them and the problems."""
     asked = [file for file in provenance.files if file.role not in ("wrote", "output of all")]
     looked_up = [(file, *_looked_up(file, folder)) for file in asked]
     found = {(file.role, file.name): place for file, place, _ in looked_up if place is not None}

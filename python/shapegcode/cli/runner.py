@@ -163,7 +163,7 @@ def write_results(report: object, json: str | None, output: Output | None) -> No
 def _write_page(
     result: Result, args: argparse.Namespace, report: dict[str, Any], output: Output | None, wrote: Sequence[str | Path]
 ) -> list[str]:
-    """Write provenance into the JSON, and the page of --html; return the files."""
+    """Write provenance into the JSON, and the page of --html; return the files of the page."""
     html = getattr(args, "html", None)
     if html is None and getattr(args, "json", None) is None:
         return []  # no file contains the provenance
@@ -219,7 +219,7 @@ def _say(
     result: Result, args: argparse.Namespace, tables: Sequence[Table], warnings: Sequence[str], notes: Sequence[str],
     last: Sequence[str],
 ) -> None:  # fmt: skip
-    """Print on standard output, the answer first; with --quiet only answer and warnings."""
+    """Print on standard output, the answer first; with --quiet only answer, citations (--cite) and warnings."""
     from shapegcode.results.table import warning_table
 
     quiet, verbose = getattr(args, "quiet", False), getattr(args, "verbose", False)

@@ -1,4 +1,7 @@
-"""``--program all``: run a command for every program of a file that no other one calls, each as if it were alone.
+"""``--program all``: run a command for the programs of a file, each as if it were alone.
+
+Not run are programs that another one calls (unless that is true of all), and subprograms whose moves are already in a
+shaped program of the file.
 
 The emitted programs replace the originals in a copy of the file. Everything else is unchanged, also subprograms whose
 moves the shaped programs now contain.
@@ -24,7 +27,7 @@ _TABLES = ("csv", "npz", "html")
 
 
 def run_all(args: argparse.Namespace) -> int:
-    """Run a command for each program of a file, except those that others call, or called before shaping."""
+    """Run a command for each program of a file, except those that others call, and subprograms no longer called."""
     for name in _TABLES:
         if getattr(args, name, None) == "-":
             raise ArgumentError(f"--{name} - with --program all: each program needs a file, give one")
@@ -50,7 +53,7 @@ def run_all(args: argparse.Namespace) -> int:
 
 
 def _called(several: Gathered, machine: Machine) -> set[int]:
-    """Indices of programs that another one in the file calls: they are expanded there, or left as calls."""
+    """Indices of programs that others in the file call (there expanded, or left as calls); none if all are called."""
     called: set[int] = set()
     folder = Path(several.source).parent
     for place in several.places:
@@ -66,7 +69,7 @@ def _called(several: Gathered, machine: Machine) -> set[int]:
 
 
 def _left_over(several: Gathered) -> set[int]:
-    """Indices of subprograms that are no longer called, because shaped programs contain their moves."""
+    """Indices of the subprograms that are not shaped, if any program of the file is; else empty."""
     if STAMP_BEGIN not in several.text:
         return set()
     texts = [several.text[place.text_begin : place.text_end] for place in several.places]

@@ -48,7 +48,7 @@ class Budget:
         return self.baud is not None or self.max_blocks_per_second is not None
 
     def excess(self, load: TransferLoad) -> float:
-        """Ratio of a region's rate to the permitted one.
+        """Largest ratio of a region's data and block rates to the permitted ones.
 
         Args:
             load: load of the region.
@@ -168,7 +168,7 @@ class Spending:
         return best
 
     def give_up(self, grid: Grid, written: Written, verdicts: Sequence[RegionVerdict]) -> bool:
-        """Choose regions to leave unchanged; False if the program fits."""
+        """Choose further regions to leave unchanged; False if there are none: then the program fits."""
         self._before = self._before or _needs(grid, written)
         loads = written.loads
         simulated = dict(zip(loads, verdicts, strict=True))

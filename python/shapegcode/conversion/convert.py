@@ -1,4 +1,4 @@
-"""The converter: one function for each box of the figure in ARCHITECTURE.md, in the same order."""
+"""The converter, in the order of the figure in ARCHITECTURE.md; some of its boxes are in `plan` and `outcome`."""
 
 from __future__ import annotations
 
@@ -51,7 +51,8 @@ def convert(
 ) -> Conversion:
     """Shape the cuts of a program, and simulate the whole emitted program for its verdict.
 
-    Options that are None have the value of the machine file; the others are checked like its values.
+    An option with a key below, such as `shaping.contour`, has the value of the machine file if it is None; else it is
+    checked like that value.
 
     Args:
         program: the program to convert, or its file.
@@ -70,7 +71,7 @@ def convert(
         max_cut_time_increase_percent: largest increase of the time of one cut: `price.cut_time_percent`.
         only: ranges of lines (first, last) of the original: shape only the cuts with a line in one of them; None: all.
         leave: ranges of lines (first, last) of the original: leave the cuts with a line in one of them unchanged.
-        shape_all: shape every cut that can be shaped within the table ``[price]``, even if it gains less than
+        shape_all: shape every cut that can be shaped within the limits of ``[price]``, even if it gains less than
             `shaping.least_gain_um`, gets worse, or the program is within tolerance. False: such cuts stay unchanged.
         tolerance_curve: compute the cycle time at other contour tolerances.
         on_progress: called with stage, number of finished parts and number of parts.
@@ -142,7 +143,7 @@ def read(
 
 
 def choose_block_period(plan: ConversionPlan) -> None:
-    """Choose another grid if a budget limits the rate."""
+    """Choose the grid again if a budget limits the rate and the block period is not fixed."""
     spending = plan.spending
     if spending is not None and spending.budget.limits_rate and not plan.fixed_period:
         weights = [float(original.result().residual_mm.max()) for original in plan.originals]
@@ -150,7 +151,7 @@ def choose_block_period(plan: ConversionPlan) -> None:
 
 
 def settle(plan: ConversionPlan) -> Shaped:
-    """Write, read back and simulate; repeat while a cut exceeds its tolerance, feed or price."""
+    """Write, read back and simulate; repeat, up to `_ATTEMPTS` times, while a cut exceeds tolerance, feed or price."""
     for attempt in range(_ATTEMPTS):
         written = write(plan, plan.grid, "shaping" if attempt == 0 else "shaping again, slower")
         shaped = simulate(plan, written, read_back(plan, written), prefetch=attempt == 0)
@@ -263,7 +264,7 @@ def _rewritten(plan: ConversionPlan, shaped: Shaped, before: Sequence[int]) -> S
 
 
 def _as_it_was(plan: ConversionPlan, shaped: Shaped) -> Shaped:
-    """If nothing was shaped and the input was a single program, return it instead of its expansion."""
+    """If nothing was shaped and the input was a single FANUC program, return it instead of its expansion."""
     rapids_shaped = shaped.rapids is not None and shaped.rapids.outcome.shaped > 0
     # A foreign program was given in another dialect than the emitted one.
     is_other = plan.program.number is not None or plan.program.foreign is not None

@@ -1,4 +1,4 @@
-"""Requirements of an emitted program for the control and the operator: memory, line, override, restart, first run."""
+"""Requirements of an emitted program for control and operator: memory, serial line, override, restart, first run."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_perio
 
 
 def _single_block(emitted: Program, placed: Sequence[Placed], figures: ProgramFigures, model: MachineModel) -> str:
-    """Effect of single block on the cut that vibrates most; its fastest blocks are simulated from rest to rest."""
+    """Effect of single block on the cut whose original vibrates most; a few shaped blocks run from rest to rest."""
     index = max(range(len(placed)), key=lambda each: max(figures.regions[each].residual_vibration_um.original))
     place, region = placed[index], figures.regions[index]
     blocks = place.blocks(emitted)

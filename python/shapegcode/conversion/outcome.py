@@ -279,8 +279,8 @@ def prove(original: Program, emitted: Program, machine: Machine, *, rapids_shape
     """Compare an emitted program with its original; changes by shaping are allowed.
 
     The verdict limits the deviation of the response, or of the command if that is the target. The programmed path of
-    the blocks deviates further (up to three tolerances in the conversions of the tests); more than
-    `_PATH_TOLERANCES` and `_PATH_UM` means that a part was left out.
+    the blocks deviates further (up to three tolerances in the conversions of the tests); more than the larger of
+    `_PATH_TOLERANCES` tolerances and `_PATH_UM` means that a part was left out.
     """
     kinds = {"feeds", "blocks", "calls"}
     kinds |= {"shaped-rapids"} if rapids_shaped else set()

@@ -155,7 +155,7 @@ class Aims:
     ) -> bool:
         """Bring the program's time within its price.
 
-        The tolerance of all cuts is loosened to a common value; if no value suffices, cuts are left unchanged.
+        Where it saves time, tolerances are loosened to a common value; if no value suffices, cuts are left unchanged.
         """
         cuts = [index for index in gains_um if not self.reasons[index]]
         wanted_s = math.fsum(self.emitted_s[index] for index in cuts) - excess_s
@@ -363,7 +363,7 @@ class CutCurves:
         self._writer, self._known = writer, {}
 
     def note(self, written: Written) -> None:
-        """Store cuts that the tolerance does not slow: they need no plan."""
+        """Store the curves, of one point, of the cuts that the tolerance does not slow: they need no plan."""
         for index in written.unslowed - self._known.keys():
             planned_um = max(written.planned_um.get(index, 0.0), 1e-3)
             self._known[index] = CutCurve((planned_um,), (written.durations_s[index],))
@@ -526,7 +526,10 @@ class ConversionPlan:
             self.gains_um[index] = gained_um
 
     def leave_out(self) -> None:
-        """Before shaping, leave cuts unchanged that have nothing to gain; all of them if every cut keeps its limits."""
+        """Before shaping, leave cuts unchanged that have nothing to gain; all if every cut keeps its limits.
+
+        None is left with `choice.shape_all`, nor ever one that cannot stay unchanged.
+        """
         self.original_within = self._original_is_within()
         if self.choice.shape_all:
             return

@@ -45,7 +45,7 @@ class RestartMark:
 
 @dataclass(frozen=True)
 class CutRestarts:
-    """Restart points of a region, and why there are no others."""
+    """Restart points of a region, or why there can be none."""
 
     marks: tuple[RestartMark, ...] = ()  # in their order
     longest_s: float = 0.0  # longest time without one

@@ -209,7 +209,7 @@ class Conversion(ProgramFigures, Result):
 
     @property
     def answer(self) -> str:
-        """Recommendation, figures and time; then the first cut beyond its limits, with its remedy."""
+        """Recommendation, figures and time; then a cut beyond its limits, with its remedy."""
         lines = [self._headline(), *self._left_out()]
         if self.recommendation == "do not run" and not any(self.reason in line for line in lines):
             lines.append(self.reason)
@@ -412,7 +412,10 @@ class Conversion(ProgramFigures, Result):
         return rows
 
     def plots(self) -> Mapping[str, Plot]:
-        """`path`, `feed` and `vibration` of the cut that vibrates most, before and after; `tolerance` against time."""
+        """`path`, `feed` and `vibration` of one cut, before and after; `tolerance` against time.
+
+        Of the shaped cuts, it is the one that vibrates most in the original.
+        """
         return self._drawn_beside()
 
     @property

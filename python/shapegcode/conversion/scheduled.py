@@ -1,4 +1,4 @@
-"""Feed scheduling and shaping together: feeds are chosen for the real motion of the shaped program."""
+"""Feed scheduling and shaping together: feeds are chosen for the simulated motion of the shaped program."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def convert_scheduled(
 ) -> ScheduledConversion:
     """Schedule the feeds of a program, shape it, and compute the force of the emitted program.
 
-    If the emitted program exceeds a limit, feeds are chosen again with more margin.
+    If the emitted program exceeds a limit, feeds are chosen again with more margin, up to three times.
 
     Args:
         program: the program to convert, or its file.

@@ -67,7 +67,7 @@ StartedTrials = Mapping[tuple[str, str], "Future[CaseFigures]"]
 
 @dataclass(frozen=True)
 class _Region:
-    """A region with its simulation and its limits."""
+    """A region that is simulated with changed values."""
 
     place: Placed
     emitted: Program
@@ -96,7 +96,7 @@ class _Region:
         return "".join(axis for axis, extent in zip("xyz", extent_mm, strict=True) if extent > 0.0)
 
     def sensitivity(self, value: KeyValue, tested: str, figures: RegionFigures, simulated: CaseFigures) -> Sensitivity:
-        """The figure, relative to its limit, that a changed value raises most above that of the nominal condition."""
+        """Find the figure whose ratio to its limit a changed value raises most, compared with the nominal condition."""
         limits = self.judge.limits(figures, self.place)
         own = figures.emitted[self.judge.rules.index(self.judge.own_rule)]
         before = {each.figure: each for each in judge_region(case_figures(own), limits)}
@@ -111,7 +111,7 @@ class _Region:
 def start_trials(
     judge: Judge, machine: Machine, place: Placed, emitted: Program, tracker: _core.ContourTracker, pool: Executor
 ) -> StartedTrials:
-    """Start those of the first trials of `parameter_sensitivity` that need the contour error (one region only)."""
+    """For a single shaped cut: of the first trials of `parameter_sensitivity`, start those with the contour error."""
     region = _Region(place, emitted, judge, tracker)
     trials = filter(region.needs_contour, islice(_trials(machine, region.moving), _FULL_RUNS))
     return {_name(trial): pool.submit(region.simulate, trial, contour=True) for trial in trials}
@@ -155,7 +155,7 @@ def parameter_sensitivity(
 
 
 def _ranked(rows: Sequence[Sensitivity]) -> tuple[Sensitivity, ...]:
-    """The worst trial of each key, largest effect first; small effects are dropped, except of unknown modes."""
+    """The worst trial of each key, largest effect first, at most 8; no small effects, unless of unknown modes."""
     worst: dict[str, Sensitivity] = {}
     for row in rows:
         matters = row.share >= _MIN_SHARE or row.key.endswith(".modes")

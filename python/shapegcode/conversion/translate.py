@@ -214,7 +214,7 @@ class _Translator:
             self._lasts |= {max(times, default=-1)}
 
     def _join(self, blocks: _core.Path, period_s: float) -> None:
-        """Replace blocks of constant feed by fewer of linear feed (FLIN), if the shaped cut contains only moves."""
+        """Replace blocks of constant feed by fewer of linear feed (FLIN), if a cut has only moves in G90 and mm."""
         text = self._program.expanded_text.decode("latin-1").split(self._program.core.line_end)
         numbers = [int(number) for number in blocks.segment_lines]
         lines = {number: text[number - 1].replace(" ", "") for number in numbers}
@@ -287,9 +287,9 @@ class _Translator:
         return [*before, *self._block(number, skip, _WORD.findall(body), comments)]
 
     def opening(self, first: str) -> list[str]:
-        """Lines before the first block: modes that may differ at power-on of the control.
+        """Lines before the first block: comments, and modes that may differ at power-on of the control.
 
-        A mode that the dialect does not have is refused, unless the first block sets another one.
+        A mode that the dialect does not have is refused, unless the first block sets another one; only G80 is left out.
         """
         self.state.is_open = True
         on, dialect = self._machine.power_on, self._dialect
@@ -476,7 +476,7 @@ class _Translator:
         raise self._error(number, f"{letter}{value}{why}: its meaning on {dialect.control} is not known{_CURE}")
 
     def _length(self, letter: str, value: str, dialect: Dialect) -> str:
-        """A number with a decimal point: without it its meaning differs between controls."""
+        """A number with a decimal point: the meaning of one without a point differs between controls."""
         controller = self._machine.controller
         if "." not in value:
             if letter != "F" and not controller.calculator_decimal_point:

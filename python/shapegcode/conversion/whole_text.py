@@ -1,4 +1,4 @@
-"""The whole emitted program: header and guards, shaped regions, everything else unchanged."""
+"""The whole emitted program: header, checks of tool offsets, shaped regions, everything else unchanged."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class Written:
 class Prefetch(Generic[T]):
     """Runs tasks in a pool, in order; a limited number of them is started ahead of the results that are fetched.
 
-    `tasks`: by number; each gets a function, and calls it with the ratio of the task that is finished. `weights`: of
+    `tasks`: by number; each gets a function, and calls it with its finished ratio. `weights`: of
     all parts, some of which have no task. `on_progress`: called with the sum of the finished weights, by the thread
     that fetches results; it may be replaced.
     """
@@ -340,7 +340,7 @@ _STATE_FIELDS = (
 
 
 def read_back(parts: list[bytes], placed: Sequence[Placed], machine: Machine) -> Program:
-    """Read the emitted program and check end points, modal states around regions and angles of arcs."""
+    """Read the emitted program and check end points, angles of arcs, and the modal states around regions."""
     # Half an increment: a program may have more digits than the controller resolves.
     tolerance_mm = {units: 0.5 * written_increment_mm(machine, units) + 1e-9 for units in (20, 21)}
     probes = [line for place in placed for line in (place.first_line - 1, place.last_line)]

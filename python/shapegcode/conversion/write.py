@@ -90,7 +90,7 @@ class TransferLoad:
 
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
-    """Measure the highest data rate of a shaped cut as a mean over the shaper's duration: rates vary slowly."""
+    """Measure the bytes that a shaped cut adds, and its highest data and block rates over a shaper's duration."""
     durations = np.concatenate(shaped.block_periods, dtype=np.float64)
     durations *= grid.block_period_s
     window_s = max(grid.duration_s, grid.block_period_s)
@@ -188,7 +188,7 @@ class _Marks:
 
 
 def _block_bytes(texts: Sequence[bytes], blocks: Iterable[int]) -> list[npt.NDArray[np.uint32]]:
-    """Characters of each block with line end and preceding comment lines; the last one also with following ones."""
+    """Size of each block, with line end and preceding comment lines; of the last one also with following ones."""
     sizes, behind = [], 0
     for text, count in zip(texts, blocks, strict=True):
         ends = restart.block_lines(text, count)[1]
@@ -270,7 +270,7 @@ class RegionWriter:
         return places
 
     def _stop_for_restarts(self, region: _core.Region, options: _core.ShapingOptions) -> tuple[int, int]:
-        """Add the stops that restart points need; return the block periods without these stops, and their number."""
+        """Add the stops that restart points need; return the block periods without them, and the number of stops."""
         places = self._places(region)
         segments = range(1, len(region.path))
         shaper = _core.RegionShaper(region.path, self._grid.fir, segments, options)
@@ -503,7 +503,7 @@ def linear_lines(
 
 
 def joints_of(lines: Mapping[int, str], numbers: Sequence[int]) -> list[int] | None:
-    """Indices of blocks at which a joined block must begin (N word, or after other lines); None: not only moves."""
+    """Indices of blocks that cannot be joined to the one before (N word, or lines between); None: not all are moves."""
     if not all(_MERE_MOVE.fullmatch(lines[number]) for number in numbers):
         return None
     pairs = enumerate(pairwise(numbers), start=1)

@@ -259,7 +259,7 @@ def _loops(points: Points) -> tuple[list[Points], Points]:
 
 
 def chord_angle_rad(radius_mm: float) -> float:
-    """Angle of a chord that deviates from its arc by 0.04 µm; at most about 80 degrees."""
+    """Angle of a chord that deviates from its arc by 0.04 µm; at most about 83 degrees."""
     return 2 * math.acos(1 - _SAGITTA_MM / max(radius_mm, 4 * _SAGITTA_MM))
 
 
@@ -315,7 +315,7 @@ def _placed(shape: Geometry, source: Geometry, distance_mm: float) -> Geometry:
 
 
 def _turns(shape: Geometry, corners: Points) -> NDArray[np.intp]:
-    """Indices of the corners at which an outline turns by more than from one chord of an arc to the next."""
+    """Indices of the corners at which an outline turns by more than between two chords of an arc."""
     import shapely
 
     begin, turns = 0, []

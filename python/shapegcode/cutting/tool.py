@@ -136,7 +136,7 @@ class Cutting(TomlTable):
         return None if self.material is None else materials()[self.material]
 
     def coefficients(self) -> _core.CuttingCoefficients:
-        """Coefficients of the core."""
+        """Coefficients in the form that `_core` takes."""
         entry = self.library_entry()
         thickness = self.chip_thickness or ("mean" if entry is None else entry.chip_thickness)
         values = {name: self._value(name) for name in COEFFICIENTS}
@@ -202,7 +202,7 @@ class Cutter(TomlTable):
 
 
 class Limits(TomlTable):
-    """Limits of the cut; a limit that is left out is not applied."""
+    """Limits of the cut; a maximum that is left out is not applied."""
 
     resultant_n: Positive | None = key("resultant of the force in the XY plane", default=None)
     resultant: Literal["peak", "mean"] = key(
@@ -226,7 +226,7 @@ class Limits(TomlTable):
 
 
 class Feed(TomlTable):
-    """Range of the feed."""
+    """Feed in air, largest feed, and the spindle speed of a program without one."""
 
     air_feed_mm_per_min: Positive | None = key("feed in air; left out: as programmed", default=None)
     approach_mm: NonNegative = key("distance before material at which the feed is that of the cut again", assumed=1.0)

@@ -123,7 +123,7 @@ class PathDemo(Result):
         return "shapegcode convert YOUR.NC -m vx500 -o SHAPED.NC --plots plots"
 
     def tables(self) -> list[Table]:
-        """Tables of the statements, and of time and residual vibration for each command."""
+        """Tables of the paper's statements, and of orbit error, residual vibration and time of each command."""
         statements = (
             Column("place", left=True),
             Column("what", text=True),

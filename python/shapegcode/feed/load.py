@@ -1,4 +1,4 @@
-"""Load along a path at the feed that the machine really reaches, and the curves for pictures."""
+"""Load along a path at the feed that the machine reaches (outside of cuts: as programmed), and curves for pictures."""
 
 from __future__ import annotations
 

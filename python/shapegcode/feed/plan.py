@@ -37,7 +37,7 @@ PROGRAMMED, MAX_FEED, AIR, KEPT, MINIMUM = "programmed", "max_feed", "air", "kep
 
 @dataclass(frozen=True)
 class Travelled:
-    """Travel along a path, one value per station."""
+    """Feed and time along a path, one value of each per station."""
 
     feed_mm_per_min: Vector  # largest on the interval before the station, each a mean over the window of the travel
     time_s: Vector  # time on that interval
@@ -60,7 +60,7 @@ class Mover:
         return 0.5 * self.period_s * sum(filter_.duration_samples for filter_ in self.filters)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
-        """Simulate `path`, a cut with other feeds; return its speed at stations along `along`, mean over the window."""
+        """Simulate `path`; return feed and time on the intervals between stations of `along`, the same cut."""
         raise NotImplementedError
 
 

@@ -239,7 +239,7 @@ def _ground(panel: Axes, material: _core.Material, low: Vector, high: Vector) ->
 
 
 def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
-    """Plot the wall error over distance and axial height, before and after, in one scale.
+    """Plot the wall error over distance and height with original and new feeds, and the largest over the height.
 
     Args:
         schedule: the schedule.
@@ -249,7 +249,7 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
         The panel of the wall error before scheduling.
 
     Raises:
-        ArgumentError: no wall is made.
+        ArgumentError: no wall with a known cutting force.
     """
     walls = schedule.walls
     if walls is None:
@@ -291,7 +291,7 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
 
 
 def _both_sides(low: float, high: float) -> Colormap:
-    """Colours from `low` to `high`, white at 0 and symmetric; `low` <= 0 <= `high`."""
+    """Colours from `low` to `high`: white at 0, equally strong at equal distances from it; `low` <= 0 <= `high`."""
     from matplotlib import colormaps
     from matplotlib.colors import LinearSegmentedColormap
 
@@ -301,7 +301,7 @@ def _both_sides(low: float, high: float) -> Colormap:
 
 
 def with_forces(scene: Scene, schedule: FeedSchedule) -> Scene:
-    """Add the cutting force along each region to the motion: the largest resultant within a revolution."""
+    """Add the cutting force (largest resultant within a revolution) to the motion; 0 where it is not known."""
     loads = schedule.loads
     regions = [[part.region for part in schedule.survey.regions], list(schedule.written.regions)]
     variants = []

@@ -51,7 +51,7 @@ class ResultantForce:
 
 @dataclass(frozen=True)
 class PeakLoad:
-    """Largest value along the program, before and after."""
+    """Largest value along the program, with the original and with the new feeds."""
 
     original: float  # with the original feeds
     emitted: float  # with the new feeds
@@ -97,7 +97,7 @@ class ScheduledRegion:
 
 @dataclass(frozen=True)
 class KeptMove:
-    """A cutting move in material outside the regions: its feed stays."""
+    """A cutting move outside the regions, but in material: its feed stays."""
 
     place: str  # file and line
     feed_mm_per_min: float  # as programmed
@@ -115,10 +115,10 @@ class FeedSchedule(Result):
         tools: names of the tools that cut.
         margin: safety margin to each limit of the load, as a ratio; none to that of the feed per tooth.
         feed_mm_per_min: range of the written feeds.
-        resultant_force_n: resultant along the whole program, cutting moves only.
+        resultant_force_n: resultant over all cutting moves whose load is known.
         peak: largest loads along the program.
         cycle_time_s: time of the whole program.
-        air_time_s: time of cutting moves without engagement.
+        air_time_s: time of cutting moves without engagement, where the load is known.
         blocks: number of blocks with a cutting move of a region.
         limits: limits of the feed by lines, in order.
         regions: sequences of cutting moves between two stops.
@@ -202,7 +202,7 @@ class FeedSchedule(Result):
 
     @cached_property
     def walls(self) -> WallMaps | None:
-        """Form error of the walls along the cutting path; None without walls."""
+        """Form error of the walls along the cutting path; None without a wall whose cutting force is known."""
         return None if self.traces is None else wall_maps(self.survey, self.loads, self.traces)
 
     def _completed(self, scene: Scene) -> Scene:

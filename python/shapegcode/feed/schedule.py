@@ -50,7 +50,7 @@ def schedule_feed(
     resolution_mm: float | None = None,
     on_progress: Progress = lambda _done: None,
 ) -> FeedSchedule:
-    """Set the feeds of a program so that force, deflection, torque, power and chip stay within the tool's limits.
+    """Set the feeds of a program so that force, deflection, torque, power and chip keep the limits of tool and spindle.
 
     Args:
         program: the program, or its file.

@@ -33,12 +33,12 @@ _SHIFT_WORD = re.compile(rb"[XYZIJK]\s*([+-]?[\d.]+)")
 
 @dataclass(frozen=True)
 class Survey:
-    """The tool engagement along a program, whose tools sweep its stock.
+    """Engagement of the tools along a program, from sweeping them through its stock.
 
     Attributes:
         program: the program.
         regions: its regions in order.
-        moves: cutting moves in material outside the regions.
+        moves: cutting moves outside the regions that remove material.
         material: remaining stock.
         warnings: findings, each with its location.
     """

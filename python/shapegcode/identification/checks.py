@@ -16,7 +16,7 @@ from shapegcode.io.units import FloatArray
 
 @dataclass(frozen=True)
 class RecordUse:
-    """Whether one tap or decay was used, and why not."""
+    """Whether a record (of an impact, decay or sweep) or a frequency response was used, and if not, why."""
 
     source: str  # file, with the number of the impact or the channel
     used: bool  # whether the modes were fitted to it
@@ -287,7 +287,7 @@ FOLDING = 0.8  # limit of the strongest frequency, relative to half the sampling
 
 
 def is_clipped(values: FloatArray) -> bool:
-    """Whether a signal is clipped: three or more samples at its extreme, and steeper next to it than a smooth peak."""
+    """Whether a signal is clipped: three or more equal extreme samples, steep on both sides; or a flat top in noise."""
     centred = values - np.median(values)
     largest = float(np.max(np.abs(centred)))
     if largest == 0.0:
@@ -339,7 +339,10 @@ def excited_hz(force_n: FloatArray, period_s: float) -> float:
 def refuse_short(
     record: Record, response: FloatArray, noise: float, band_hz: float | None, warnings: list[str]
 ) -> float:
-    """Refuse a record too short, or sampled too slowly for its strongest mode; returns that mode's frequency, Hz."""
+    """Refuse a record too short, or sampled too slowly; return the frequency of its strongest mode, Hz.
+
+    With a band, its upper end decides whether sampling is too slow; the strongest mode then gives a warning only.
+    """
     half_rate = 0.5 / record.period_s
     if len(response) < _MIN_SAMPLES:
         raise RecordError(

@@ -230,12 +230,12 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
 
 
 def _left(measured: _Measured, hits: Hits, model: ComplexArray) -> ComplexArray:
-    """(impacts, n) residual of the responses of impacts after a model, in the band."""
+    """(impacts, n) responses to impacts minus those of a model; 0 outside the band."""
     return np.where(_inside(measured.parts[0], measured), hits.response - model * hits.force, 0.0)
 
 
 def _in_responses(responses: Sequence[FrequencyResponse], sought: Sought) -> FrfModes:
-    """Search for modes, again with lines weighted by the residual of the first search, and test every mode found."""
+    """Search for modes, search again with lines weighted by the first residual, and test every mode found."""
     parts = tuple(measured_lines(each, sought.exponential_window_s) for each in responses)
     low, high = min(float(each.omega[0]) for each in parts), max(float(each.omega[-1]) for each in parts)
     measured = _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
@@ -254,7 +254,7 @@ def _in_responses(responses: Sequence[FrequencyResponse], sought: Sought) -> Frf
 def _tested(
     measured: _Measured, windows: Sequence[Window], pool: Sequence[StablePole], poles: Sequence[Pole], sought: Sought
 ) -> FrfModes:
-    """Every mode of the windows with its refusal, if any, and the quality of the fit."""
+    """Modes of the windows in the searched band, each with its refusal, if any, and the quality of the fit."""
     modes = [mode for window in windows for mode in _modes(window, measured, pool, sought)]
     low_hz, high_hz = sought.band_hz or (0.0, np.inf)
     modes = _strongest([each for each in modes if low_hz <= each.frequency_hz.value <= high_hz], sought)
@@ -303,7 +303,7 @@ def _weighed(lines: Lines, model: ComplexArray) -> Lines:
 
 
 def _model(parts: Sequence[Lines], windows: Sequence[Window]) -> list[ComplexArray]:
-    """Model of each response, from the windows."""
+    """Model of each response, from the windows; outside of them the response itself."""
     found = [lines.response.copy() for lines in parts]
     for window in windows:
         for row, (lines, left) in enumerate(zip(window.parts, window.fit.left, strict=True)):

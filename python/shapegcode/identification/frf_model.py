@@ -324,7 +324,7 @@ def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
 
 
 def weighted(lines: Lines, noise: FloatArray) -> Lines:
-    """The same lines, weighted by the noise power of each line."""
+    """The same lines with weights 1/sqrt(noise power); very low noise is raised to a minimum."""
     # As acceleration: noise of a displacement integrated from it may exceed all modes at the lowest lines.
     course = lines.omega ** (2.0 - lines.power)
     least = (_MIN_NOISE * float(np.max(np.abs(lines.response * course))) / course) ** 2
@@ -339,7 +339,7 @@ def smoothed(power: FloatArray) -> FloatArray:
 
 
 def correlation_of(left: Sequence[ComplexArray]) -> ComplexArray:
-    """Correlation of the residual between lines 0, 1, 2, ... apart, if it is significant."""
+    """Correlation of the residual between lines 0, 1, 2, ... apart, until it is insignificant."""
     power = sum(float(np.sum(np.abs(part) ** 2)) for part in left)
     count = sum(len(part) for part in left)
     found = [1.0 + 0.0j]

@@ -116,7 +116,7 @@ class Window:
 def search(
     parts: Sequence[Lines], low: float, high: float, most: int, candidates: Sequence[StablePole], starts: Starts | None
 ) -> list[Window]:
-    """Fit the modes of each window, begun from stable poles or `starts`; the response of other modes is subtracted."""
+    """Fit the modes of each window, starting from stable poles or `starts`; other modes are subtracted."""
     final, least = starts is not None, STABLE if starts is None else np.inf
     spare = [(each.omega, each.zeta) for each in candidates if each.share < least]
     if starts is None:
@@ -143,7 +143,7 @@ def search(
 
 
 def _upper_end(parts: Sequence[Lines], low: float, ratio: float, highest: float) -> float:
-    """Upper end of a band: *ratio* times its lower end, higher where frequency lines are sparse."""
+    """Upper end of a band: *ratio* times its lower end, higher where lines are sparse, at most *highest*."""
     fewest = max(
         float(lines.omega[min(int(np.searchsorted(lines.omega, low)) + _BAND_LINES, len(lines.s) - 1)])
         for lines in parts
@@ -157,7 +157,7 @@ def modes_of(windows: Sequence[Window]) -> Starts:
 
 
 def _linear(parts: Sequence[Lines], starts: Starts) -> ComplexArray:
-    """Residues of modes with fixed poles, (responses, m)."""
+    """Residues of modes with fixed poles, (responses, modes)."""
     found = []
     omega, zeta = np.array(starts, dtype=np.float64).reshape(-1, 2).T
     for lines in parts:
@@ -277,7 +277,7 @@ class _Selection:
         return float(samples * np.log(max(squares, 1e-300)) + columns * np.log(samples))
 
     def _reduces(self) -> bool:
-        """Remove the mode that explains least if the evidence does not support it; True if one was removed."""
+        """Remove one of the modes that explain least, if the evidence does not support it; True if one was removed."""
         fit = self.best
         if fit is None:
             return False
@@ -323,7 +323,7 @@ class _Selection:
         return False
 
     def _splits(self) -> bool:
-        """Replace the mode with the largest residual relative to its width by two; True if that is better."""
+        """Replace one of the modes with most residual within their widths by two, if that is better; True if it was."""
         if self.best is None:
             return False
         fit, left = self.best, []
@@ -385,7 +385,7 @@ def evidence_of(fit: ModalFit, share: float) -> float:
 
 
 def fitted(parts: Sequence[Lines], starts: Starts, effort: tuple[int, float] = _FULL) -> ModalFit | None:
-    """A fit, or None without starts or with too few lines."""
+    """A fit; None without starts, with too few lines, or if it fails."""
     if not starts:
         return None
     try:
@@ -409,7 +409,7 @@ def _twins(fit: ModalFit) -> bool:
 
 
 def _apart(fit: ModalFit) -> Starts:
-    """Leave out the modes of a fit that are heavily damped or coincide with a stronger one; if none is, the weakest."""
+    """Modes of a fit, less those heavily damped or near a stronger one; if there are none such, less the weakest."""
     order = np.argsort(np.max(np.abs(fit.residues), axis=0))[::-1]
     kept: list[int] = []
     for index in order:

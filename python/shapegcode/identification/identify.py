@@ -191,7 +191,7 @@ def _refuse_of_decays(what: str, start_s: float | None, *, stops: bool, across: 
 
 
 def _turned_if_opposed(ready: Prepared, found: Identification, sought: model_search.Sought) -> Identification:
-    """The modes found; if none, and some were opposite to the force: those of the reversed responses, if any."""
+    """The modes found; if all are refused, some as opposite to the force: those of the reversed responses, if any."""
     if found.modes or not any(mode.refusal == model_search.OPPOSED for mode in found.refused):
         return found
     text = f"{ready.records[0].source}: {model_search.TURNED}"
@@ -216,12 +216,15 @@ def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record
 
 
 def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: model_search.Sought) -> Identification:
-    """Find modes in the stillest third of the stops of ordinary runs, then again in all that these modes explain."""
+    """Find modes in the first third of the stops of ordinary runs, then again in all stops that these modes explain.
+
+    Stops are in the order of the records; within each record those with the least slow motion come first.
+    """
     forced = [record for record in records if record.force_n is not None]
     if forced:
         raise ArgumentError(f"{forced[0].source}: contains a force: stops are searched in a run without a hammer")
     lowest_hz, highest_hz = sought.band_hz or (None, None)
-    stops = [stop for record in records for stop in split_stops(record, lowest_hz)]
+    stops = split_stops(records, lowest_hz)
     if not stops:
         raise RecordError(
             f"{records[0].source}: no stop after which the machine rests for three cycles of the lowest "
@@ -260,7 +263,7 @@ def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quanti
 
 
 def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
-    """The record of Klipper's resonance sweep; None if no file is one."""
+    """The record of Klipper's resonance sweep; None if no file is one, or with `ignore_force`."""
     found = []
     for path in [Path(each) for each in sources if isinstance(each, str | Path)]:
         if path.is_file():

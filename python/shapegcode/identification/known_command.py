@@ -208,7 +208,10 @@ class _Clock:
         self.correlation = float(np.mean(self.shares))
 
     def _coarse(self) -> tuple[float, float, float, FloatArray]:
-        """Find the clock's rate and start, wait per part, and squared correlation of each part, from below 40 Hz."""
+        """Find the relative error of the clock's rate, its start, the wait per part, and squared correlations by part.
+
+        Only frequencies below 40 Hz are used.
+        """
         command, period = self.command, self.record.period_s
         thinner = max(1, int(0.4 / period / _COARSE_HZ))
         values = resample_poly(self.values, 1, thinner)
@@ -437,7 +440,7 @@ class _Clock:
 
 
 def _in_place(spectra: Spectra, clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
-    """Parts to use: `clear` ones, and parts at their time in the program that stand out or lie between parts to use."""
+    """Parts to use: `clear` ones; and, of those at their programmed time, any that stand out or lie between others."""
     lags = np.linspace(-_AWAY_S, _AWAY_S, 401)
     crossed = spectra.response * np.conj(spectra.command)
     height = np.abs(crossed @ np.exp(spectra.turn[:, None] * lags))
@@ -474,7 +477,7 @@ def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
 
 
 def _lag(spectra: Spectra, block: npt.NDArray[np.intp], own: npt.NDArray[np.bool_], longest_s: float) -> float:
-    """Delay of some parts' response to that predicted by the others, s; 0 for several parts not explained by them."""
+    """Delay of some parts' response behind that predicted from the others, s; 0 for several unexplained parts."""
     others = spectra.of(np.setdiff1d(np.arange(len(own)), block)).ratio() * spectra.command[block]
     expected, response = (np.where(own[block], each, 0.0) for each in (others, spectra.response[block]))
     whole = float(np.sqrt(np.sum(np.abs(expected) ** 2) * np.sum(np.abs(response) ** 2)))

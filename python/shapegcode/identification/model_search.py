@@ -92,7 +92,7 @@ def evidence_of(problem: FitProblem, fit: Fit | None) -> float:
 
 
 def chart_modes(problem: FitProblem) -> Iterator[Starts]:
-    """Modes of the models of a stabilisation chart, by number of modes from 1."""
+    """Yield the modes of each model of a stabilisation chart, in the order of the models: for 1 mode, for 2 ..."""
     orders = (min(map(len, problem.responses)) - 8) // 8  # limited by the samples of the shortest record
     most = max(1, min(_CHART_ORDERS, orders))
     for poles in _core.stabilisation_poles(problem.responses, most, problem.forces):
@@ -286,7 +286,7 @@ def rival_of(order: int, fits: Sequence[Fit], white_share: float) -> Fit | None:
 
 
 def checked_modes(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts: Doubts) -> list[IdentifiedMode]:
-    """The modes by ascending frequency, each with its refusal if any, without drift and modes outside the band."""
+    """The modes by ascending frequency, with refusals; drift (damping too high) and modes outside the band left out."""
     low, high = doubts.band_hz
     found = [
         replace(mode, refusal=_refusal_of(mode, doubts))

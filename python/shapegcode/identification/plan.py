@@ -56,7 +56,7 @@ class TapPlan(Result):
 
     @property
     def answer(self) -> str:
-        """Names the machine."""
+        """The purpose of the plan: a tap test of the machine."""
         return f"tap test of {self.machine or 'a machining centre'}: how to do it"
 
     @property
@@ -129,7 +129,7 @@ def rapid_stop_program(axis: str, distance_mm: float, dwell_s: float) -> str:
 
 
 def _instructions(about: str, recordings: tuple[AxisRecording, ...], stops: tuple[RapidStop, ...]) -> str:
-    """The text for the operator, in lines of 80 characters."""
+    """The text for the operator, wrapped at 80 characters except for indented lines."""
     text = (resources.files("shapegcode") / "data" / "tap_plan.txt").read_text(encoding="utf-8").format(
         highest=max(recordings, key=lambda how: how.highest_hz), pulse_samples=_PULSE_SAMPLES, taps=_TAPS,
         checks=checks, stop_count=2 * _STOPS, program=textwrap.indent(stops[0].program.rstrip("\n"), "    "),

@@ -280,7 +280,7 @@ def _spectrum(found: Identification) -> tuple[FloatArray, FloatArray]:
 
 
 def _seen(frequency_hz: FloatArray, found: Identification, peaks_hz: Sequence[float] = ()) -> slice:
-    """Range of frequencies to draw: without 0 Hz, to well above the highest mode."""
+    """Range of frequencies to draw: without 0 Hz, to well above the highest mode or peak."""
     marked = [*peaks_hz, *(mode.frequency_hz.value for mode in (*found.modes, *found.refused))]
     first = int(frequency_hz[0] == 0.0)
     return slice(

@@ -181,7 +181,7 @@ _GRID = 8  # points of the filter's transform per coefficient
 
 
 def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
-    """Highest frequency to keep in taps, Hz: end of the band or, if higher, that of the highest peak with a margin."""
+    """Highest frequency to keep in taps, Hz: end of the band or, if higher, the highest peak with a margin."""
     excited = max(each.excited_hz or 0.0 for each in ready.usable)
     margin = _MARGIN
     if are_pulses(ready):  # short pulses excite all frequencies up to half the rate

@@ -67,7 +67,7 @@ class IdentifiedMode:
         mass_kg: equivalent (modal) mass at the point of the tap; None without a measured force.
         damping_n_s_per_m: equivalent viscous damping; None without a measured force.
         stiffness_n_per_m: equivalent stiffness; None without a measured force.
-        refusal: why the data do not support this mode; empty: they do.
+        refusal: why this mode is refused: not supported by the data, or beyond the requested number; empty: it is not.
         left_out: refused without a fault of the test: beyond the excited band or the requested number, or with a
             peak below 2 % of the highest supported one; in a sweep or capture also narrower than the line spacing.
         moves: mode shape: motion along X, Y and Z relative to that along the axis of the test; null for an
@@ -168,7 +168,7 @@ class Identification(Result):
     Attributes:
         files: as named, or the sources of records.
         modes: those that the data support, by ascending frequency.
-        refused: modes above the noise that the data do not support, each with the reason.
+        refused: modes above the noise that are refused, each with the reason.
         order: number of modes of the chosen model; 0: no mode.
         evidence: information criterion (lower is better) by number of modes; empty if frequency responses were fitted
             (those given, or those of impacts with many modes).
@@ -360,9 +360,10 @@ class Identification(Result):
         return [table for table in tables if table.rows]
 
     def plots(self) -> Mapping[str, Plot]:
-        """`identify-traces`, `-stabilisation`, `-decay`, and `-response` or `-spectrum`; none without a model.
+        """`identify-traces`, `-stabilisation`, `-decay` if a mode was found, and `-response` (decays: `-spectrum`).
 
-        For a frequency response without time record: `-response` and `-stabilisation`; for a sweep: `-sweep`.
+        For a frequency response without time record: `-response` and `-stabilisation`; for a sweep: `-sweep`. None
+        without a model.
         """
         return self._drawn_beside() if self.fitted or self.fitted_lines or self.sweep is not None else {}
 
@@ -380,7 +381,7 @@ def as_sweep(
 
 
 def by_support(found: Sequence[IdentifiedMode]) -> dict[str, Any]:
-    """Fields for supported modes, refused modes, and the reason if there is no mode."""
+    """Fields for supported modes, refused modes, and the reason if no mode is supported."""
     modes, refused = (tuple(mode for mode in found if bool(mode.refusal) == bad) for bad in (False, True))
     reason = "" if modes else "no mode exceeds the noise"
     if refused and not modes:

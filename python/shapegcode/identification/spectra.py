@@ -3,7 +3,7 @@
 Also finds where a free decay starts in a record that has neither the force nor the command of the axis.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -73,7 +73,7 @@ class Spectrum:
 
 
 def decay_spectrum(record: Record) -> Spectrum:
-    """Amplitude spectrum of the response of a decay with half a Hann window, 1 at the first sample, and its peaks."""
+    """Amplitude spectrum of a decay's response under half a Hann window (1 at the first sample), with its peaks."""
     response = record.response - np.mean(record.response)
     samples = len(response)
     window = 0.5 * (1.0 + np.cos(np.pi * np.arange(samples) / samples))
@@ -264,7 +264,7 @@ def _events(envelope: FloatArray) -> npt.NDArray[np.intp]:
 def _until_next(envelope: FloatArray, starts: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
     """First and last + 1 sample of the decay after each start.
 
-    A decay ends where the envelope is lowest: as a forward RMS it rises before the next event.
+    It ends where the envelope, a forward RMS, is lowest before the next start; the last one ends with the record.
     """
     ends = [int(a) + int(np.argmin(envelope[a:b])) + 1 for a, b in pairwise(starts)]
     return list(zip([int(each) for each in starts], [*ends, len(envelope)], strict=True))
@@ -337,8 +337,13 @@ def part_of(record: Record, begin: int, end: int, name: str = "") -> Record:
     return replace(record, source=f"{record.source}{name}", response=response, force_n=force_n, start_s=at_s)
 
 
-def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
-    """One record for each stop after which the machine rests (the 20 strongest at most), least slow motion first."""
+def split_stops(records: Iterable[Record], lowest_hz: float | None = None) -> list[Record]:
+    """Stops after which the machine rests (the 20 strongest of each record), all by ascending slow motion."""
+    stops = [stop for record in records for stop in _stops_of(record, lowest_hz)]
+    return [part for _, part in sorted(stops, key=lambda stop: stop[0])]
+
+
+def _stops_of(record: Record, lowest_hz: float | None) -> Iterator[tuple[float, Record]]:
     quiet = _without_median(record)
     period = 1.0 / ((lowest_hz or _LOWEST_HZ) * record.period_s)
     envelope = _envelope(quiet, period, _ENVELOPE_PERIODS * period)
@@ -354,9 +359,8 @@ def split_stops(record: Record, lowest_hz: float | None = None) -> list[Record]:
         inside = slice(part[0] + round(period), part[1])
         return float(np.sum(slow[inside] ** 2) / np.sum(quiet[inside] ** 2))
 
-    parts = sorted(sorted(parts, key=lambda part: -envelope[part[0]])[:_MAX_STOPS], key=moved)
-    names = [f" stop at {record.start_s + begin * record.period_s:.2f} s" for begin, _ in parts]
-    return [part_of(record, *part, name) for part, name in zip(parts, names, strict=True)]
+    for part in sorted(parts, key=lambda part: -envelope[part[0]])[:_MAX_STOPS]:
+        yield moved(part), part_of(record, *part, f" stop at {record.start_s + part[0] * record.period_s:.2f} s")
 
 
 def find_decay(record: Record, start_s: float | None = None) -> Record:

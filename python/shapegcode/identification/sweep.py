@@ -144,7 +144,7 @@ def _fit(frequency: FloatArray, power: FloatArray, starts: list[tuple[float, ...
 
 
 def _next(frequency: FloatArray, power: FloatArray, last: _Model) -> _Model:
-    """The best model with one mode more, started where the last residual is largest."""
+    """The best model with one more mode, started at one of the two largest separate maxima of the last residual."""
     left = np.log(power) - _log_power(last.parameters, frequency)
     smooth = np.convolve(left, np.ones(5) / 5.0, "same")
     first = int(np.argmax(smooth))
@@ -193,7 +193,7 @@ _FEWEST_PARTS = 2
 
 
 def is_capture(path: Path) -> bool:
-    """Whether a file contains commands and actual positions of axes."""
+    """Whether a file may be a Sinumerik Edge capture (by its first bytes), or is a servo log."""
     with open_file(path) as file:
         head = file.read(4096)
     return is_edge_json(head) or is_servo_log(path, head)
@@ -229,7 +229,7 @@ def _axis_of(source: str, traces: Sequence[ServoTrace], axis: str | None) -> Ser
 def _response(
     source: str, period_s: float, trace: ServoTrace, band_hz: tuple[float, float] | None, axis: str | None
 ) -> FrequencyResponse:
-    """Ratio −command/actual at the lines that the command excites and on which the parts agree."""
+    """Ratio −command/actual at the excited lines between the first and the last at which the parts agree."""
     windows = _windows(trace, period_s)
     if len(windows) < _FEWEST_PARTS:
         raise RecordError(

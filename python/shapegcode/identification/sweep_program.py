@@ -44,7 +44,7 @@ _MIN_BAND = 1.5  # upper end over lower end
 
 @dataclass(frozen=True)
 class SweptBand:
-    """A part of the program, once up and once down.
+    """A band of frequencies in the program, swept once up and once down.
 
     Attributes:
         low_hz: lowest frequency of the back-and-forth moves.
@@ -74,7 +74,7 @@ class SweepProgram(Result):
         axis: "x", "y" or "z".
         file: file of the program.
         bands: parts of the program, ascending.
-        limit: reason for the upper end of the band.
+        limit: what limits the frequency of moves, at the upper end of the band or above it.
         acceleration_percent: stated limit of the amplitude, relative to the axis' largest acceleration.
         duration_s: simulated duration of the program.
         size_bytes: size of the program.
@@ -238,7 +238,7 @@ class _Planner:
         self._min_mm = _MIN_INCREMENTS * controller.least_increment_mm
 
     def plan(self, low: float, high: float) -> tuple[list[_Move], str]:
-        """Moves from the lowest frequency to the highest that can be reached, and the reason why no higher one can."""
+        """Moves from the lowest frequency to *high*, or as high as can be reached; and a text on what limits them."""
         most = 0.5 / (_SPARE * self._block_s)
         spare = f"with {100.0 * (_SPARE - 1.0):.0f} % margin"
         limit = f"a block lasts {1e3 * self._block_s:g} ms or more, {spare} moves reach {most:.4g} Hz"
@@ -265,7 +265,7 @@ class _Planner:
         return found, limit
 
     def _move(self, hertz: float) -> tuple[_Move, float]:
-        """The move with the wanted amplitude, or the largest possible one, and its amplitude in mm/s²."""
+        """The move with the wanted amplitude, or with nearly the largest possible one, and its amplitude in mm/s²."""
         top = min(self._feed, 60.0 * self._travel_mm / (0.5 / hertz))
         tried = [self._tried(hertz, float(feed)) for feed in np.geomspace(top / 100.0, top, _FEEDS)]
         largest = max(amplitude for _, amplitude in tried)
@@ -281,7 +281,7 @@ class _Planner:
         return move, size
 
     def _tried(self, hertz: float, feed: float) -> tuple[_Move, float]:
-        """The move that takes half a cycle, and its amplitude."""
+        """The move that takes half a cycle, and the amplitude of acceleration of moving it back and forth, mm/s²."""
         half_s = 0.5 / hertz
         low, high = 0.0, min(feed / 60.0 * half_s, self._travel_mm)
         for _ in range(_HALVINGS):
@@ -304,7 +304,7 @@ class _Planner:
 
 
 def amplitude(command_mm: FloatArray, period_s: float, band_hz: tuple[float, float], lasts_s: float) -> float:
-    """Amplitude of the commanded acceleration in a band, as of an equivalent sine of this duration, mm/s²."""
+    """Amplitude, mm/s², of the sine that in `lasts_s` has the energy of the commanded acceleration in a band."""
     acceleration = np.diff(command_mm, 2) / period_s**2
     size = 2 * len(acceleration)
     hertz = np.fft.rfftfreq(size, period_s)
@@ -341,7 +341,7 @@ def _bands(strokes: list[_Move], machine: Machine, seconds: float) -> list[list[
 
 
 def plain_name(name: str) -> str:
-    """A name in the characters that a comment of any control may contain."""
+    """The name in capitals, without characters that some control does not allow in a comment; at most 30."""
     return "".join(sign for sign in name.upper() if sign.isalnum() or sign in " -.")[:30]
 
 

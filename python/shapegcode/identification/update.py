@@ -80,7 +80,7 @@ def update_machine(path: str | Path, found: Identification, *, keep_modes: str =
 
 
 def check_updatable(path: str | Path) -> Machine:
-    """Check before the calculation for faults that make `update_machine` fail whatever the modes."""
+    """Read the machine before the calculation; refuse a built-in one, which `update_machine` could not change."""
     if isinstance(path, str) and path in Machine.builtin_names():
         raise ArgumentError(
             f"{path} is a built-in machine, which stays as it is: shapegcode machine init {path} -o mine.toml makes a "
@@ -102,8 +102,9 @@ def update_modes(
 ) -> MachineUpdate:
     """Replace the modes of one axis in the text of a machine file by identified ones; idempotent.
 
-    A mode within 10 % of one in the file overwrites its table; unmeasured keys stay, except a mass. A mode of the
-    file within 10 % of a refused one stays unchanged. The axis' remaining tables are deleted; identified modes
+    A mode within 10 % of one in the file overwrites its values there. Unmeasured ones stay, except a mass, and so does
+    a frequency uncertainty that is larger than the new one and was not measured. A mode of the file within 10 % of a
+    refused one stays unchanged. The axis' remaining tables are deleted; identified modes
     without a table get new ones.
     """
     if axis not in ("x", "y", "z"):
@@ -452,7 +453,7 @@ _NO_PAIR, _SHARE_DIGITS = 1e3, 4
 
 
 def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
-    """Participations that sum to 1: in the ratio of the residues 1/m, else equal; and a text that says which."""
+    """Participations that sum to 1: as 1/m if all masses m are known, else equal; and a text that says which."""
     masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
     if len(masses) < len(modes):
         return [_rounded(1.0 / len(modes), _SHARE_DIGITS)] * len(modes), "equal shares"
@@ -461,7 +462,7 @@ def shares_of(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
 
 
 def matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:
-    """Index of the old mode for each new mode: most pairs within 10 %, then the smallest sum of distances."""
+    """Index of the old mode for new modes that have one: most pairs within 10 %, then the smallest sum of distances."""
     if not old_hz or not modes:
         return {}
     new_hz = np.array([mode.frequency_hz.value for mode in modes])

@@ -1,1 +1,1 @@
-"""Measured and written files."""
+"""Reads measurements and other files, and writes files."""

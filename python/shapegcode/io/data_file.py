@@ -119,7 +119,7 @@ class DataFile:
             yield from self._checked(cast(BinaryIO, packed))
 
     def read(self) -> bytes:
-        """Read its whole content, unpacked; see `pieces`."""
+        """Read the whole content of the file, unpacked; see `pieces`."""
         if self.kind != "gzip" and self.size > _MAX_BYTES:
             raise self._fault(f"{self.path}: {self.size} bytes: at most {_MAX_BYTES} are read at once")
         return b"".join(self.pieces())
@@ -234,7 +234,7 @@ _TEMPORARY = re.compile(r"\..+\.[0-9a-f]+\.tmp")  # names of earlier versions ha
 
 @contextlib.contextmanager
 def named_errors(path: str | Path) -> Iterator[None]:
-    """Set *path* in file system errors: a failed write() has no name, a temporary file another."""
+    """Name *path* in file system errors: a failed write() names no file, others may name a temporary one."""
     try:
         yield
     except OSError as error:
@@ -271,7 +271,7 @@ def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
 
 
 def _target_of(path: str | Path) -> Path:
-    """Target of a symbolic link."""
+    """The path with symbolic links resolved; raises for a loop of links."""
     target = Path(os.path.realpath(path))
     if target.is_symlink():  # realpath fails only for a loop of links
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))

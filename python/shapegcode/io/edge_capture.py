@@ -221,7 +221,7 @@ class EdgeCapture:
             (n,) in mm or degrees.
 
         Raises:
-            RecordError: the signal is not in the file.
+            RecordError: no such axis, or the signal is not in the file.
         """
         number = self.axis(axis).number
         values = self.column("ENC_POS" if actual else "DES_POS", number)
@@ -264,7 +264,7 @@ class EdgeCapture:
             (n,) in mm/s or degrees/s; NaN for a single sample between gaps.
 
         Raises:
-            RecordError: the position of the axis is not in the file.
+            RecordError: no such axis, or its position is not in the file.
         """
         position_of = self.position(axis, actual=actual)
         out = np.full(len(position_of), np.nan)

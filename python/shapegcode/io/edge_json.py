@@ -129,7 +129,7 @@ def _counters(
 
 
 def _key_of(table: Mapping[str, Any], name: str) -> Any:
-    """Value by a key in any case, since versions differ ("HfProbeCounter"); None if missing."""
+    """Value of a key, capital or small letters alike, since versions differ ("HfProbeCounter"); None if missing."""
     if name in table:
         return table[name]
     return next((value for key, value in table.items() if key.lower() == name.lower()), None)

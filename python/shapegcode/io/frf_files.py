@@ -47,7 +47,7 @@ _BARE_COLUMNS = (3, 4)  # allowed numbers of columns without a header: frequency
 
 
 def part_of(text: str) -> str | None:
-    """Part of a frequency response in a column, by its header."""
+    """The part of a frequency response that a column contains, by its header; None: not known."""
     if re.search(r"\|[^|]+\|", text):
         return "magnitude"
     return next((_WORDS[word] for word in words_of(text) if word in _WORDS), None)
@@ -109,7 +109,7 @@ def read_frf_text(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
 
 
 def _blank_cells(path: Path, table: TextTable) -> list[str]:
-    """Header cells separated by blanks, each with the unit after it: ``Frequency [Hz] Real [m/N]``."""
+    """Header cells separated by blanks, with units: ``Frequency [Hz] Real [m/N]``; empty if not one per column."""
     line = utf8_text(path).split(b"\n")[table.layout.header_line - 1].decode("utf-8", "replace")
     cells = re.findall(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])]+)?", line.strip(" #%/*\r\n"))
     return cells if len(cells) == table.layout.columns else []
@@ -211,7 +211,7 @@ except Exception as error:  # SciPy raises what its parts do
 
 
 def is_mat(path: Path, head: bytes) -> bool:
-    """Whether it is a MATLAB file."""
+    """Whether a file is a MATLAB file."""
     return head[:6] == b"MATLAB" or path.suffix.lower() == ".mat"
 
 
@@ -405,7 +405,7 @@ def _axis(path: Path, root: Element) -> tuple[str | None, list[str]]:
 
 
 def _lines(path: Path, controller: Element | None, name: str) -> tuple[FloatArray, Any] | None:
-    """Frequencies and complex values of a response; the last one of its name, which the tuning used."""
+    """Frequencies and values (complex or real) of the last response of a name, the one that the tuning used."""
     if controller is None:
         return None
     found = [each for each in controller.iter("FrequencyResponseFunction") if each.get("name") == name]

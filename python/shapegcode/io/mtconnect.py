@@ -282,7 +282,7 @@ class _Odd:
         return item
 
     def pairs(self, number: int, line: bytes, fields: list[bytes]) -> tuple[tuple[Item, bytes], ...]:
-        """(item, value) pairs of a line; empty for other lines, noted unless blank, comment or asset text."""
+        """(item, value) pairs of a line; a line without any is noted unless blank, a comment or text of an asset."""
         if self.until:
             if line.strip() == self.until:
                 self.until = b""

@@ -146,7 +146,7 @@ class _Chooser:
         return _Column(index, self.labels[index], self._factor(index, "time", options.time_unit))
 
     def force(self) -> _Column | None:
-        """The column of the force; None, for a free decay: no column, or --ignore-force."""
+        """The column of the force; None (a free decay) if there is none, or with --ignore-force."""
         options = self.options
         if options.ignore_force:
             return None
@@ -289,7 +289,7 @@ def is_klipper(head: bytes) -> bool:
 
 
 def klipper_options(options: ReadOptions) -> ReadOptions:
-    """Options with Klipper's units, which its files do not state: s and mm/s²."""
+    """Options with Klipper's units (s, mm/s²) unless others are given, as its files state none; without a force."""
     scaled = options.response_scale is not None or options.response_unit is not None
     return replace(
         options,

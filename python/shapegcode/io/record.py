@@ -273,7 +273,7 @@ def frequency_factor(text: str) -> float:
 
 
 def ratio_unit(text: str) -> tuple[Unit, float] | None:
-    """Unit of a response over a force: ``m/N``, ``(m/s²)/N``, ``µm/N``, ``g/N``, ``m/s^2/N``, ``1/kg``."""
+    """Unit of the response and factor to SI, from ``m/N``, ``(m/s²)/N``, ``µm/N``, ``1/kg`` ...; None: unknown."""
     plain = text.strip().strip("[]")
     if re.fullmatch(r"(1/kg|kg\^?-1)", plain):
         unit = find_unit("m/s²")
@@ -461,7 +461,7 @@ def even_grid(times_s: FloatArray) -> EvenGrid:
 
 
 def resample(values: FloatArray, times_s: FloatArray, grid: EvenGrid) -> FloatArray:
-    """Values on a grid of the band-limited signal that fits the samples best: least squares of sinc functions."""
+    """Values, at the points of a grid, of the band-limited signal that fits the samples best (least squares, sinc)."""
     offset = float(np.mean(values))
     at = (times_s - grid.times_s[0]) / grid.period_s
     first = np.floor(at).astype(int) - _REACH + 1

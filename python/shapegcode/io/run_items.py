@@ -70,7 +70,7 @@ for _role, _words in _NAMES.items():
 
 
 def stated_feed_unit(text: str) -> str:
-    """Name of a unit of feed, in any spelling."""
+    """Standard name of a unit of feed given in any spelling; raises for other units."""
     unit = find_unit(text)
     if unit is None or unit.measures != "velocity":
         raise RecordError(f"unit {text!r} of the feed: must be one of {units_of('velocity')}")
@@ -125,7 +125,7 @@ class ItemTable:
         return None
 
     def sought(self, role: Role) -> str:
-        """Names searched for a role, for messages."""
+        """The name chosen for a role, or the first six of those that are searched, for messages."""
         return self.chosen.get(role) or ", ".join(_NAMES[role].split()[:6])
 
 

@@ -236,7 +236,7 @@ def _time(cells: list[str], header: _Header, stamps: Stamps) -> tuple[bytes, flo
 
 
 def _point(cell: str) -> str:
-    """Replace a decimal comma by a point."""
+    """Replace a decimal comma by a point; thousands points before it are removed."""
     return without_thousands(cell.encode()).decode().replace(",", ".") if "," in cell else cell
 
 

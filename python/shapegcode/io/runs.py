@@ -1,4 +1,4 @@
-"""Runs of programs in a log: values of their items over time; cut out of the events of a log.
+"""Runs of programs, cut out of the events of a log: the values of the log's items over time.
 
 A run lasts from ACTIVE to PROGRAM_COMPLETED, READY or the like; `run_items.STATES` has the words of controls.
 """
@@ -113,7 +113,7 @@ _CLOCKS_APART = 0.01
 
 @dataclass
 class Hold:
-    """A hold, an interruption, a stop."""
+    """A hold, an interruption or a stop in a log."""
 
     start: float
     word: str
@@ -226,7 +226,7 @@ def _began_again(hold: Hold, part: RunPart, tracks: Sequence[Track]) -> bool:
 
 
 def run_of(part: RunPart, tracks: Sequence[Track], feed_unit: str | None, notes: FileNotes) -> RunLog:
-    """Build the run."""
+    """Build the log of one run."""
     signals = {role: _best(part, tracks, role, notes) for role in _SIGNALS}
     block, counts = signals["block"], "line"
     inside = ([p for p in pairs if p[0] >= -_LEAD_IN_S] for _, pairs in _text_values(part, tracks, "block_text"))
@@ -501,7 +501,7 @@ class RunCutter:
             yield from self._break_off(line, time, word)
 
     def _break_off(self, line: int, time: float, word: str) -> Iterator[RunLog]:
-        """End a run whose status shows no completion (READY, for example); a held run ends where its hold began."""
+        """End a run that shows no completion; a held run ends where its hold began, except at UNAVAILABLE or OFF."""
         run = self._open
         assert run is not None
         name = self._status.name if self._status else ""
@@ -523,7 +523,7 @@ class RunCutter:
     # --- the ends of runs ---
 
     def _finish(self, end: float, word: str | None) -> Iterator[RunLog]:
-        """Yield the run in progress; *word*: what ended it, None: the log ends first."""
+        """End and yield the run in progress, in parts if restarted; *word*: what ended it; None: the log lacks it."""
         run = self._open
         assert run is not None
         self._open, self._given = None, True

@@ -23,7 +23,7 @@ _LOG_HEAD_BYTES = 65_536
 
 
 def chunks(path: Path) -> Iterator[bytes]:
-    """Yield pieces of a file without a byte order mark; UTF-16 becomes UTF-8."""
+    """Yield pieces of a file: a byte order mark is removed, and UTF-16 becomes UTF-8."""
     decoder: codecs.IncrementalDecoder | None = None
     first = True
     with DataFile(path) as file:

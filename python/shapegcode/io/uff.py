@@ -324,7 +324,7 @@ def is_frf_uff(path: Path, options: ReadOptions) -> bool:
 
 
 def read_frf_uff(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
-    """Read the frequency responses of a universal file; if some of them are at the driving point, only those."""
+    """Read frequency responses of a universal file: numbered ones, else along the axis, at the driving point if any."""
     file = UffFile(path, options)
     functions = _functions(file)
     units = next((file.dataset(k) for k, kind in enumerate(file.types) if kind == 164), None)

@@ -98,7 +98,7 @@ def factor_between(unit: Unit, wanted: str) -> float:
 
 
 def is_foreign_unit(text: str, measures: str | None) -> bool:
-    """Whether a text is a unit without conversion, such as V, for a quantity of this kind."""
+    """Whether a text is a unit, such as V, that is not converted for a quantity of this kind."""
     plain = re.sub(r"[\s^]", "", text.lower()).replace("²", "2").replace("μ", "µ")
     return plain in _FOREIGN or (measures == "time" and plain in _FOREIGN_TIMES)
 

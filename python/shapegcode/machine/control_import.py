@@ -59,7 +59,7 @@ def import_parameters(
 
     Raises:
         MachineError: not a dump or table, an implausible value, or an axis limit that is in neither dump nor base.
-        ArgumentError: modes to keep for an axis without modes in the base, or for a rigid one.
+        ArgumentError: an unknown axis, or modes to keep for a rigid axis or one without modes in the base.
         OSError: a file cannot be read.
     """
     data, file = (dump, source) if isinstance(dump, bytes) else (read_file(dump, _MAX_DUMP_BYTES), str(dump))
@@ -213,7 +213,7 @@ class _Ini:
 
 
 def read_ini(file: str | Path, *, name: str | None = None) -> IniMachine:
-    """Read the machine of a LinuxCNC INI file, with *name* or [EMC] MACHINE; its modes are not known."""
+    """Read the machine of a LinuxCNC INI file, without modes; its name is *name*, [EMC] MACHINE or the file's."""
     ini = _Ini(str(file), read_file(file, _MAX_BYTES).decode("utf-8", "replace"))
     if not any(section == "TRAJ" for section, _ in ini.entries):
         raise MachineError(str(file), (Problem("", "", "not an INI file of LinuxCNC: it has no section [TRAJ]"),))

@@ -74,7 +74,7 @@ class LinuxcncPlanner(TomlTable):
 
 
 class KlipperPlanner(TomlTable):
-    """Motion settings of printer.cfg; max_velocity and max_accel are the smaller of X and Y."""
+    """Motion settings of printer.cfg, except max_velocity and max_accel: these are the smaller limits of X and Y."""
 
     square_corner_velocity_mm_per_s: Annotated[NonNegative, Field(le=1000)] = key(
         "[printer] square_corner_velocity: speed at a corner of 90 degrees", assumed=5.0
@@ -417,7 +417,7 @@ class SpindleTimes(InlineTable):
 
 
 class TimeScatter(InlineTable):
-    """Standard deviations of times that no parameter explains."""
+    """Standard deviations of the random scatter of times."""
 
     cuts_percent: Annotated[NonNegative, Field(le=100)] = key("scatter of the cutting time of a tool")
     between_cuts_s: Seconds = key("scatter of the time between two cuts")

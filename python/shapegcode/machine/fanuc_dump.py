@@ -4,7 +4,7 @@ from them.
 Both grammars of CNC-PARA.TXT are read: ``N01420Q1A1P24000.0A2P24000.0`` (30i, 0i-D, 0i-F; the 15i leaves Q1 out) and
 ``N01825 A1 P 3000 A2 P 3000`` (16, 18, 21). Tables: ``G10G90L10P1R185.676`` (TOOLOFST.TXT),
 ``G10L2P1X-865.475Y-934.435Z-833.845`` (EXT_WKZ.TXT), ``G10L85P500(4044000000000000)`` (MACRO.TXT: the value as a double
-in hexadecimal), ``#500=[25283*65536]/134217728`` (the same of older series). Lines end in LF, CR-LF or LF-CR-CR.
+in hexadecimal), ``#500=[25283*65536]/134217728`` (MACRO.TXT of older series). Lines end in LF, CR-LF or LF-CR-CR.
 """
 
 import ast
@@ -214,7 +214,7 @@ class DumpValues:
         return max(values, default=None)
 
     def per_axis(self, number: int, high: float = _MAX_VALUE, unit: str = "", low: float = 0.0) -> list[float] | None:
-        """The values of X, Y, Z, or three times the one value without an axis; None if the dump has neither."""
+        """The values of X, Y, Z; or, for all three, the one value without an axis; None if the dump has neither."""
         entries = self.entries(number)
         if len(entries) < 3:
             one = self.dump.get(number)
@@ -222,7 +222,7 @@ class DumpValues:
         return [self._number(entry, low, high, unit) for entry in entries]
 
     def entries(self, number: int) -> list[Entry]:
-        """Entries of a parameter for X, Y and Z, in this order."""
+        """Entries of a parameter for X, Y and Z, in this order, as far as the dump has them."""
         found = (self.dump.get(number, axis) for axis in self.axes)
         return [entry for entry in found if entry is not None]
 
@@ -232,7 +232,7 @@ class DumpValues:
         return None if entry is None else self.bit_of(entry, bit)
 
     def bit_of(self, entry: Entry, bit: int) -> bool | None:
-        """A bit of a value, counted from the right, from 0; if it is not eight bits, note a problem and return None."""
+        """A bit of a value of eight bits, from the right, from 0; for another value note a problem and return None."""
         if len(entry.text) != 8 or set(entry.text) - {"0", "1"}:
             name = f"parameter {entry.number} {entry.target}".rstrip()
             self.problems.append(Problem(name, entry.text, "must be eight bits, 0 or 1", entry.line))

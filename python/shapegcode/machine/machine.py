@@ -216,13 +216,16 @@ class Machine(TomlTable):
 
     @property
     def bears_override(self) -> bool:
-        """True if emitted blocks are override-tolerant: by emission.override, or by verdict.override_percent."""
+        """True if emitted blocks are override-tolerant: emission.override any, or ask with verdict.override_percent."""
         stated = self.verdict.override_percent != (100.0, 100.0)
         return self.emission.override == "any" or (self.emission.override == "ask" and stated)
 
     @property
     def dial_positions(self) -> tuple[float, ...]:
-        """Override ratios of override-tolerant blocks: limits of [verdict] (not set: 0.7, 1.2), each 0.1 between."""
+        """Override ratios of override-tolerant blocks: both limits of [verdict], and the multiples of 0.1 between them.
+
+        If both limits are 100 %, they are replaced by 0.7 and 1.2.
+        """
         low, high = self.verdict.override_percent
         if low == high == 100.0:
             low, high = _USUAL_DIAL_PERCENT

@@ -256,7 +256,7 @@ class MachineDescription(Result):
 
     @property
     def answer(self) -> str:
-        """Number of unverified values, and the most important one."""
+        """Number of unverified values; for a program, also how many matter, and which one most."""
         name, count = self.machine["name"], len(self._open())
         if self.program is None:
             if not count:
@@ -340,7 +340,7 @@ class MachineDescription(Result):
 
 
 def _by_table(values: Iterable[_Keyed]) -> Iterator[str | _Keyed]:
-    """Yield values, with the name of each table before its first one."""
+    """Yield values, with the name of each table before its first value."""
     for table, rows in groupby(values, key=lambda value: value.key.rpartition(".")[0]):
         yield from [table] if table else []
         yield from rows
@@ -410,7 +410,7 @@ class MachineDifference(Result):
         first: name or file of the first machine.
         second: name or file of the second machine.
         keys: number of compared keys.
-        different: differing keys, in the order of the file.
+        different: differing keys, in the order of the reference of the machine file.
         warnings: none.
     """
 

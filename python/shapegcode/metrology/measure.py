@@ -61,8 +61,8 @@ def measure(
         plant: "modal" or "feed-drive", see `sg.stream`.
         against: the program whose path is the nominal one; None: the first of several if it has no shaped region
             and each of the others has one; else each program's own path.
-        lines: sections by first and last lines of the nominal program; None: sequences of lines of one direction
-            and of arcs about one centre.
+        lines: sections by first and last lines of the nominal program; None: sequences of lines of one direction,
+            of arcs about one centre, and of short moves (a curve).
         band_um: settled means within this distance of the command.
         station_spacing_mm: largest distance between two measured stations of walls.
         cutoff_mm: cut-off lambda c of the roughness; None: the standard's, by the length of a section.

@@ -19,7 +19,10 @@ _SHARE_OF_PART, _MIN_SHOWN_UM, _MAX_MARKED = 0.03, 1e-3, 12
 
 
 def plots_of(measurement: Measurement) -> dict[str, Plot]:
-    """Pictures by name, of the region with the largest deviation of walls; none without measured walls."""
+    """Pictures by name, of the region with the largest deviation of walls.
+
+    Empty unless walls of a region were measured in every program.
+    """
     if _worst_region(measurement) is None:
         return {}
     return {"measure-part": partial(plot_part, measurement), "measure-walls": partial(plot_walls, measurement)}

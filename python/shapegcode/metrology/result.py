@@ -52,7 +52,7 @@ def _program_columns(names: Sequence[str]) -> tuple[Column, ...]:
 
 
 def _summary_table(title: str, programs: Mapping[str, MeasuredProgram], band_um: float) -> Table:
-    """Table of the largest value of each figure with section and line, one column per program."""
+    """Table of cutting time, contour error, and the largest value of each other figure with section and line."""
     all_of = programs.values()
     largest = (each.contour_error_um.response.max for each in all_of)
     rows = [
@@ -312,7 +312,7 @@ class MeasuredProgram:
         return f"{self.program}: simulated {simulated}, measured against {path}{judged}"
 
     def verdict(self, limit_um: float) -> str:
-        """Sentence: within tolerance or not, by how much, and where."""
+        """Sentence: the largest deviation; not judged, within tolerance, or out of tolerance by how much and where."""
         largest = self.contour_error_um.response.max
         within = f"deviates from the path by up to {largest:.2f} µm"
         if self.ok is None:
@@ -377,7 +377,7 @@ class Measurement(Result):
 
     @property
     def answer(self) -> str:
-        """For each judged program: within tolerance, or by how much out."""
+        """For each judged program: within tolerance, or how far out; if none is judged, the deviation of each."""
         judged = [program for program in self.programs if program.ok is not None] or self.programs
         return "; ".join(program.verdict(self.contour_tolerance_um) for program in judged)
 

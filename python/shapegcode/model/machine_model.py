@@ -1,6 +1,7 @@
 """Core model of a machine, made from the machine file and used by every simulation.
 
-`SimulatedController` plans a path or simulates it block by block; shaped blocks are planned only if `always_plans`.
+`SimulatedController` plans a path or simulates it block by block. Shaped blocks are planned only if
+`MachineModel.always_plans`, or for the operating condition with the look-ahead left on.
 """
 
 from __future__ import annotations
@@ -256,7 +257,7 @@ class MachineModel:
 
     @cached_property
     def shaped(self) -> SimulatedController:
-        """Controller for shaped blocks: one by one, without look-ahead if that can be switched off."""
+        """Controller for shaped blocks: one by one, or with look-ahead if that cannot be switched off."""
         model = _core.for_shaped_blocks(fanuc_model(self.machine))
         model.block_end = self.own_rule
         return SimulatedController(model)
@@ -275,7 +276,7 @@ class MachineModel:
 
     @property
     def vibration_memory_s(self) -> float:
-        """Time in which a vibration decays to a millionth, s; 0 if a mode is undamped, or if there is none."""
+        """Time in which a vibration decays to a millionth, s; 0 without modes, or if one is undamped."""
         slowest = self.slowest_decay_per_s
         return math.log(1e6) / slowest if _MIN_DECAY_PER_S < slowest < math.inf else 0.0
 
@@ -299,7 +300,7 @@ class MachineModel:
         self, *, plant: str = "modal", filters: Sequence[_core.Fir] = (), shift: float = 0.0, only: str | None = None,
         offset: Offset = NO_OFFSET,
     ) -> _core.SimulationOptions:  # fmt: skip
-        """Interpolation period and plant, with acceleration filters after interpolation."""
+        """Options of a simulation: interpolation period, plant, and acceleration/deceleration after interpolation."""
         if plant not in PLANTS:
             raise _core.ArgumentError(f"plant = {plant!r}: must be one of {', '.join(PLANTS)}")
         options = _core.SimulationOptions()

@@ -44,8 +44,9 @@ def moving_modes(
     """Modes that move X, Y, Z, each with its variation over the commanded position.
 
     Each frequency is shifted by `shift` times its uncertainty, and damping is lowered by |`shift`| times the
-    uncertainty of damping. A table over the part's mass is evaluated; with a table over a position the nominal mode is
-    listed, with the table. A mode that moves several axes is listed for each of them.
+    uncertainty of damping; `only`: the one mode to shift, such as "x.1". A table over the part's mass is evaluated;
+    with a table over a position the nominal mode is listed, with the table. A mode that moves several axes is listed
+    for each of them.
     """
     found: list[Pairs] = [[], [], []]
     for name, axis, mode in numbered_modes(machine):
@@ -82,7 +83,7 @@ def excited_modes(machine: Machine) -> list[list[_core.Mode]]:
 
 
 def slowest_excited_hz(machine: Machine) -> list[float]:
-    """Lowest frequency that X, Y, Z excite, by the tables of their modes; infinite for an axis without any."""
+    """Lowest frequency that each of X, Y, Z excites, by the tables of the modes; infinite if it excites none."""
     found = [math.inf] * 3
     for exciting, _, _, mode in _excitations(machine):
         found[exciting] = min(found[exciting], slowest_mode(mode)[0])
@@ -117,7 +118,7 @@ def slowest_mode(mode: AxisMode) -> tuple[float, float]:
 
 
 def damping_scale(mode: AxisMode, shift: float) -> float:
-    """Factor on a mode's damping ratio if its frequency is shifted by `shift` of its uncertainty.
+    """Factor on a mode's damping ratio if its frequency is shifted by `shift` times its uncertainty.
 
     Either sign of `shift` lowers the damping. To first order a shaper's residual is the same at higher and lower
     damping, as it depends on the pole's distance |dw/w + i dzeta|; to second order it is larger at lower damping.

@@ -74,7 +74,7 @@ class Allowed:
             The allowed differences.
 
         Raises:
-            ArgumentError: a word that is not in `KINDS` nor ``path=LENGTH`` above 0 with its unit.
+            ArgumentError: a word that is neither in `KINDS` nor a ``path=LENGTH`` above 0 with its unit.
         """
         kinds, path_um = set(), 0.0
         for word in (words.split(",") if words else ()) if isinstance(words, str) else words:
@@ -230,7 +230,7 @@ class Comparison(Result):
 
     @property
     def answer(self) -> str:
-        """Unchanged items, distance of the paths, and the first difference that is not allowed."""
+        """Unchanged items, distance of the paths, and a difference that is not allowed: an early end, or the first."""
         always = (self.count(kind) for kind in _ALWAYS)
         unchanged = ", ".join(f"{each.unchanged} of {each.original} {_noun(each.kind)}" for each in always)
         others = (each for each in self.counts if each.differs and each.kind not in (*_ALWAYS, "emission"))
@@ -261,7 +261,7 @@ class Comparison(Result):
         return f"check {first.place}; if intended, allow it: --allow {','.join(words)}."
 
     def key_figures(self) -> tuple[Figure, ...]:
-        """Distance of the paths, and number of differences."""
+        """Distance of the paths, and number of differences that are not allowed."""
         from shapegcode.results.page.model import Figure
 
         return (
@@ -308,8 +308,8 @@ def compare(
 ) -> Comparison:
     """Compare two programs, and list what differs.
 
-    Calls, macros and coordinate modes are compared as expanded blocks. The paths of a cut are
-    compared along each other, so that blocks may differ.
+    Calls, macros and coordinate modes are compared as expanded blocks. Of a cut the two paths are compared, by the
+    largest distance of one from the other: its blocks may differ.
 
     Args:
         original: the first program, or its file; a truncated file is read up to its end.

@@ -57,7 +57,7 @@ def _kilobytes(file: str, name: str) -> int | None:
 
 
 def _of_groups() -> list[int | None]:
-    """Memory left in the control group (version 2) of this process and in those that contain it, bytes."""
+    """Memory left, bytes, in each control group (version 2) with a limit that contains this process."""
     left: list[int | None] = []
     with contextlib.suppress(OSError, ValueError):
         own = _CGROUP / Path("/proc/self/cgroup").read_text().partition("::")[2].strip().lstrip("/")
@@ -69,7 +69,7 @@ def _of_groups() -> list[int | None]:
 
 
 def _of_own_limits() -> list[int | None]:
-    """Address space and data left by `ulimit`, bytes."""
+    """Address space and data that the limits of `ulimit` still permit, bytes; nothing for those without a limit."""
     try:
         import resource
     except ModuleNotFoundError:  # not on this system

@@ -44,7 +44,7 @@ class Expansion(Result):
 
     @property
     def answer(self) -> str:
-        """The expanded program, and whether it differs from the original."""
+        """Name, lines and bytes of the expanded program, and whether there was something to expand."""
         what = "expanded" if self.expanded else "nothing to expand: the program is unchanged"
         return f"{self.program}: {self.lines} lines, {self.size_bytes} bytes, {what}"
 

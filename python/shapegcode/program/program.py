@@ -231,7 +231,7 @@ class Program:
         return self.core.view() if self.unexpanded is None else memoryview(self.unexpanded)
 
     def text_slice(self, begin: int, end: int) -> bytes:
-        """Bytes of the text read between two offsets.
+        """Bytes between two offsets of the text that was read.
 
         Args:
             begin: offset of the first byte.
@@ -308,7 +308,7 @@ class Program:
 
     @cached_property
     def doubt(self) -> tuple[int, str] | None:
-        """Warning about a word with another meaning on another control, if the control is not recognized."""
+        """Line and warning: a word that other controls read differently; None: no such word, or a known control."""
         is_stated = self.reading.machine.controller.dialect != "auto"
         if is_stated or self.reading.emitted or self.foreign is not None:
             return None
@@ -373,7 +373,8 @@ class Program:
             data: bytes from which it was read.
 
         Returns:
-            The value of `input.arc_centre` with which the whole program is readable; empty if it is not.
+            The other value of `input.arc_centre`, if an alarm is of an arc and the whole program is readable with that
+            value; empty if not, and for a program of another control.
         """
         if self.foreign is not None:
             return ""
@@ -488,7 +489,7 @@ def between_increments(region: _core.Region, increment_mm: float) -> list[bool]:
 
 
 def _other_arc_centre(data: bytes, options: _core.ReaderOptions, message: str) -> str:
-    """The other meaning of I, J, K, if the whole program is readable with it; else empty."""
+    """The other meaning of I, J, K, if *message* is of an arc and the program is readable with it; else empty."""
     if _ARC_OFF_RADIUS not in message:
         return ""
     options.absolute_arc_centres = not options.absolute_arc_centres

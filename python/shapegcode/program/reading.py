@@ -187,7 +187,7 @@ class Reading:
         return self.absolute_arc_centres
 
     def options(self, folder: Path | None, foreign: ForeignSettings | None = None) -> _core.ReaderOptions:
-        """Options of the core for this reading; `foreign`: the text was expanded from another control's program."""
+        """Options of the core for this reading; `foreign`: settings of the other control whose program was expanded."""
         options = reader_options(self.machine, emitted=self.emitted)
         options.absolute_arc_centres = self.has_absolute_arc_centres
         options.probe_lines = list(self.probe_lines)
@@ -203,7 +203,7 @@ class Reading:
         return options
 
     def _called(self, find: Finder, foreign: ForeignSettings | None, number: int) -> tuple[str, bytes] | None:
-        """Find a program in another file, and store it for reading again without these files."""
+        """Find a program in another file, and store its text, so that the file is not needed when it is read again."""
         if number not in self.called and (found := find(number)) is not None:
             file, text = found
             if foreign is not None and foreign.called_text is not None:
@@ -333,7 +333,7 @@ PROGRAM_SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".
 
 
 def program_bytes(path: str | Path, most: int) -> bytes:
-    """Read the content of a program file."""
+    """Read the content of a program file; of a longer one only `most` + 1 bytes."""
     with open_file(path) as file, named_errors(path):
         size = min(os.fstat(file.fileno()).st_size, most + 1)
         require_memory(str(path), 2 * size, f"{size} bytes of program text are to be read")
@@ -348,7 +348,7 @@ def given_text(program: str | Path, machine: Machine) -> tuple[bytes, str, Path 
 
 
 def program_loader(folders: Sequence[Path], most: int) -> Finder:
-    """Make a finder of called programs' files: O0123, O123 or 0123, with any of `PROGRAM_SUFFIXES`."""
+    """Make a finder of called programs' files: O0123, O123, o0123, 0123, O00000123, with any of `PROGRAM_SUFFIXES`."""
 
     def load(number: int) -> tuple[str, bytes] | None:
         stems = (f"O{number:04d}", f"O{number}", f"o{number:04d}", f"{number:04d}", f"O{number:08d}")

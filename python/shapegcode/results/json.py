@@ -154,7 +154,7 @@ def _warn_of_old_key(what: str, key: str, new: str) -> None:
 
 
 class Streamed(list[Any]):
-    """Entries converted one by one in `json.JSONEncoder.iterencode`; `json.dumps` would see an empty list."""
+    """Entries that are converted one by one, as `json.JSONEncoder.iterencode` asks for them."""
 
     def __init__(self, entries: Sequence[object]) -> None:
         super().__init__()

@@ -86,7 +86,7 @@ class Trace:
 
     @property
     def rest_s(self) -> float:
-        """Instant at which the set-points finally come to rest: first sample at the final position."""
+        """Instant at which the set-points finally rest: first sample from which on all are at the final position."""
         moved = np.flatnonzero((np.abs(self.command_mm - self.command_mm[-1]) > _STILL_MM).any(axis=1))
         return self.start_s + (float(moved[-1] + 1) * self.period_s if len(moved) else 0.0)
 
@@ -198,7 +198,7 @@ def plot_feed(views: Sequence[View], ax: Axes | None = None, *, part: str = "") 
 def plot_vibration(views: Sequence[View], ax: Axes | None = None, *, part: str = "") -> Axes:
     """Plot the vibration of each axis about its command, and what remains after the stop.
 
-    Axes that do not vibrate are named, not drawn.
+    Axes that do not vibrate are named, not drawn; if none vibrates, the first that moves is drawn.
 
     Args:
         views: time ranges, side by side.

@@ -195,7 +195,7 @@ class Outcome(OldNames):
         return 0 if self.ok else 1
 
     def to_dict(self) -> dict[str, Any]:
-        """Content of ``--json``: the fields and `json_extra` as JSON types; see `shapegcode.results.json`."""
+        """The fields and `json_extra` as JSON types: ``--json`` without what the command adds, such as provenance."""
         found: dict[str, Any] = plain(self)
         return found
 

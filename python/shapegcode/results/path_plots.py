@@ -47,7 +47,7 @@ def plot_path(
     part: str = "",
     whole_mm: npt.ArrayLike | None = None,
 ) -> Axes:
-    """Plot the deviation of the table from the programmed path, magnified.
+    """Plot the deviation of the table, or of the command, from the programmed path, magnified.
 
     Each curve is the programmed path plus the magnified deviation of every sample; the title gives the
     magnification. The legend states the largest deviation: of the table over the whole run, if the core measured it,
@@ -228,7 +228,8 @@ def follow(
 ) -> tuple[FloatArray, FloatArray]:
     """For each sample of a motion along a polyline, the nearest point of the polyline: distance along it, position.
 
-    Where the polyline passes a point twice, the distance travelled decides. `complete`: the command covers all.
+    Where the polyline passes a point twice, the distance travelled decides.
+    `complete`: the command covers the whole polyline.
     """
     from scipy.spatial import KDTree
 
@@ -334,7 +335,7 @@ def _trace(label: str, run: _core.SimulationFigures, period_s: float) -> Trace:
 
 
 def motion_pictures(simulated: Callable[[], SimulatedRegion]) -> dict[str, Plot]:
-    """Path, feed and vibration of a region, by name."""
+    """Pictures of the path, feed and vibration of a region, by name."""
     scene = functools.cache(lambda: _Scene.of(simulated()))
 
     def path(ax: Axes | None = None) -> Axes:

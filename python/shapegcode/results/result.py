@@ -181,13 +181,13 @@ class Result(Outcome):
         return table
 
     def to_xarray(self, what: str = "") -> xr.Dataset:
-        """Its arrays for xarray, with dimensions and units; needs `shapegcode[study]`.
+        """Arrays of the result, or of one of its attributes, for xarray; needs `shapegcode[study]`.
 
         Args:
-            what: name of the attribute with arrays; empty: the first one.
+            what: name of the attribute with arrays, or of the result's class for its own; empty: the first with any.
 
         Returns:
-            The arrays.
+            The arrays, with dimensions and units.
 
         Raises:
             ArgumentError: no such attribute with arrays; the message lists those that exist.
@@ -211,7 +211,7 @@ class Result(Outcome):
         return whole.assign_coords(axis=list(_AXES)) if "axis" in whole.dims else whole
 
     def _repr_html_(self) -> str:
-        """Answer and tables, for notebooks."""
+        """Answer, warnings, tables and next step, for notebooks."""
         return short_html(self)
 
 
@@ -276,7 +276,7 @@ METHODS: Mapping[str, tuple[str, ...]] = {
 
 @functools.cache
 def bibliography() -> Mapping[str, str]:
-    """Every entry by its key, the program's own first."""
+    """Every entry of references.bib by its key, that of shapegcode itself first."""
     text = (resources.files("shapegcode") / "data" / "references.bib").read_text(encoding="utf-8")
     return {re.split(r"[{,]", entry, maxsplit=2)[1]: entry for entry in text.strip().split("\n\n")}
 

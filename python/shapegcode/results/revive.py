@@ -226,7 +226,7 @@ def _fields(cls: Any, data: Mapping[str, Any], where: str, bound: Mapping[Any, A
 
 
 def _from_properties(cls: Any, data: Mapping[str, Any], where: str) -> Mapping[str, Any]:
-    """Compute fields that the JSON leaves out from properties in it, for classes with `hidden_from_json(data)`."""
+    """Compute fields missing in the JSON from properties in it, for classes with `hidden_from_json(data)`."""
     read = getattr(cls, "hidden_from_json", None)
     if read is None:
         return {}

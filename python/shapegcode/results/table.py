@@ -133,7 +133,7 @@ class Table:
         return replace(self, whole=True)
 
     def width(self) -> int:
-        """Width of the table with every column, in characters, without wrapped texts."""
+        """Width of the table in characters, with every column that has a text, and no text wrapped."""
         return _min_width(self.shown(), self._texts(self.shown()), whole=True)
 
     def _texts(self, shown: Sequence[Column]) -> list[list[str]]:
@@ -143,7 +143,7 @@ class Table:
         return [[c if w else c.replace(" ", NO_BREAK) for c, w in zip(row, worded, strict=True)] for row in cells]
 
     def _fitting(self, shown: list[Column], width: int) -> list[Column]:
-        """The columns that fit a width without a cut word."""
+        """Leave out columns until the rest fits without cutting words; the first and those of priority 0 stay."""
         kept = list(shown)
         while _min_width(kept, self._texts(kept)) > width:
             free = [rank for rank, column in enumerate(kept) if rank > 0 and column.priority > 0]
@@ -175,7 +175,7 @@ class Table:
 
 
 def _min_and_max(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> tuple[list[int], list[int]]:
-    """Width of each column for its longest word, and for its longest line."""
+    """Width of each column for its longest word (24 at most for texts, else 60), and for its longest cell."""
     least, most = [], []
     for rank, column in enumerate(columns):
         parts = [[cells[rank]] if column.left else cells[rank].split(" ") for cells in rows]
@@ -187,7 +187,7 @@ def _min_and_max(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> tu
 
 
 def _min_width(columns: Sequence[Column], rows: Sequence[Sequence[str]], *, whole: bool = False) -> int:
-    """Width of a table, with the space between its columns."""
+    """Width of a table for its longest words or, if *whole*, its longest lines, with the space between its columns."""
     least, most = _min_and_max(columns, rows)
     return sum(most if whole else least) + 2 * len(columns) - 1
 

@@ -26,7 +26,7 @@ _FOUND = ("measured", "dump")
 
 
 def write_toml(machine: keys.TomlTable, remarks: Mapping[str, str], *, short: bool = False) -> str:
-    """Write a machine as a commented file; *short*: only values that differ from a default or have a known origin."""
+    """Write a machine as a commented file; *short*: only required keys, and those not default or with an origin."""
     writer = _TomlWriter(dict(remarks), short)
     writer.comment(_SHORT_HEAD if short else _HEAD)
     writer.lines.append("")

@@ -123,7 +123,7 @@ def remarks_of(text: str) -> dict[str, str]:
 
 
 def remarks_in_comments(text: str) -> dict[str, str]:
-    """Comments after the values of a file without origins."""
+    """The comments after values, by key: the remarks of a file without `[origin]`."""
     return {line.key: line.remark for _, line in lines_of(text) if line and line.remark}
 
 
@@ -324,7 +324,7 @@ class KeyValue:
 
 
 def facts(field: FieldInfo | None) -> dict[str, Any]:
-    """Metadata of a field from `key`."""
+    """Metadata that the function `key` gave to a field; empty without."""
     extra = field.json_schema_extra if field is not None else None
     return dict(extra) if isinstance(extra, dict) else {}
 
@@ -359,7 +359,7 @@ def key_info(field: FieldInfo, key: str) -> KeyInfo:
 def values_of(
     table: TomlTable, prefix: str = "", given: bool = True, remarks: Mapping[str, str] | None = None
 ) -> Iterator[KeyValue]:
-    """Every key below a table with its value and origin, in the order of the file."""
+    """Every key below a table with its value and origin, in the order in which the keys are defined."""
     for name, field in type(table).model_fields.items():
         value, key = getattr(table, name), f"{prefix}{name}"
         from_file = given and name in table.model_fields_set

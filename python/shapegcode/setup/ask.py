@@ -159,7 +159,7 @@ def _parsed(name: str, typed: str) -> Any:
 
 
 def _problem(name: str, typed: str, given: Mapping[str, Any]) -> bool | str:
-    """True, or the problem of an answer; the question is then repeated."""
+    """True if an answer can be used, else its problem: the question is then repeated."""
     try:
         value = _parsed(name, typed)
     except ValueError:
@@ -175,7 +175,7 @@ def _problem(name: str, typed: str, given: Mapping[str, Any]) -> bool | str:
 
 
 def _of_file(file: str, problem: Callable[[str], str]) -> bool | str:
-    """True, or the problem of a file."""
+    """True if a file exists and has no problem, else the problem."""
     return problem(file).replace("\n", "; ") or True if Path(file).is_file() else f"{file}: no such file"
 
 

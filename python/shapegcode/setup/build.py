@@ -71,7 +71,7 @@ def set_up(answers: Answers) -> MachineSetup:
 
 
 def _started(answers: Answers) -> tuple[Machine, list[str]]:
-    """The machine of the dump, or one with only the required keys."""
+    """The machine of the dump, or one with the limits of the answers; and remarks on what was read."""
     rigid = "".join(axis for axis, answer in answers.modes.model_dump().items() if answer == "rigid")
     if answers.dump is not None and answers.control == "linuxcnc":
         ini = read_ini(answers.dump, name=answers.name)

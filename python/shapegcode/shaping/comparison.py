@@ -1,4 +1,4 @@
-"""Compares shapers: designs every family, marks the useful designs, and recommends one."""
+"""Compares shapers of several families: designs them, marks the useful designs, and recommends one."""
 
 import cmath
 import contextlib
@@ -146,7 +146,7 @@ def choose(
     allow_negative: bool = False,
     on_progress: Callable[[float], None] = lambda _: None,
 ) -> Recommendation:
-    """Design every family on each grid of `periods_s` (None: at continuous times), compare, and recommend."""
+    """Design all or the given families on each grid of `periods_s` (None: at continuous times), compare, recommend."""
     options = options or DesignOptions()
     _check(bands, periods_s, options, objective)
     # The user's impulses only if given.

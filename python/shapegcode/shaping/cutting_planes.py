@@ -1,9 +1,9 @@
-"""Taps on a grid whose residual stays below a bound over whole frequency bands: linear programs with cuts.
+"""Taps on a grid whose residual stays below a bound over whole frequency bands: linear programs with cutting planes.
 
 The condition ``|R(w)| <= v`` for every frequency w of a band is infinitely many second-order cones. Each of them
 is equivalent to ``Re(e^{-ja} R(w)) <= v`` for every direction a, which is linear in the taps. So a linear program
-with some (w, a) is a relaxation: its optimum is a lower bound for any design. Its taps
-are swept over the bands, and where they exceed the bound the cutting plane (w, a = arg R(w)) is added.
+with some (w, a) is a relaxation: its optimum is a lower bound for any design. The residual of
+its taps is swept over the bands, and where it exceeds the bound the cutting plane (w, a = arg R(w)) is added.
 Bound and sweep enclose the optimum, and the search ends when they meet.
 """
 
@@ -207,7 +207,7 @@ class CutPool:
 
 
 class _Band:
-    """Exponents of one mode's residual terms on a grid, and the frequencies of its sweep."""
+    """The band of a mode: exponents of its residual's terms on a grid, and the frequencies at which it is evaluated."""
 
     def __init__(self, band: ModeBand, times_s: FloatArray) -> None:
         zeta = band.mode.damping_ratio
@@ -223,7 +223,7 @@ class _Band:
         return np.asarray(np.exp(np.outer(omegas, self.q)) @ taps, dtype=np.complex128)
 
     def peaks(self, taps: FloatArray) -> tuple[FloatArray, ComplexArray]:
-        """Frequencies of the local maxima of |R|, refined, and R there."""
+        """Angular frequencies of the local maxima of the residual's magnitude, refined, and the residual there."""
         size = np.abs(self.terms @ taps)
         padded = np.concatenate([[-1.0], size, [-1.0]])
         at = np.flatnonzero((size >= padded[:-2]) & (size >= padded[2:]))
@@ -268,7 +268,10 @@ class TapProblem:
         self._rows = [[] for _ in self.bands]
 
     def least_worst(self, limit: float | None = None) -> Bounds | None:
-        """Taps with the smallest worst residual, or None; a search with a limit ends once that is met or impossible."""
+        """Taps with the smallest worst residual, and its bounds; None: no taps satisfy the equations.
+
+        With a limit the search ends once the limit is met or impossible.
+        """
         best = np.zeros(self.last + 1)
         lower, upper = 0.0, math.inf
         # far below the limit the program would be degenerate, and the solver may cycle

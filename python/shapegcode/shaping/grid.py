@@ -74,9 +74,9 @@ def choose_block_period(
     fewest blocks.
 
     A mode without a band is cancelled exactly; if any has a band, the residual ratio is at most `vibration_limit`
-    within the bands. If no period has such a design within `max_duration_s`, designs of this
-    duration are compared: the period with the smallest worst residual wins (within 2 % of it the longest period) and
-    is reported in `note`.
+    within the bands. If in that case no period has such a design within `max_duration_s`, the
+    designs with the smallest worst residual within that duration are compared: the period with the smallest one wins
+    (within 2 % of it the longest period), and `note` says so.
 
     Args:
         modes: modes to cancel, with or without bands, at least one.
@@ -191,7 +191,7 @@ def _candidate(
 def _fallback(
     refused: BlockPeriodCandidate, bands: Sequence[ModeBand], max_duration_s: float, limit: float
 ) -> BlockPeriodCandidate:
-    """Design of the least worst residual within the longest duration, and a note; the given refusal if none exists."""
+    """Design with the smallest worst residual within the longest duration, with a note; *refused* if there is none."""
     from shapegcode.shaping.robust import Task, best_within, unreachable
 
     task = Task.checked(bands, refused.period_s)
@@ -228,7 +228,10 @@ def check_block_period(period_s: float, machine: Machine) -> None:
 def candidate_periods(
     bands: Sequence[ModeBand], machine: Machine | None, max_duration_s: float, vibration_limit: float = 0.05
 ) -> list[float]:
-    """Block periods to compare, ascending, s: the machine's, or up to three with the shortest non-negative shapers."""
+    """Block periods to compare, ascending, s: the machine's, or up to three with the shortest non-negative shapers.
+
+    If no period has such a shaper: the three shortest periods.
+    """
     from shapegcode.shaping.robust import Task, shortest_below
 
     if machine is not None and machine.emission.block_period_s is not None:
@@ -303,8 +306,9 @@ def choose_grid(
 
     With `shaping.family` = "auto" the shaper is the shortest one without negative impulses whose residual ratio stays
     within `shaping.vibration_limit` over the modes' bands (else the one with the smallest worst residual), and is zero
-    for modes without a band. With a named family it is the shortest one of that family. An override-tolerant program
-    (`Machine.bears_override`) gets the period that suits other feed overrides, see `best_for_overrides`.
+    for modes without a band. With a named family it is the shortest one of that family. If neither argument nor file
+    gives a period, an override-tolerant program (`Machine.bears_override`) gets the one that suits other feed
+    overrides, see `best_for_overrides`.
 
     Args:
         machine: modes and controller.
@@ -312,7 +316,7 @@ def choose_grid(
         fastest_mm_per_s: fastest programmed feed; None: the slowest of the axes' largest feeds.
 
     Returns:
-        The grid: block period, shaper for all axes, shapers along the followed axis.
+        The grid: block period, shaper for all axes, shapers along the followed axis, shapers per axis if requested.
 
     Raises:
         DesignError: no shaper exists within `shaping.max_duration_s`.
@@ -431,7 +435,7 @@ def shaper_track(machine: Machine, period_s: float) -> ShaperTrack:
 def override_vibration_um(
     block_period_s: float, shaper: _core.Shaper, model: MachineModel, feed_mm_per_s: float
 ) -> float:
-    """Largest residual vibration of straight moves in equal blocks over the feed overrides, µm."""
+    """Largest residual vibration over the feed overrides, µm, of straight moves in blocks one block period long."""
     moves = np.array([float(bool(modes)) for modes in excited_modes(model.machine)])
     speed = feed_mm_per_s * math.sqrt(moves.sum())
     fir = shaper_fir(shaper, block_period_s)

@@ -1,8 +1,8 @@
 """Shapers on a sample grid: the shortest taps on the grid that meet the defining conditions of a family.
 
 Rounding the times of a continuous design to a grid destroys its zeros. So here a family is given by its
-defining conditions, and the shortest taps that meet them are searched. Zeros have their multiplicity, and lie at
-``z = e^{s*period}`` to round-off. A residual limit is met over its whole band, as
+defining conditions, and the shortest taps that meet them are searched. Each zero has its full multiplicity, and
+lies at ``z = e^{s*period}`` (s: pole of the mode) to round-off. A residual limit is met over its whole band, as
 :func:`shapegcode._core.worst_residual` proves. A zero is a linear condition on the taps; for a limit
 of the residual see `cutting_planes`.
 """
@@ -271,7 +271,7 @@ def lower_hull(
 
     The second central moment is concave in the taps, so no convex program minimises it; but it is least at one of
     these corners, each of which minimises a linear cost. A part of the boundary is skipped if the supporting
-    lines at its two ends prove that no solution on it is better.
+    lines at its two ends prove that no solution on it is better by more than `tolerance` (a ratio).
     """
     time = np.arange(last + 1) / last
     moments = np.vstack([time, time**2])

@@ -134,8 +134,8 @@ def plot_sensitivity(
 
     Args:
         result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, or shapers by name.
-        modes: modes to mark if shapers are given, as for `choose_shaper`; empty: curves without damping, to 2.5
-            cycles in the longest shaper.
+        modes: modes to mark if shapers are given, as for `choose_shaper`; empty: curves without damping, up to the
+            frequency with 2.5 cycles in the duration of the longest shaper.
         ax: where to draw; None: a new figure.
 
     Returns:
@@ -262,8 +262,8 @@ def plot_branches(result: Recommendation, ax: Axes | None = None) -> Axes:
         The axes of the plot.
 
     Raises:
-        ValueError: another number of modes, or no minimal shaper in a cycle of the slower mode, or in the
-            longest duration.
+        ValueError: not two modes, or no minimal shaper that is at most as long as a cycle of the slower mode and the
+            longest permitted duration.
     """
     branches = _branches(result)
     if branches is None:
@@ -318,7 +318,7 @@ def shaped_step(shaper: _core.Shaper, period_s: float, until_s: float) -> FloatA
     """Shaped unit step (staircase of the impulses), sampled at 0, one period, ... up to at least `until_s`.
 
     Each impulse becomes a ramp of two periods, whose middle is one period after the impulse: so the first sample is at
-    rest, and times between samples are kept.
+    rest, and the times of impulses between samples are preserved.
     """
     times_s = np.arange(round(until_s / period_s) + 2) * period_s
     after = (times_s[:, None] - shaper.times_s[None, :]) / period_s

@@ -1,7 +1,7 @@
 """The families of shapers, one row each with source and validity, and their solvers.
 
-A family is solved at continuous times, and on a grid from its defining conditions. Families of one mode are extended to
-several by convolution, at continuous times and on a grid.
+A family is solved at continuous times, on a grid from its defining conditions, or both. Families of one mode are
+extended to several by convolution, at continuous times and on a grid.
 """
 
 import math
@@ -81,7 +81,7 @@ def repeated(name: str, zeros: int) -> Solve:
 
 
 def hump_ei(name: str, humps: int) -> Solve:
-    """EI with *humps* humps; on a grid the shortest impulses with EI's zeros, and its limit between the outer zeros."""
+    """EI with *humps* humps; on a grid the shortest impulses that have EI's zeros and keep its limit between them."""
 
     def conditions(mode: _core.Mode, options: DesignOptions) -> Conditions:
         zeros_hz = _core.extra_insensitive(mode, options.vibration_limit, humps).zeros_hz
@@ -159,7 +159,7 @@ def simultaneous_zv(modes: Sequence[_core.Mode], max_duration_s: float) -> _core
 
 
 def _merged(shaper: _core.Shaper, distance_s: float) -> tuple[FloatArray, FloatArray]:
-    """Times and amplitudes after merging taps at most `distance_s` apart at their weighted mean time."""
+    """Merge impulses at most `distance_s` apart at their weighted mean time; return times (first 0) and amplitudes."""
     groups: list[list[int]] = []
     for index, time_s in enumerate(shaper.times_s):
         if groups and time_s - shaper.times_s[groups[-1][-1]] <= distance_s:
@@ -236,14 +236,15 @@ def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bo
 
 def _first(good: Callable[[int], bool], fewest: int, most: int, stride: int) -> int | None:
     """Smallest good count from `fewest` to `most`, by strides, then bisection; None: none is good."""
-    count = next((each for each in range(fewest, most + 1, stride) if good(each)), None)
-    if count is None:
+    if fewest > most:
         return None
-    return halved(good, max(count - stride, fewest - 1), count)
+    counts = [*range(fewest, most, stride), most]
+    at = next((index for index, count in enumerate(counts) if good(count)), None)
+    return None if at is None else halved(good, counts[at - 1] if at else fewest - 1, counts[at])
 
 
 def _samples(mode: _core.Mode, ratios: tuple[float, ...], period_s: float, steps: int) -> FloatArray | None:
-    """Samples inside a kernel of `steps` periods; None if one is negative or a zero is missed."""
+    """Samples inside a kernel of `steps` periods; None if one is not above 0, or a zero is missed."""
     x = 2.0 * np.arange(1, steps) / steps - 1.0
     count = 2 * len(ratios) + 1
     basis = legendre.legvander(x, count - 1) * (1.0 - x * x)[:, None]
@@ -477,7 +478,7 @@ def distinct(bands: Sequence[ModeBand]) -> list[ModeBand]:
 
 
 def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None = None) -> list[Design]:
-    """Design and evaluate all shapers of a family for some modes, the preferred one first."""
+    """Design and evaluate the shapers of a family for some modes, within limits; the preferred one first."""
     options = options or DesignOptions()
     row = family_named(name)
     if not bands:

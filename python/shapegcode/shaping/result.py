@@ -37,7 +37,7 @@ OBJECTIVES = {
 
 
 def _order(each: Design, objective: str) -> tuple[float, ...]:
-    """Sort key: the least is taken; the family breaks ties."""
+    """Sort key of a design for an objective: the design with the smallest key is the best."""
     duration, residual, contour, _ = _merits(each)
     fewest_blocks = -(each.period_s or 0.0)  # the longest period
     rank = 0.0 if each.family in _CONVERTED else 1.0 if each.family in _FOR_GRIDS else 2.0
@@ -160,7 +160,8 @@ class Recommendation(Result):
 
     Attributes:
         modes: modes to cancel.
-        designs: every design, in the order of the registry and of the periods; `robust` ones above the limit come last.
+        designs: every design, by family in the given order (else the registry's), then by period; `robust` ones above
+            the limit come last.
         recommended: index of the recommended design.
         reason: reason for the recommendation, in a sentence.
         refused: families without a design.
@@ -256,7 +257,7 @@ class Recommendation(Result):
         return f"shapegcode convert part.nc -m {self.machine} {options}"
 
     def notes(self) -> list[str]:
-        """Reason of the recommendation; best design for blocks, if that is another design; best design of each grid."""
+        """Reason of the recommendation; best design for blocks, if another; best design of each grid, if several."""
         lines = [f"{_MARK} {'recommended' if self.ok else 'best available'}: {self.reason}"]
         index = self.recommended_on_grid
         if index is not None and index != self.recommended:
@@ -364,7 +365,7 @@ class Recommendation(Result):
 
 
 def families_table() -> Table:
-    """Every family of the registry: name, source, validity."""
+    """Table of the families in the registry: name, title, kind of times, validity, source."""
     columns = (
         Column("family", value="name", text=True),
         Column("what", value="title", text=True),

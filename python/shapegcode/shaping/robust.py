@@ -92,9 +92,9 @@ def minimax_robust(
 ) -> RobustDesign:
     """Design the shortest taps on a grid with at most a given residual ratio within the bands.
 
-    The number of periods is the smallest for which the smallest worst residual is below the limit (to 0.1 %). Among the
-    non-negative designs of that duration the one with the least second central moment, the contour cost, is chosen
-    (to 0.5 %); with negative impulses, the one with the least sum of magnitudes.
+    The number of periods is the smallest with which a design keeps the limit (to 0.1 %) in all bands. Of the designs of
+    that duration that keep it, the one with the least second central moment, the contour cost, is chosen (to 0.5 %);
+    if negative impulses are allowed, the one with the least sum of magnitudes.
 
     Source: this project.
     """
@@ -285,7 +285,7 @@ def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, pre
     """Smallest number of periods of a design below the limit, or None if it exceeds `most`.
 
     A design stays valid with zero taps added: the number of periods is raised until it suffices, then bisected. The
-    search starts at the duration of the convolved ZV, or at a multiple of `too_few` (known not to suffice) if that is
+    search starts near the duration of the convolved ZV, or at a multiple of `too_few` (known not to suffice) if that is
     longer. With a relative `precision` the result suffices, but may exceed the smallest number by that ratio.
     """
     start = max(1.0, sum(0.5 / band.mode.frequency_hz for band in task.bands) / task.period_s, _GROWTH * too_few)
@@ -320,7 +320,7 @@ def _within(task: Task, last: int, limit: float, min_cost: bool) -> RobustDesign
 
 
 def no_exact(task: Task, duration_s: float) -> str:
-    """Message: modes without a band have no design of this duration."""
+    """Message: no design up to this duration cancels the modes without a band."""
     taps = "non-negative impulses" if task.max_abs_sum is None else f"impulses with sum|a| up to {task.max_abs_sum:g}"
     if task.mirrored:
         taps = f"mirrored {taps}"

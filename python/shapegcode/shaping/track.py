@@ -69,7 +69,7 @@ class ShaperTrack:
 
     @cached_property
     def filters(self) -> VaryingFir:
-        """The shapers in whole periods."""
+        """The shapers as filters whose delays are whole periods."""
         return VaryingFir([shaper_fir(node.shaper, self.period_s) for node in self.nodes])
 
     def following(self, offset_mm: float = 0.0) -> FollowingFir:
@@ -153,7 +153,7 @@ def taps_of_mean(
 
 
 def _vertices(matrix: FloatArray, right: FloatArray, *costs: FloatArray) -> list[FloatArray | None]:
-    """For each cost: the non-negative taps that meet the conditions at least cost; None: there are none."""
+    """For each cost vector: non-negative taps of least cost that meet the conditions; None: there are none."""
     count = matrix.shape[1]
     program = LinearProgram(np.zeros(count), np.full(count, math.inf), (matrix, right))
     found: list[FloatArray | None] = []

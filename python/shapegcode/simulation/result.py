@@ -45,7 +45,7 @@ class RegionRun:
 
     @property
     def command_mm(self) -> FloatArray:
-        """Set-points after all filters, (n, 3), including the decay after the stop."""
+        """Set-points after all filters, (n, 3), also those at rest while the vibration decays after the stop."""
         return self.figures.recorded_command
 
     @property
@@ -56,7 +56,7 @@ class RegionRun:
 
 @dataclass(frozen=True)
 class ShapedFigures:
-    """Figures of the shaped regions, without shaped rapids, with the worse rule of block timing, as in `convert`."""
+    """Figures of the shaped regions, without shaped rapids: each the larger of both block timings, as in `convert`."""
 
     regions: int  # number of regions
     cutting_time_s: float  # until the set-points rest
@@ -144,8 +144,8 @@ class Simulation(Result):
         response_orbit_error_percent: of the machine table on each arc.
         regions: the cutting regions in order.
         of_shaped: the shaped regions only; None: no shaped regions.
-        verdict: with `against`: verdict of the whole program and its original in the relevant operating conditions, as
-            `convert` judges its output.
+        verdict: with `against`: verdict on the whole program, compared with its original in the operating conditions
+            that count, as `convert` judges its output; None: without.
         motion: motion of the whole program; None: not requested.
         warnings: on the program and the machine.
         simulated: the program, for a page.
@@ -242,7 +242,7 @@ class Simulation(Result):
         )
 
     def tables(self) -> list[Table]:
-        """Tables of vibration and settling by axis; contour and orbit errors; the motion."""
+        """Tables of vibration and settling by axis; contour and orbit errors; operating conditions; the motion."""
         regions = [self._vibration_table(), self._contour_table()] if self.regions else []
         if self.verdict is not None and self.verdict.cases:
             regions.append(case_table(self.verdict.cases, self.verdict.worst_case))

@@ -150,7 +150,7 @@ def simulate_motion(
     every: int = 1,
     on_progress: Callable[[float], None] = lambda _done: None,
 ) -> Motion:
-    """Simulate the motion of a whole program; returns largest values and curves, and writes it to files.
+    """Simulate the motion of a whole program; return its largest values and curves, and write it to files if requested.
 
     Memory does not grow with the length of the program.
 

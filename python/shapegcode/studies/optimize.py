@@ -1,7 +1,7 @@
-"""The shortest program that stays within tolerance with a given probability: block period, family, tolerance, feed on
-arcs.
+"""Chooses values, such as block period, family, tolerance and feed on arcs, for the shortest program that stays within
+tolerance with a given probability.
 
-All combinations are converted if there are not too many; else SciPy's differential evolution selects them.
+All combinations are converted if there are not too many; else those that SciPy's differential evolution selects.
 """
 
 from __future__ import annotations
@@ -47,7 +47,9 @@ def optimize(
     shape_all: bool = False,
     on_progress: Callable[[float], None] = lambda _share: None,
 ) -> Optimum:
-    """Choose block period, family, tolerance and arc feed for the shortest time with the required probability.
+    """Choose the settings with the shortest time among those that keep the tolerance with the required probability.
+
+    By default these are block period, family, planned tolerance and arc feed.
 
     >>> found = sg.optimize("part.nc", machine, {"axes.x.modes.1.frequency_hz": sg.normal(46, 2)}, probability=0.99)
     >>> sg.convert("part.nc", machine.with_values(found.values))
@@ -59,7 +61,7 @@ def optimize(
         choose: values to choose from, by key; None: see `shapegcode.studies.optimize.usual_choices`.
         probability: required probability of staying within tolerance.
         n: machines on which a combination is simulated; four times as many new ones confirm it.
-        most: maximum number of conversions.
+        most: maximum number of combinations to convert.
         seed: equal seeds give equal results.
         shape_all: see `convert`.
         on_progress: called with the finished fraction of the conversions.
@@ -155,7 +157,7 @@ class _Choosing:
         return float(within(np.array(simulate_all(replay, job, None))).mean())
 
     def simulated(self, ranks: Ranks) -> Candidate:
-        """A candidate with its probability, confirmed if it is high enough."""
+        """A candidate with its probability; if that is high enough, also the probability on new samples."""
         found = self.converted(ranks)
         if found.time_s is not None and found.within is None:
             share = self._share(self._replays[ranks], 0)

@@ -121,13 +121,13 @@ class MachineStudy(Result):
         within: ratio of all samples that stay within every limit; those without an emitted program do not.
         within_interval: 95 % interval of the estimated probability; meaningless for a grid.
         at_least: the required probability.
-        quantities: measures over all samples.
+        quantities: quantiles of each measure over the simulated samples.
         parameter_sensitivity: values by influence on the verdict, most influential first.
         curves: measures over each value, for pictures.
         refused: samples without an emitted program.
         warnings: samples without a program, and what was not measured.
         limits_um: smallest limit of each measure that has one.
-        draws: values by key and measures by name, one row per sample.
+        draws: values by key and measures by name, one row per simulated sample.
     """
 
     program: str
@@ -164,7 +164,7 @@ class MachineStudy(Result):
 
     @property
     def next_step(self) -> str:
-        """Measure the most influential value, or convert."""
+        """What to do next: convert, measure or choose the most influential value, or see why samples were refused."""
         if self.ok:
             sure = "it stays within tolerance in spite of the uncertainties"
             return f"convert {self.program} for {self.machine}: {sure}."
@@ -246,7 +246,7 @@ class MachineStudy(Result):
             The Dataset, with units; its dimension is `draw`, or `percent`.
 
         Raises:
-            ArgumentError: another word.
+            ArgumentError: `what` is neither of these words, nor empty.
             NotKeptError: the study was read back from its JSON, which has no samples.
             ModuleNotFoundError: xarray is not installed.
         """
@@ -278,10 +278,10 @@ class MachineStudy(Result):
         return xr.Dataset(measured, coords=coordinates, attrs=about)
 
     def csv_lines(self) -> Iterator[str]:
-        """Yield one line per sample.
+        """Yield CSV lines: a header, then one line per sample.
 
         Yields:
-            Header and lines.
+            The lines, with line ends.
         """
         yield ",".join(self.draws) + "\n"
         for row in zip(*self.draws.values(), strict=True):
@@ -307,7 +307,7 @@ class Candidate:
         values: the chosen values.
         time_s: cycle time; None: no emitted program.
         within: ratio of samples within tolerance; None: no emitted program, or a shorter combination is good enough.
-        checked: the same for four times as many new samples; None: `within` is None or below the requested one.
+        checked: the same for four times as many new samples; None: `within` is None or below the required ratio.
         why: reason without an emitted program.
     """
 
@@ -378,7 +378,7 @@ class Optimum(Result):
 
     @property
     def next_step(self) -> str:
-        """The command that converts with the best settings."""
+        """The command that converts with the best settings; if none is good enough, what to change."""
         if self.best is None:
             return "measure the most influential value (shapegcode study), widen the tolerance, or require less."
         words = [word for each in self.best.values for word in ("--set", f"{each.key}={each.value}")]

@@ -76,7 +76,7 @@ def study(
         Quantiles, probability, influences; `to_xarray()` has every sample.
 
     Raises:
-        ArgumentError: nothing to vary, n below 1, another sampling or measure, or nothing that could be simulated.
+        ArgumentError: nothing to vary; invalid n, seed, sampling, measure or `at_least`; nothing could be simulated.
         MachineError: an unknown key, or a sampled value that is invalid in a machine file: key, value, limit.
         DesignError: no shaper exists for the machine file.
         ProgramError: the program cannot be read.
@@ -295,7 +295,7 @@ def _bin(at: float, name: str, values: FloatArray) -> results.BinQuantiles:
 def parameter_sensitivity(
     varied: Sequence[Varied], columns: Sequence[Sequence[object]], shares: FloatArray, *, indices: bool, seed: int
 ) -> tuple[results.ParameterInfluence, ...]:
-    """Influence of each value on the ratio to the limit, largest first."""
+    """Influence of each varied value on the largest ratio to a limit; largest influence first."""
     found = _indices(varied, shares, seed) if indices else {}
     rows = []
     for each, column in zip(varied, columns, strict=True):

@@ -100,7 +100,7 @@ _LEAVES = frozenset(SampledValue.model_fields)
 
 
 def _flat(given: Mapping[str, object], above: tuple[str, ...] = ()) -> Iterator[tuple[str, object]]:
-    """Flatten nested tables to dotted keys, except tables that are values of the machine file."""
+    """Flatten nested tables to dotted keys, except distributions and tables that are values of the machine file."""
     for name, entry in given.items():
         parts = (*above, *name.split("."))
         if isinstance(entry, dict) and entry and not entry.keys() & _LEAVES and not _is_value(parts):

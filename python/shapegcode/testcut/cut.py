@@ -188,11 +188,11 @@ class TestCut:
 
     @property
     def up(self) -> bool:
-        """Up milling."""
+        """True for up milling."""
         return self.milling == "up"
 
     def data(self) -> dict[str, Any]:
-        """The content of the side file."""
+        """The content of the JSON file beside the program."""
         return {"format": _FORMAT, **asdict(self)}
 
 

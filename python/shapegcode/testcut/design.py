@@ -143,8 +143,8 @@ def taper_cut(
         The design, for `write_test_cut`.
 
     Raises:
-        ArgumentError: beyond the limits of tool or machine, depths that do not increase, or a length below five times
-            their difference.
+        ArgumentError: a feed or depth beyond the limits of tool or machine, radial depths that do not increase, or a
+            length below five times their difference.
     """
     feeds = feeds_mm_per_min or [given.feed_mm_per_min * share for share in (0.5, 1.0, 2.0)]
     given._check_feeds(feeds)

@@ -361,7 +361,7 @@ def _speeds_at(measuring: MeasuringPass, x_mm: FloatArray, lag: float) -> FloatA
 
 
 def _noise(x: FloatArray, force: FloatArray, travel: float) -> float:
-    """Standard deviation of means over a travel, relative to the mean."""
+    """Standard deviation of the mean forces of sections of length *travel*, relative to their mean."""
     interval_of = ((x - x[0]) / travel).astype(int)
     sums, counts = np.bincount(interval_of, force), np.bincount(interval_of)
     means = sums[counts > 0] / counts[counts > 0]

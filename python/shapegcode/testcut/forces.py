@@ -21,7 +21,7 @@ from shapegcode.testcut.cut import CuttingLaw, CutTool, MeasuringPass, TestCut
 
 @dataclass(frozen=True)
 class Engagement:
-    """Engagement with the tool's axis at each X; azimuths as in ``_core.EngagedArc``."""
+    """Engagement for each X of the tool's axis; azimuths as in ``_core.EngagedArc``."""
 
     from_rad: FloatArray  # lowest azimuth in material, from the direction of feed, positive to its left
     to_rad: FloatArray  # highest one; equal to `from_rad` without engagement
@@ -258,7 +258,7 @@ class CoefficientFit:
 def fit_coefficients(
     data: MeanForces, tool: CutTool, axial_depth_mm: float, *, thickness: Thickness = "mean", edge: bool = False
 ) -> CoefficientFit:
-    """Fit k1(t) and k2(t), and if requested the edge forces."""
+    """Fit the laws of k1 and k2 over the chip thickness, and if requested the edge forces."""
     count = 6 if edge else 4
     chip = np.zeros(len(data.feed_mm_per_min))
     for speed, at, met in _by_speed(data):
@@ -292,7 +292,7 @@ def fit_coefficients(
 
 
 def _outliers(measured: FloatArray, left: FloatArray, noise: FloatArray) -> npt.NDArray[np.bool_]:
-    """Mask of rows whose force deviates from the others, (n,)."""
+    """Mask of rows whose force does not follow the fitted law, (n,)."""
     # The noise may be below the error of the law itself, which must not turn a row into an outlier.
     size = np.linalg.norm(measured, axis=1)[:, None]
     outlier = np.any((np.abs(left) > _OUTLIER * noise) & (np.abs(left) > _MIN_OUTLIER * size), axis=1)
@@ -436,7 +436,7 @@ def noise_of(left: FloatArray, predicted: FloatArray, revolutions: FloatArray, r
 
 
 def neighbour_correlation(scaled: FloatArray, group: npt.NDArray[np.intp], outlier: npt.NDArray[np.bool_]) -> float:
-    """Correlation of neighbouring residuals within each group, at least 0."""
+    """Correlation of neighbouring residuals of the same group, over all groups; 0 if it may be chance."""
     pairs = (group[1:] == group[:-1]) & ~outlier[1:] & ~outlier[:-1]
     if pairs.sum() < 8:
         return 0.0

@@ -310,7 +310,7 @@ def _shift(forecast: Expected, x: FloatArray, size: FloatArray, side: float) -> 
 
 
 def _vertex(three: FloatArray) -> float:
-    """Position of the minimum of the parabola through three values, in steps from the middle value."""
+    """Position of the minimum of the parabola through three values, in steps from the middle one; 0: no minimum."""
     left, middle, right = three.tolist()
     bend = left - 2.0 * middle + right
     return 0.5 * (left - right) / bend if bend > 0.0 else 0.0

@@ -211,7 +211,7 @@ class TaperResult(Result):
 
 @dataclass(frozen=True, eq=False)
 class CornerPass:
-    """Largest resultant of a pass within the stock, mean over a revolution and peak."""
+    """Largest resultant in the stock in one pass, measured and expected: mean over a revolution, and peak."""
 
     number: int  # of the pass, from 1
     measured_mean_n: float  # largest mean, as recorded
@@ -256,12 +256,12 @@ class CornerResult(Result):
 
     @property
     def ok(self) -> bool:
-        """The feed changes the largest resultant as much as expected, within 10 %."""
+        """True if the feed changes the largest resultant as much as expected, within 10 %, or if `ratio` is None."""
         return self.ratio is None or abs(self.ratio.measured / self.ratio.expected - 1.0) <= RATIO_LIMIT
 
     @property
     def answer(self) -> str:
-        """Measured over expected resultant; ratio of the largest resultants with modified and with constant feed."""
+        """Measured over expected resultant; ratio of largest mean resultants with modified and with constant feed."""
         sentence = f"the measured resultant is {self.scale:.2f} times the expected one in the first recorded pass"
         if self.ratio is None:
             return sentence
@@ -316,7 +316,7 @@ class IntervalResult(Result):
     Attributes:
         program: program of the test cut.
         machine: name of the machine.
-        interval_mm: shortest interval from which on every measured one is followed; None: not even the longest.
+        interval_mm: shortest measured interval that is followed, as are all longer ones; None: the longest is not.
         lag_interval_mm: travel at the largest feed until a lag of the median time constant reaches 90 % of a step.
         passes: measured passes, by interval.
         warnings: further remarks.

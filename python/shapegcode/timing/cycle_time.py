@@ -230,7 +230,7 @@ class TimeInterval:
         return tuple(sorted(parts, key=lambda part: -part.share))
 
     def narrowed_by(self) -> str:
-        """The program that would narrow the interval most if logged; scatter between cuts or runs is left aside."""
+        """Kind of program whose log would narrow the interval most; scatter between cuts or runs is left aside."""
         name = next((part.name for part in self.parts() if part.name not in (BETWEEN, RUNS)), CUTS)
         text = next(
             (text for word, text in _REMEDIES.items() if word in name), f"a program in which {name} occurs alone"
@@ -238,7 +238,7 @@ class TimeInterval:
         return text.format(move=self.mean_move_mm)
 
     def after_logging(self, other: TimeInterval) -> float:
-        """Half-width, s, after logging a run of another program, whose time has its own scatter (least squares)."""
+        """Half of the interval, s, once a run of another program is logged, with its own scatter (least squares)."""
         common = sum(value * other.steps.get(name, 0.0) for name, value in self.steps.items())
         known = sum(value**2 for value in (*other.steps.values(), *other.scatters.values()))
         left = sum(value**2 for value in self.steps.values()) - (common**2 / known if known > 0.0 else 0.0)

@@ -1,1 +1,1 @@
-"""Verdict of programs: every cut, shaped or left unchanged, simulated in conditions that count."""
+"""Verdict of programs: every cut, shaped or left unchanged, is simulated under the operating conditions."""

@@ -116,7 +116,7 @@ class FrequencyResidual:
 
 @dataclass(frozen=True)
 class CaseVerdict(OldNames):
-    """Verdict in one case: residual, and the figure closest to its limit."""
+    """Verdict in one case: residual, and the figure that is largest relative to its limit."""
 
     name: str  # shown name, unique
     block_end: str | None  # "ceil" or "carry"; null if look-ahead replans the blocks
@@ -142,7 +142,7 @@ class CaseVerdict(OldNames):
 
 
 def worst_counted(cases: Sequence[CaseVerdict]) -> CaseVerdict | None:
-    """The deciding case: of those that count, the one with the largest ratio to a limit; None without cases."""
+    """The deciding case: of those that count, the one with the largest ratio to a limit; None if none counts."""
     counted = [case for case in cases if case.counts]
     shares = [math.inf if case.share_of_limit is None else case.share_of_limit for case in counted]
     return counted[shares.index(max(shares))] if counted else None
@@ -153,8 +153,8 @@ class FeedExcess:
     """Largest ratio of the emitted speed to the programmed feed at the same position of the path.
 
     The speed is that of the set-points along their own path, averaged over one, four or sixteen times the control's
-    block time; two increments, the effect of rounding, are subtracted. The feed is that of the path where the
-    set-points are, not that at the same time.
+    block time (at least an interpolation period); two increments, the effect of rounding, are subtracted. The feed
+    is that of the path where the set-points are, not that at the same time.
     """
 
     ratio: float  # speed over programmed feed; 1: as programmed
@@ -282,8 +282,8 @@ class Case:
     def needs_contour(self, target: Target) -> bool:
         """True if the contour error must be measured in this operating condition.
 
-        With a shifted mode only if the condition counts, and the target is the response or the override is not 100 %:
-        the mode does not change the command.
+        At 100 % override a shifted mode does not change the command. So with a shifted mode it is measured only if the
+        condition counts, and if the target is the response or the override differs from 100 %.
         """
         return self.mode is None or (self.counts and (self.override != 1.0 or target == "response"))
 
@@ -354,7 +354,7 @@ def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]
 
 
 def stated_cases(machine: Machine) -> list[Case]:
-    """Operating conditions of the verdict for a machine; the nominal ones come first (ceil, carry).
+    """Operating conditions of the verdict for a machine; the nominal ones come first (FANUC: ceil, carry).
 
     Feed overrides from 50 to 120 % and at both ends of `verdict.override_percent` (none if the override is locked);
     each mode, and all modes at once, shifted up and down by the uncertainty with the lowest damping; all modes shifted
@@ -412,7 +412,7 @@ def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[LimitCheck]
 def region_misses(
     cases: Sequence[Case], figures: Sequence[CaseFigures | None], limits: RegionLimits
 ) -> list[tuple[str, LimitCheck]]:
-    """Figures of a cut beyond their limits in conditions that count, each in its worst condition, as text."""
+    """Figures of a cut beyond their limits, each in the worst condition that counts: as text, and with its limit."""
     worst: dict[str, tuple[LimitCheck, Case]] = {}
     for case, simulated in zip(cases, figures, strict=True):
         for check in judge_region(simulated, limits) if case.counts and simulated is not None else ():
@@ -430,7 +430,7 @@ _MIN_VIBRATION_UM = 0.005  # an axis below this everywhere has no column
 
 
 def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table:
-    """Table of operating conditions: figures, whether it counts, and which one decides."""
+    """Table of operating conditions: their figures, which of them count, and which one decides."""
     columns = (
         Column("condition", value=lambda case: unbroken(case.name), text=True),
         *(

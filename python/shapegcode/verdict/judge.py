@@ -51,7 +51,7 @@ Step = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class RegionFigures:
-    """Simulations of one cut: as programmed, and as emitted in every operating condition of the verdict."""
+    """Simulations of one cut: as programmed, and as emitted in the operating conditions of the verdict."""
 
     original: _core.SimulationFigures  # the programmed path with the controller's own motion
     # shaped blocks with each rule of block timing; one entry for a cut left unchanged
@@ -254,7 +254,10 @@ class Judge:
         return None if worst is None else worst.lines
 
     def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
-        """Limits of a region, equal in all cases; for the residual: a ratio of the original's, at least the floor."""
+        """Limits of a region, the same in all cases.
+
+        The residual may be the original's times `tolerance.residual_ratio`, or `residual_floor_um` if that is more.
+        """
         tolerance, floor_um = self._machine.tolerance, residual_floor_um(place.region, self._machine)
         limit_um = np.maximum(tolerance.residual_ratio * (figures.original.residual_mm * 1e3), floor_um)
         return RegionLimits(limit_um, tolerance.contour_um, self.target)

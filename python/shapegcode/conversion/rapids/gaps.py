@@ -63,7 +63,7 @@ class Rapid:
 
 @dataclass(frozen=True)
 class Gap:
-    """The steps between two cuts, in order."""
+    """Rapids and other steps, in order, until a cut, a stop, a tool change or the end of the program."""
 
     steps: tuple[Rapid | float, ...]  # rapids, and durations of other steps, s
     cut_follows: bool  # a cut follows: the vibration must have settled at the end of the gap
@@ -75,7 +75,7 @@ class Gap:
 
 
 def find_gaps(program: Program, machine: Machine) -> list[Gap]:
-    """Collect the rapids of an emitted program between its cuts."""
+    """Find the gaps of an emitted program that contain a rapid, in order."""
     core = program.core
     moves = core.other_moves
     functions = core.functions
@@ -192,7 +192,7 @@ class _Reader:
         return ""
 
     def _feed_mm_per_s(self, travel_mm: FloatArray, units: int) -> float:
-        """Largest feed along a travel, whole number in F: each axis keeps its limit, the path the largest of these."""
+        """Largest feed along a travel, a whole F: each axis within its limit, the path within the largest of these."""
         share = np.abs(travel_mm) / np.linalg.norm(travel_mm)
         moved = share > 0.0
         along = float((self._largest_mm_per_s[moved] / share[moved]).min())
@@ -297,7 +297,10 @@ class OpenGap:
                 kept[reason] += 1
 
     def drop_useless(self, kept: Counter[str]) -> None:
-        """Leave each rapid unchanged, in program order, if its replacement does not let the next cut start sooner."""
+        """Leave each rapid unchanged, in program order, whose replacement saves less than the minimum gain.
+
+        Leave all unchanged if together they save less.
+        """
         # Start with all replaced: of two rapids with equal settling times, replacing one alone gains nothing.
         flags = [bool(choice.text) for choice in self.choices]
         ready_s = self._ready_s(flags)

@@ -146,7 +146,7 @@ def fit_lag(trace: ServoTrace, use: Masks, period_s: float, *, dead_time: bool) 
 def lag_estimates(
     fit: LoopFit, halves: Sequence[LoopFit], trace: ServoTrace, use: Masks, period_s: float
 ) -> tuple[ServoEstimate, ...]:
-    """Parameters of servo lag with dead time; 95 % intervals, no narrower than the halves of the record differ."""
+    """Parameters of servo lag with dead time; 95 % intervals, at least as wide as the fits to both halves are apart."""
 
     def model(values: FloatArray) -> FloatArray:
         late = values[0] / period_s

@@ -106,7 +106,7 @@ def _lines(source: str, file: str, notes: dict[str, Note]) -> tuple[list[str], d
 
 
 def _refuse_in_cycles(code: str, file: str) -> None:
-    """Refuse modal words of drilling cycles whose meaning differs on FANUC."""
+    """Refuse words in drilling cycles that FANUC reads differently: I, J, K of pecks, and P from a variable."""
     cycle = ""
     for number, whole_line in enumerate(_LINE.findall(code), start=1):
         line = whole_line.partition(";")[0]

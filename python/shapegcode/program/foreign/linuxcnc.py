@@ -98,7 +98,7 @@ class ToolTable:
 def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | None:
     """Read the tool table given by `input.tool_table`, directly or by an INI file; else `tool.tbl` in the folder.
 
-    None if there is no such file.
+    None if the key is empty and there is no such file.
     """
     if not stated:
         beside = folder / "tool.tbl" if folder is not None else None

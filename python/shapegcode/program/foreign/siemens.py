@@ -18,9 +18,10 @@ from shapegcode.program.foreign import read
 
 
 def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> read.ForeignProgram:
-    """Read a SINUMERIK program in DIN words.
+    """Read a SINUMERIK program (DIN mode).
 
-    Subprograms are looked for in the text, in `folder` and in `input.program_folders`: NAME.SPF, then NAME.MPF.
+    Subprograms are looked for in the text, in `folder` and in `input.program_folders`: NAME.SPF, NAME.MPF, then
+    _N_NAME_SPF, _N_NAME_MPF.
     """
     controller, settings, options = machine.controller, machine.input, _core.SiemensOptions()
     options.file = read.shown_name(file)

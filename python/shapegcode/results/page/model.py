@@ -339,7 +339,7 @@ def _json(report: Mapping[str, Any]) -> Section:
 
 
 def short_html(result: Outcome) -> str:
-    """Answer, warnings and tables for a notebook."""
+    """Answer, warnings, the first rows of each table, and next step, for a notebook."""
     parts = [f"<p><b>{escape(result.answer)}</b></p>"]
     parts += [f"<p>warning: {escape(warning)}</p>" for warning in result.warnings]
     for table in result.tables():

@@ -161,7 +161,7 @@ _SHARE_OF_STARTS = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """The kept samples."""
+    """Samples that are kept for a page, and the errors caused by leaving out the others."""
 
     sample: IntArray  # indices of the samples, (n,)
     labels: IntArray  # labels of each, (n, labels)

@@ -265,7 +265,7 @@ def _scatters(
 
 
 def _with_interval(row: result.CalibrationRun, run: logs.ObservedRun, machine: Machine) -> result.CalibrationRun:
-    """Add the interval that `time` gives for the program on the calibrated machine at the run's overrides."""
+    """Add the interval of the predicted time, as wide in percent as `time` gives it at the run's overrides."""
     interval = time_interval(run.timed.program, machine, row.feed_override, row.rapid_override)
     half = interval.half_width_s * row.predicted_s / interval.total_s if interval and interval.total_s > 0.0 else 0.0
     return replace(row, low_s=row.predicted_s - half, high_s=row.predicted_s + half)
@@ -479,7 +479,7 @@ _FUNCTIONS = {
 
 
 def _meaning(name: str) -> tuple[str, str, str]:
-    """Key, meaning and unit of a time in addition to the motion."""
+    """Key, meaning and unit of a time that is added to that of the motion."""
     return _FUNCTIONS.get(name) or ("times.m_codes", f"M{int(name[1:]):02d}", "s")
 
 

@@ -217,7 +217,7 @@ class SeenSection:
 
 
 def sections_of(runs: Sequence[ObservedRun]) -> list[SeenSection]:
-    """Sections of runs with enough readings."""
+    """The sections of all runs that contain enough readings."""
     found = []
     for run in runs:
         for cut_section in run.cut_sections:
@@ -293,7 +293,7 @@ def fit_motion(
     thorough: bool = True,
     on_step: Callable[[], None] = lambda: None,
 ) -> MotionFit:
-    """Minimise the misfit over the parameters of a family: Nelder-Mead, restarted at its end."""
+    """Minimise a family's misfit over its parameters: Nelder-Mead from several starts, then again near the best end."""
     from scipy.optimize import minimize
 
     sections = sections_of(runs)

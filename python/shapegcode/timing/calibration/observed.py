@@ -157,7 +157,10 @@ def lines_at(signal: Signal, log: RunLog, timed: TimedProgram) -> IntArray:
 
 
 def longest(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
-    """From pairs of value and duration: the value with the longest total time, and its fraction of the whole time."""
+    """From pairs of value and duration: the value with the longest total time, and its fraction of the whole time.
+
+    Without pairs: 1 and 1.
+    """
     held: dict[float, float] = defaultdict(float)
     for value, duration in pairs:
         held[value] += duration
@@ -173,7 +176,7 @@ def held_longest(signal: Signal, end_s: float | None) -> float:
 
 
 def feed_unit(entry: RunEntry, log: RunLog, timed: TimedProgram) -> float:
-    """Unit of the logged feed, mm/s: as stated, else that in which steady cuts run as programmed; NaN: unknown."""
+    """Unit of the logged feed, mm/s: as stated, else nearest to the programmed feeds; NaN: unknown, or few readings."""
     if log.feed is None or len(log.feed) < _MIN_READINGS:
         return math.nan
     line = lines_at(log.feed, log, timed)
@@ -211,7 +214,10 @@ def steady_value(values: FloatArray) -> float | None:
 def cut_sections_of(
     entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float, notes: list[str]
 ) -> list[CutSection]:
-    """Feed override of each section: by its steady feed, else as stated, else by the run's steady feed, else 1."""
+    """Feed override of each section.
+
+    By its steady feed, else as stated or logged, else by the run's steady feed, else 1.
+    """
     ratio, line = np.empty(0), np.empty(0, dtype=np.int64)
     if log.feed is not None and math.isfinite(unit):
         line = lines_at(log.feed, log, timed)
@@ -327,7 +333,7 @@ def _lines(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) 
 
 
 def _compare_tools(entry: RunEntry, log: RunLog, timed: TimedProgram, notes: list[str]) -> None:
-    """Compare the logged tools with those called by the program; note it if the log numbers tools in another way."""
+    """Compare logged tools with those that the program calls; note a difference, refuse the log of another version."""
     if log.tool is None:
         return
     called = {int(tool) for tool in timed.tools if tool >= 0}

@@ -1,4 +1,4 @@
-"""Directions of a calibrated cycle-time model that run logs do not determine, as rows for the machine file.
+"""Directions in the space of the parameters of a cycle-time model that run logs leave open: rows of the machine file.
 
 Each row is a step of one standard deviation, or of a fraction of it with a larger weight; rows are independent. The
 directions are those of the symmetric root of the covariance, each nearest to one parameter (Zuber and Strimmer, 2011,
@@ -43,7 +43,7 @@ def kind_weights(scores: Sequence[float], best: int) -> list[float]:
 
 
 def motion_rows(fit: MotionFit, covariance: FloatArray, runs: Sequence[ObservedRun], machine: Machine) -> list[_Row]:
-    """A row for each parameter of the motion; for look-ahead without a block time, also a row for the block time."""
+    """Rows for the parameters of the motion; for look-ahead without a fitted block time also one for the block time."""
     base, parameters = fit.file_values(), fit.family.parameters
     rows = []
     for index, step in enumerate(_symmetric_root(covariance).T):

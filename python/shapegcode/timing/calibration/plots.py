@@ -22,7 +22,7 @@ def plots_of(found: CycleTimeCalibration) -> dict[str, Plot]:
 
 
 def plot_cycle_time_calibration(found: CycleTimeCalibration, ax: Axes | None = None) -> Axes:
-    """Plot the errors of the calibrated model, one row for each run: of the whole run and of its tools.
+    """Plot the errors of the calibrated model for whole runs and for their tools, one row for each run (20 at most).
 
     How to read this: 0 is the measured time; the bands are 2 % for a run and 5 % for a tool's part; a bar is the
     95 % interval.

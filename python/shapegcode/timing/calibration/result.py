@@ -17,7 +17,7 @@ TOLERANCE_PERCENT = 2.0
 
 @dataclass(frozen=True)
 class FamilyScore(OldNames):
-    """One kind of look-ahead tried.
+    """A kind of look-ahead that was tried.
 
     Attributes:
         name: its name.
@@ -153,10 +153,10 @@ class CycleTimeCalibration(Result):
         machine: name.
         family: kind of look-ahead that predicts best the runs not used for its fit.
         families: all kinds tried.
-        numbers: calibrated parameters, one row for each key of the machine file.
+        numbers: calibrated parameters; a key of the machine file may have several rows, such as one per M code.
         runs: one row for each run.
         fitted: the calibrated machine.
-        remarks: interval and source of each key that was set in the machine file, by dotted name.
+        remarks: source of each key that was set in the machine file, with its interval if known, by dotted name.
         undetermined: parameters that the logs do not determine, in words.
         warnings: runs with errors above 2 %, and holds.
         largest_error_percent: of a run, by cross-validation if possible, without holds; null: no complete run.

@@ -64,7 +64,7 @@ class RunEntry:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the program in a log."""
+        """Names that a log may give to the program."""
         if self.logged_as is not None:
             return (self.logged_as,)
         with open_file(self.program) as file:
@@ -152,7 +152,7 @@ class _RunsRow(TomlTable):
 
 
 class _RunsTable(TomlTable):
-    """The file."""
+    """Contents of a file of runs."""
 
     runs: Annotated[tuple[_RunsRow, ...], Field(min_length=1)] = key("programs and logs")
 
