@@ -151,7 +151,7 @@ CONVERT = Interface(
          "duration of the shortest block, for example 5ms (default: emission.block_period_s of the machine file, else "
          "chosen for the modes)"),
         ("--max-bytes", "N[k|M]", size,
-         "largest size of the emitted program, for example 256k; to keep it, the cuts that gain least are left "
+         "largest size of the emitted program, for example 256k; to keep it, cuts gaining least per byte stay "
          "unchanged"),
         ("--baud", "N", positive,
          "speed of the serial line; if it is too low, longer block periods are used; if they are not enough, cuts are "

@@ -221,7 +221,7 @@ class Spending:
         return [factor for factor in factors if factor > 1.0 + _ROUNDING]
 
     def _worth(self, grid: Grid, loads: Mapping[int, TransferLoad], weights: Sequence[float]) -> tuple[float, int, int]:
-        """Rank of a grid: gain of the regions within the rate limits, then their number, then the shorter shaper."""
+        """Rank of a grid: weight of regions within the rate limits, then their number, then the shorter shaper."""
         slow = [index for index, load in loads.items() if not self.budget.too_fast(load)]
         return math.fsum(weights[index] for index in slow), len(slow), -round(grid.duration_s / self._period_s)
 

@@ -198,7 +198,7 @@ def _restarts(program: Program, emitted: Program, written: Written, machine: Mac
     ]
     for (first, last), each in sorted(long, key=lambda pair: -pair[1].longest_s)[:1]:
         more = f" (longest gap; {len(long) - 1} more)" if len(long) > 1 else ""
-        why = each.reason or "the command is not slow anywhere there"
+        why = each.reason or "the command is not slow enough there"
         remedy = "" if each.reason or emission.restart_stops else "; emission.restart_stops = true adds a stop"
         yield (
             f"no restart point for {_duration(each.longest_s)} in original lines {first} to {last}{more}: {why}{remedy}"

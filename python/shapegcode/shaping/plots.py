@@ -80,7 +80,7 @@ def _shapers_and_bands(
 
 
 def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
-    """Plot worst residual and contour cost over duration: what less vibration costs.
+    """Plot worst residual and contour cost (variance of impulses) over duration.
 
     Designs on the Pareto front are filled, the recommended one is ringed.
 

@@ -278,8 +278,8 @@ class Recommendation(Result):
     def shown(self, *, everything: bool = False) -> list[int]:
         """Indices of the designs for a table, shortest first.
 
-        The recommended designs, overall and for each grid; per family at continuous times the preferred design and the
-        shortest ones of the Pareto front, and the shortest one on any grid.
+        The recommended designs, overall and for each grid. Of each family also: at continuous times the preferred
+        design and the shortest on the Pareto front; on grids the shortest.
 
         Args:
             everything: return all designs.

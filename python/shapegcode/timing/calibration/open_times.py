@@ -1,8 +1,8 @@
 """Directions in the space of the parameters of a cycle-time model that run logs leave open: rows of the machine file.
 
 Each row is a step of one standard deviation, or of a fraction of it with a larger weight; rows are independent. The
-directions are those of the symmetric root of the covariance, each nearest to one parameter (Zuber and Strimmer, 2011,
-"CAR scores"): so the squared changes of a time are the contributions of the parameters to its variance.
+directions are columns of the symmetric root of the covariance, each nearest to one parameter (Zuber and Strimmer, 2011,
+"CAR scores"): a row's change to a time, squared, is the part of its variance from that parameter.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def motion_rows(fit: MotionFit, covariance: FloatArray, runs: Sequence[ObservedR
 
 
 def _unnoticed_block_time(fit: MotionFit, runs: Sequence[ObservedRun], machine: Machine) -> float:
-    """Largest block time that the logs do not contradict, s; at most that of common controls."""
+    """Largest block time that the logs do not contradict, s; at most `_USUAL_BLOCK_TIME_S`."""
     sections, model = sections_of(runs), fit.model(machine)
     before, block_time = misfit(sections, model), _USUAL_BLOCK_TIME_S
     while block_time > 1e-4:
@@ -81,7 +81,7 @@ def _unnoticed_block_time(fit: MotionFit, runs: Sequence[ObservedRun], machine: 
 def function_rows(
     functions: FunctionFit, file_values: Callable[[FunctionFit], Mapping[str, object]], meaning: Callable[[str], str]
 ) -> list[_Row]:
-    """A row for each time in addition to the motion."""
+    """A row for each time that adds to the motion's."""
     names, base = list(functions.values), file_values(functions)
     value = np.array(list(functions.values.values()))
     rows = []
