@@ -69,8 +69,8 @@ def convert(
         block_period_s: block period, s: `emission.block_period_s`; if neither is set, `choose_grid` chooses it.
         max_time_increase_percent: largest increase of the program's time: `price.program_time_percent`.
         max_cut_time_increase_percent: largest increase of the time of one cut: `price.cut_time_percent`.
-        only: ranges of lines (first, last) of the original: shape only the cuts with a line in one of them; None: all.
-        leave: ranges of lines (first, last) of the original: leave the cuts with a line in one of them unchanged.
+        only: ranges of lines of the expanded program (first, last): shape only the cuts with a line in one; None: all.
+        leave: ranges of lines of the expanded program (first, last): leave the cuts with a line in one unchanged.
         shape_all: shape every cut that can be shaped within the limits of ``[price]``, even if it gains less than
             `shaping.least_gain_um`, gets worse, or the program is within tolerance. False: such cuts stay unchanged.
         tolerance_curve: compute the cycle time at other contour tolerances.

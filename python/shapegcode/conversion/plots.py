@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def plots_of(conversion: Conversion) -> dict[str, Plot]:
-    """Path, feed and vibration of the cut with the largest residual vibration in the original; tolerance curve."""
+    """Path, feed and vibration of the shaped cut with the largest original residual vibration; tolerance curve."""
     found = motion_pictures(partial(_simulated, conversion)) if conversion.regions else {}
     if conversion.tolerance_curve is not None and len(conversion.tolerance_curve.points) > 1:
         found["tolerance"] = partial(plot_tolerance, conversion.tolerance_curve)

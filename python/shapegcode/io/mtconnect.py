@@ -275,7 +275,7 @@ class _Odd:
             )
 
     def find(self, name: bytes) -> Item | None:
-        """Identify an item and cache it, with a limit for files that are no log."""
+        """Identify an item; at most 10 000 are cached (a file may be no log)."""
         item = self._table.find(name.decode("utf-8", errors="replace").strip())
         if len(self._known) < 10_000:
             self._known[name] = item

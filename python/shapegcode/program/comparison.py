@@ -230,7 +230,7 @@ class Comparison(Result):
 
     @property
     def answer(self) -> str:
-        """Unchanged items, distance of the paths, and a difference that is not allowed: an early end, or the first."""
+        """Unchanged items, distance of the paths; of the differences not allowed an early end, else the first."""
         always = (self.count(kind) for kind in _ALWAYS)
         unchanged = ", ".join(f"{each.unchanged} of {each.original} {_noun(each.kind)}" for each in always)
         others = (each for each in self.counts if each.differs and each.kind not in (*_ALWAYS, "emission"))
