@@ -200,10 +200,7 @@ def read_back(plan: ConversionPlan, written: Written) -> ReadBack:
 
 
 def simulate(plan: ConversionPlan, written: Written, text: ReadBack, *, prefetch: bool = False) -> Shaped:
-    """Simulate every shaped cut in the operating conditions, unless its text was simulated before.
-
-    `prefetch`: also start the sensitivity analysis if the deciding cut is known already.
-    """
+    """Simulate every shaped cut with new text; `prefetch`: also start the sensitivity analysis of the deciding cut."""
     placed, (emitted, trackers) = written.placed, text
     indices = [plan.aims.index(place.region) for place in placed]
     places = [placed[rank] for rank in trackers]

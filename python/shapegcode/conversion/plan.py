@@ -153,10 +153,7 @@ class Aims:
     def keep_program_price(
         self, excess_s: float, gains_um: Mapping[int, float], keepable: Callable[[int], bool]
     ) -> bool:
-        """Bring the program's time within its price.
-
-        Where it saves time, tolerances are loosened to a common value; if no value suffices, cuts are left unchanged.
-        """
+        """Bring the program's time within its price: loosen tolerances to a common value, then leave cuts unchanged."""
         cuts = [index for index in gains_um if not self.reasons[index]]
         wanted_s = math.fsum(self.emitted_s[index] for index in cuts) - excess_s
 
@@ -327,10 +324,7 @@ class ToleranceCurve:
 def plan_curve(
     path: _core.Path, fir: _core.Fir, options: _core.ShapingOptions, asked_um: float, original_um: float
 ) -> CutCurve:
-    """Plan a cut at several tolerances: first without any limit, then ever tighter, down to the requested tolerance.
-
-    Each search starts from the speeds of the search before it.
-    """
+    """Plan a cut without limit, then ever tighter to the requested tolerance; each search starts from the last one."""
     wanted = sorted(
         {*(factor * asked_um for factor in (*_FACTORS, *_BETWEEN)), max(original_um, asked_um)}, reverse=True
     )
@@ -526,10 +520,7 @@ class ConversionPlan:
             self.gains_um[index] = gained_um
 
     def leave_out(self) -> None:
-        """Before shaping, leave cuts unchanged that have nothing to gain; all if every cut keeps its limits.
-
-        None is left with `choice.shape_all`, nor ever one that cannot stay unchanged.
-        """
+        """Leave cuts unchanged without gain; all that can be if every cut keeps its limits (not with `shape_all`)."""
         self.original_within = self._original_is_within()
         if self.choice.shape_all:
             return

@@ -63,10 +63,7 @@ def translate(
     shaped: Sequence[tuple[_core.Path, tuple[int, int], tuple[int, int]]] = (),
     block_period_s: float = 0.0,
 ) -> Translation:
-    """Write a program in the dialect `emission.dialect`.
-
-    `shaped`: blocks and lines of each shaped cut, and the lines of `original` that it replaces.
-    """
+    """Write a program in `emission.dialect`; `shaped`: blocks and lines of each shaped cut, and the lines replaced."""
     dialect = dialect_of(machine.emission.dialect)
     assert dialect is not None  # FANUC's words are the input
     writer = _Translator(dialect, program, machine, original or program, shaped, block_period_s)

@@ -260,10 +260,7 @@ def _in_lines(each: FrequencyResponse, poles: _Poles) -> _Amplitudes:
 
 
 def _solved(columns: FloatArray, goal: FloatArray, modes: int) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Complex factors of the modes by least squares, their variance, and the residual.
-
-    The first columns are those of the modes: all real parts, then all imaginary parts.
-    """
+    """Least-squares factors of the modes (first columns: real parts, then imaginary), their variance, the residual."""
     norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     basis, sizes, turned = np.linalg.svd(columns / norms, full_matrices=False)
     kept = sizes > 1e-10 * sizes[0]

@@ -208,10 +208,7 @@ class _Clock:
         self.correlation = float(np.mean(self.shares))
 
     def _coarse(self) -> tuple[float, float, float, FloatArray]:
-        """Find the relative error of the clock's rate, its start, the wait per part, and squared correlations by part.
-
-        Only frequencies below 40 Hz are used.
-        """
+        """Relative error of the clock's rate, start, wait per part, squared correlations; frequencies below 40 Hz."""
         command, period = self.command, self.record.period_s
         thinner = max(1, int(0.4 / period / _COARSE_HZ))
         values = resample_poly(self.values, 1, thinner)

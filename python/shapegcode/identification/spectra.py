@@ -262,10 +262,7 @@ def _events(envelope: FloatArray) -> npt.NDArray[np.intp]:
 
 
 def _until_next(envelope: FloatArray, starts: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
-    """First and last + 1 sample of the decay after each start.
-
-    It ends where the envelope, a forward RMS, is lowest before the next start; the last one ends with the record.
-    """
+    """First and last + 1 sample of each decay: to where the envelope is lowest before the next start, or the end."""
     ends = [int(a) + int(np.argmin(envelope[a:b])) + 1 for a, b in pairwise(starts)]
     return list(zip([int(each) for each in starts], [*ends, len(envelope)], strict=True))
 

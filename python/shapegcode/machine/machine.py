@@ -222,10 +222,7 @@ class Machine(TomlTable):
 
     @property
     def dial_positions(self) -> tuple[float, ...]:
-        """Override ratios of override-tolerant blocks: both limits of [verdict], and the multiples of 0.1 between them.
-
-        If both limits are 100 %, they are replaced by 0.7 and 1.2.
-        """
+        """Ratios of override-tolerant blocks: limits of [verdict] (both 100 %: .7 and 1.2), multiples of .1 between."""
         low, high = self.verdict.override_percent
         if low == high == 100.0:
             low, high = _USUAL_DIAL_PERCENT

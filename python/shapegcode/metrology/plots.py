@@ -19,10 +19,7 @@ _SHARE_OF_PART, _MIN_SHOWN_UM, _MAX_MARKED = 0.03, 1e-3, 12
 
 
 def plots_of(measurement: Measurement) -> dict[str, Plot]:
-    """Pictures by name, of the region with the largest deviation of walls.
-
-    Empty unless walls of a region were measured in every program.
-    """
+    """Pictures of the region with the largest deviation of walls; empty unless every program has walls of a region."""
     if _worst_region(measurement) is None:
         return {}
     return {"measure-part": partial(plot_part, measurement), "measure-walls": partial(plot_walls, measurement)}

@@ -111,10 +111,7 @@ def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
 
 
 def called_from(text: bytes, index: int, kept: Iterable[int]) -> tuple[ProgramPlace, ...]:
-    """Programs of a file that program `index` still calls on the control, directly or through another one.
-
-    `kept`: the program numbers in its calls that were not expanded.
-    """
+    """Programs of a file that program `index` calls, also indirectly; `kept`: numbers called and not expanded."""
     entries, places = _core.list_programs(text), programs_of(text)
     found: set[int] = set()
     waiting = [(index, number) for number in kept]

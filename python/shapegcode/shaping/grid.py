@@ -228,10 +228,7 @@ def check_block_period(period_s: float, machine: Machine) -> None:
 def candidate_periods(
     bands: Sequence[ModeBand], machine: Machine | None, max_duration_s: float, vibration_limit: float = 0.05
 ) -> list[float]:
-    """Block periods to compare, ascending, s: the machine's, or up to three with the shortest non-negative shapers.
-
-    If no period has such a shaper: the three shortest periods.
-    """
+    """Block periods to compare, ascending, s: the machine's, or three, of the shortest non-negative shapers if any."""
     from shapegcode.shaping.robust import Task, shortest_below
 
     if machine is not None and machine.emission.block_period_s is not None:
@@ -458,10 +455,7 @@ def override_vibration_um(
 
 
 def best_for_overrides(designs: Iterable[tuple[float, _core.Shaper]], machine: Machine, feed_mm_per_s: float) -> float:
-    """Period whose shaper has the smallest product of duration and vibration at other overrides.
-
-    Vibration below the residual floor counts as the floor.
-    """
+    """Period whose shaper has the smallest duration times vibration (at least the floor) at other overrides."""
     model = MachineModel(machine)
     floor_um = max(machine.tolerance.residual_floor_um, 1e-3)
 

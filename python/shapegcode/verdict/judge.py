@@ -254,10 +254,7 @@ class Judge:
         return None if worst is None else worst.lines
 
     def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
-        """Limits of a region, the same in all cases.
-
-        The residual may be the original's times `tolerance.residual_ratio`, or `residual_floor_um` if that is more.
-        """
+        """Limits of a region; of the residual: `residual_ratio` times the original's, or the floor if that is more."""
         tolerance, floor_um = self._machine.tolerance, residual_floor_um(place.region, self._machine)
         limit_um = np.maximum(tolerance.residual_ratio * (figures.original.residual_mm * 1e3), floor_um)
         return RegionLimits(limit_um, tolerance.contour_um, self.target)

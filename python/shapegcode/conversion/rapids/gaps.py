@@ -297,10 +297,7 @@ class OpenGap:
                 kept[reason] += 1
 
     def drop_useless(self, kept: Counter[str]) -> None:
-        """Leave each rapid unchanged, in program order, whose replacement saves less than the minimum gain.
-
-        Leave all unchanged if together they save less.
-        """
+        """Leave rapids unchanged whose replacement saves less than the minimum gain, and all if together they do."""
         # Start with all replaced: of two rapids with equal settling times, replacing one alone gains nothing.
         flags = [bool(choice.text) for choice in self.choices]
         ready_s = self._ready_s(flags)

@@ -78,10 +78,7 @@ def delayed(motion: FloatArray, samples: float) -> FloatArray:
 
 
 def lagged_motion(motion: FloatArray, gain_per_s: float, period_s: float, late: float = 0.0) -> FloatArray:
-    """Error of a first-order lag without feed-forward (f = 0), exact for set-points joined by straight lines.
-
-    `late`: delay of the motion in samples.
-    """
+    """Error of a first-order lag (f = 0), exact for set-points joined by straight lines; `late`: delay in samples."""
     kept = math.exp(-gain_per_s * period_s)
     share = (1.0 - kept) / (gain_per_s * period_s)  # for a ramp over one period
     first = motion[1] - motion[0]

@@ -96,10 +96,7 @@ class ToolTable:
 
 
 def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | None:
-    """Read the tool table given by `input.tool_table`, directly or by an INI file; else `tool.tbl` in the folder.
-
-    None if the key is empty and there is no such file.
-    """
+    """Read the tool table of `input.tool_table` (also by an INI file), else `tool.tbl` of the folder; None: no file."""
     if not stated:
         beside = folder / "tool.tbl" if folder is not None else None
         return read_tool_table(beside, unit) if beside is not None and beside.is_file() else None

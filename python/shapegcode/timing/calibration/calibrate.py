@@ -152,10 +152,7 @@ def _observed(file: RunsFile, machine: Machine) -> list[logs.ObservedRun]:
 
 
 def _folds(runs: Sequence[logs.ObservedRun]) -> list[list[logs.ObservedRun]]:
-    """Cross-validation groups: all runs of one or more programs; with a single program (weaker) two groups of its runs.
-
-    Empty if there is only one group.
-    """
+    """Cross-validation groups: runs of one or more programs, or two groups of one program (weaker); empty: one."""
     by_program: dict[int, list[logs.ObservedRun]] = defaultdict(list)
     for run in runs:
         by_program[id(run.timed)].append(run)

@@ -157,10 +157,7 @@ def lines_at(signal: Signal, log: RunLog, timed: TimedProgram) -> IntArray:
 
 
 def longest(pairs: Iterable[tuple[float, float]]) -> tuple[float, float]:
-    """From pairs of value and duration: the value with the longest total time, and its fraction of the whole time.
-
-    Without pairs: 1 and 1.
-    """
+    """From pairs of value and duration: value with the longest total time, and its fraction; without pairs 1 and 1."""
     held: dict[float, float] = defaultdict(float)
     for value, duration in pairs:
         held[value] += duration
@@ -214,10 +211,7 @@ def steady_value(values: FloatArray) -> float | None:
 def cut_sections_of(
     entry: RunEntry, log: RunLog, timed: TimedProgram, unit: float, notes: list[str]
 ) -> list[CutSection]:
-    """Feed override of each section.
-
-    By its steady feed, else as stated or logged, else by the run's steady feed, else 1.
-    """
+    """Feed override of each section: by its steady feed, else stated or logged, else the run's steady feed, else 1."""
     ratio, line = np.empty(0), np.empty(0, dtype=np.int64)
     if log.feed is not None and math.isfinite(unit):
         line = lines_at(log.feed, log, timed)
