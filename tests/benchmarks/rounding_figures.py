@@ -6,7 +6,6 @@ import math
 import os
 import random
 import sys
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,12 +17,12 @@ import numpy.typing as npt
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 
 import shapegcode as sg
+from acceptance import machine_with
 from judge.interpreter import interpret
 from judge.plant import residual_um
 from judge.player import play
 from shapegcode import _core
 from shapegcode.conversion.convert import convert
-from shapegcode.machine.programs import ANY_PRICE
 
 MODES = ((46.0, 0.02), (131.0, 0.02), None)
 #: Name, inch, least increment in mm.
@@ -66,13 +65,12 @@ def path(seed: int, *, inch: bool = False) -> str:
 
 def machine(rounding: str, period_s: float, increment_mm: float = 1e-3) -> sg.Machine:
     """The VX500 with a rounding and a block period, at any price, and IS-C words if the increment is 0.1 µm."""
-    data = tomllib.loads(sg.Machine.builtin_text("vx500"))
-    data["emission"]["rounding"] = rounding
-    data["emission"]["block_period_s"] = period_s
-    data["controller"]["block_time_s"] = period_s
-    if increment_mm < 1e-3:
-        data["controller"]["least_increment_mm"] = increment_mm
-    return sg.Machine.from_data(data).with_values(ANY_PRICE)
+    return machine_with(
+        {
+            "emission.rounding": rounding, "emission.block_period_s": period_s, "controller.block_time_s": period_s,
+            "controller.least_increment_mm": min(increment_mm, 1e-3),
+        }
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -161,7 +161,7 @@ def test_what_people_see(capsys: pytest.CaptureFixture[str], taps: list[str]) ->
 
 def test_the_next_command_finds_the_same_modes(capsys: pytest.CaptureFixture[str], taps: list[str]) -> None:
     determining = ["--response-scale=1.5", "--freq", "20:400", "--max-modes", "3"]
-    assert main(["identify", "--quiet", *determining, taps[0], "--json", "-"]) == 0
+    assert main(["identify", *determining, "-q", taps[0], "--json", "-"]) == 0
     said = json.loads(capsys.readouterr().out)["next_step"]
     assert f"identify {taps[0]} --axis x {' '.join(determining)} --update mine.toml" in said
 

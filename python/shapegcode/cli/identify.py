@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import shlex
 from dataclasses import fields, replace
 from pathlib import Path
@@ -37,6 +38,7 @@ _OF_FILES = (
      "time constant of an exponential window that the analyser applied to the response, such as 50ms"),
     ("--response-first", None, bool, "in a WAV file the response is the first channel, not the force"),
 )  # fmt: skip
+_OPTION = re.compile("--?[A-Za-z]")  # not a negative number
 _DETERMINING = {
     "--across", "--modes", "--max-modes", "--most-modes", "--frequencies", "--decay", "--ignore-force", "--stops",
     "--start", *(name for names, *_ in _OF_FILES for name in names.split()),
@@ -97,8 +99,8 @@ def _said_again(args: argparse.Namespace) -> tuple[str, ...]:
     """Options that determine which modes are found, as typed: the command of the next step repeats them."""
     said, repeats = [], False
     for word in args.typed[1:]:
-        if word.startswith("--"):
-            name = word.partition("=")[0]
+        if _OPTION.match(word):
+            name = word.partition("=")[0]  # or an abbreviation
             repeats = name != "--force" and any(each.startswith(name) for each in _DETERMINING)
         if repeats and word not in args.files:
             said.append(shlex.quote(word))

@@ -1,7 +1,5 @@
 #include "program/linuxcnc/plain_lines.hpp"
 
-#include <limits>
-
 #include "program/text/characters.hpp"
 #include "program/text/number_scan.hpp"
 
@@ -14,15 +12,13 @@ bool is_digit_at(std::string_view text, std::size_t i) noexcept { return i < tex
 
 char letter_at(std::string_view text, std::size_t i) noexcept { return i < text.size() ? upper(text[i]) : '\0'; }
 
-constexpr std::size_t no_n_word = std::numeric_limits<std::size_t>::max();
-
-/// Reads N and its digits; none: N has no digits, or too many. `no_n_word`: there is no N.
+/// Reads N and its digits; 0: there is no N; none: N0, or N without digits or with too many.
 std::optional<std::size_t> scan_n_word(std::string_view text, std::size_t& i) noexcept {
-  if (letter_at(text, i) != 'N') return no_n_word;
+  if (letter_at(text, i) != 'N') return 0;
   const std::size_t begin = ++i;
   std::size_t number = 0;
   for (; is_digit_at(text, i); ++i) number = 10 * number + static_cast<std::size_t>(text[i] - '0');
-  if (i == begin || i - begin > most_characters) return std::nullopt;
+  if (number == 0 || i - begin > most_characters) return std::nullopt;
   skip_spaces(text, i);
   return number;
 }
@@ -79,7 +75,7 @@ class PlainScanner {
     std::size_t i = found_.end;
     skip_spaces(text_, i);
     const std::optional<std::size_t> n_word = scan_n_word(text_, i);
-    if (!n_word || (*n_word != no_n_word && !is_kept(*n_word))) return false;
+    if (!n_word || (*n_word > 0 && !is_kept(*n_word))) return false;
     const bool has_g = letter_at(text_, i) == 'G';
     const int motion = has_g ? scan_motion(text_, i) : -1;
     const bool is_arc = motion > 1;
@@ -90,13 +86,11 @@ class PlainScanner {
     if (letter_at(text_, i) == 'F' && !(line.feed = scan_value(text_, i))) return false;
     if (i >= text_.size() || text_[i] != '\n') return false;
     take(line, has_g, motion, i + 1);
-    if (*n_word != no_n_word) found_.n_words.push_back(static_cast<std::uint32_t>(*n_word));
+    if (*n_word > 0) found_.n_words.push_back(static_cast<std::uint32_t>(*n_word));
     return true;
   }
 
-  bool is_kept(std::size_t n_word) const noexcept {
-    return n_word > 0 && n_word < n_counts_.size() && n_counts_[n_word] == 1;
-  }
+  bool is_kept(std::size_t n_word) const noexcept { return n_word < n_counts_.size() && n_counts_[n_word] == 1; }
 
   bool scan_axes(std::size_t& i, Line& line) const noexcept {
     const std::size_t begin = i;

@@ -17,7 +17,7 @@ from shapegcode.conversion.write import EmittedRegion
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.model.modes import UNKNOWN_OFFSET
+from shapegcode.model.modes import UNKNOWN_OFFSET, moving_axis
 from shapegcode.program import MM_PER_INCH, Program
 from shapegcode.verdict.figures import RegionVerdict
 
@@ -370,7 +370,7 @@ class RapidPlant:
         self._machine_model = model
         self.model = model.ordinary.model
         self.band_mm = machine.tolerance.residual_floor_um * 1e-3
-        self._moving = any(mode.frequency_over is not None for axis in machine.axes.as_tuple() for mode in axis.modes)
+        self._moves = moving_axis(machine) is not None
         self.longest_memory_s = model.vibration_memory_s or math.inf  # earlier motion is ignored, s
         self._known: dict[tuple[float, ...], Timing] = {}
 
@@ -378,7 +378,7 @@ class RapidPlant:
         """Simulate a rapid as G00; if it has no region, its work offset is unknown, and the nominal modes are used."""
         travel = rapid.travel_mm
         key = tuple(np.round(travel, 9))
-        if not self._moving and key in self._known:
+        if not self._moves and key in self._known:
             return self._known[key]
         samples = _core.rapid_samples(rapid.start_mm, rapid.end_mm, self.model)
         motion_s, arrival_s = _core.rapid_time_s(travel, self.model), _core.in_position_wait_s(travel, self.model)
