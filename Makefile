@@ -45,7 +45,7 @@ SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 .PHONY: help demo test test-all lint bench bench-full bench-realtime coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
-        build-packages test-packages package dev fetched lint-package lint-others tidy tidy-all release trials plain sanitize threads wheel stub-check \
+        build-packages test-packages package dev fetched lint-package lint-others tidy tidy-all release release-build release-test trials plain sanitize threads wheel stub-check \
         test-all-core test-all-python test-linuxcnc fuzz-parameters fuzz-merge
 
 help:
@@ -53,7 +53,7 @@ help:
 	@echo 'make test    what must hold, in minutes: lint, C++ tests, stubs, Python tests'
 	@echo 'make test-all  slow tests, sanitizers, each source by itself with Clang, clang-tidy of everything and the book as well'
 	@echo 'make test-linuxcnc  the HAL component in LinuxCNC'"'"'s own simulation (installs linuxcnc-uspace); part of test-all'
-	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy of what changed since the last test-all and of its users'
+	@echo 'make lint    style, imports and types: ruff, import-linter, mypy, clang-format, clang-tidy of what changed since the last test-all and of its users'
 	@echo 'make threads  the controller with a thread for each of its parts, under ThreadSanitizer; part of test-all'
 	@echo 'make coverage  lines of C++ and Python that `make test` runs'
 	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter; bench-full: with all repetitions'
@@ -75,12 +75,12 @@ demo: package
 	$(BIN)/shapegcode convert tests/golden/programs/PARALLEL.NC -m vx500 --set tolerance.contour_um=10 \
 	  -o demo-output/PARALLEL.NC --plots demo-output --json demo-output/PARALLEL.json --html demo-output/PARALLEL.html
 
-# Mostly one after the other, so that the output reads from top to bottom and ends with pytest's own closing line.
-TOGETHER := --no-print-directory -j$(JOBS) --output-sync=recurse
+# What one process does (pip, mypy) runs beside the compiler and the C++ tests. The output ends with pytest's closing line.
+TOGETHER = --no-print-directory --output-sync=recurse $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(JOBS))
 test:
-	$(MAKE) lint
-	$(MAKE) release
-	$(MAKE) $(TOGETHER) stub-check fetched
+	$(MAKE) --no-print-directory -j$(JOBS) lint release-build
+	$(MAKE) package
+	$(MAKE) $(TOGETHER) release-test stub-check fetched
 	$(PYTEST) -m 'not slow'
 
 # What takes longer than a person waits; .ci/run does of it what guards a file that changed since it last passed, which
@@ -122,6 +122,7 @@ lint-package: dev
 lint-others: test-packages dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	PYTHONPATH=python $(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/mypy $(BENCHMARK_CHECK) tests/benchmarks
 	clang-format --dry-run -Werror $(CPP_FILES)
 	$(MAKE) tidy
@@ -222,15 +223,18 @@ build-packages:
 	@tests/tools/debian_packages.sh $(BUILD_PACKAGES)
 	@tests/tools/fetch_sundials.sh
 
-test-packages:
+test-packages: build-packages
 	@tests/tools/debian_packages.sh $(TEST_PACKAGES)
-	@tests/tools/fetch_sundials.sh
 
-.venv/.runtime: pyproject.toml tests/tools/requirements.py | build-packages
+.venv/.build: pyproject.toml tests/tools/requirements.py | build-packages
 	@$(PYTHON) -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo '$(PYTHON) must be Python 3.11 or newer, with venv; name another one with PYTHON=...' >&2; exit 1; }
 	[ -x $(BIN)/python ] || $(PYTHON) -m venv .venv
-	$(PIP) install -r <($(PYTHON) tests/tools/requirements.py build runtime)
+	$(PIP) install -r <($(PYTHON) tests/tools/requirements.py build)
+	touch $@
+
+.venv/.runtime: .venv/.build
+	$(PIP) install -r <($(PYTHON) tests/tools/requirements.py runtime)
 	touch $@
 
 .venv/.dev: .venv/.runtime
@@ -262,10 +266,15 @@ dev: .venv/.dev
 
 package: .venv/.package
 
-release: test-packages .venv/.runtime
+release: release-build
+	$(MAKE) release-test
+
+release-build: test-packages .venv/.build
 	$(CONFIGURE_RELEASE)
-	cmake --build --preset $@
-	ctest --preset $@
+	cmake --build --preset release
+
+release-test:
+	ctest --preset release
 
 sanitize: test-packages
 	cmake --preset $@
@@ -273,20 +282,20 @@ sanitize: test-packages
 	ctest --preset $@ $(CTEST_FLAGS)
 
 # All random trials of the C++ tests, of which `release` runs half.
-trials: test-packages .venv/.runtime
+trials: test-packages .venv/.build
 	$(CONFIGURE_RELEASE)
 	cmake --build --preset release --target core_tests
 	SHAPEGCODE_ALL_TRIALS=1 ctest --preset release -L trials $(CTEST_FLAGS)
 
 # The controller with a thread for each of its parts, and LinuxCNC's component as it is unloaded, under ThreadSanitizer.
-threads: test-packages .venv/.runtime
+threads: test-packages .venv/.build
 	$(CONFIGURE_RELEASE)
 	cmake --build --preset release --target thread_tests hal_thread_tests
 	TSAN_OPTIONS=halt_on_error=1 build/release/tests/cpp/thread_tests
 	SHAPEGCODE_ALL_TRIALS=1 TSAN_OPTIONS=halt_on_error=1 build/release/tests/cpp/hal_thread_tests --source-file='*test_linuxcnc_shaper.cpp'
 
 # Each source and public header by itself, with Clang's warnings as errors: read, not compiled, as GCC compiles them all.
-plain: .venv/.runtime
+plain: .venv/.build
 	@tests/tools/debian_packages.sh $(CLANG_PACKAGES)
 	cmake --preset $@ -D SHAPEGCODE_BUILD_PYTHON=ON -D Python_EXECUTABLE=$(CURDIR)/$(BIN)/python \
 	  -D pybind11_DIR="$$($(BIN)/python -m pybind11 --cmakedir)"

@@ -67,15 +67,21 @@ def test_a_lower_feed_is_reached_before_it_begins_and_kept_to_its_end() -> None:
     assert kept.cutting_time_s.emitted - free.cutting_time_s.emitted < 2.0 * kept.shaper.duration_s
 
 
-def test_what_runs_too_fast_is_a_miss_that_says_where(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def unlimited(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The core plans without a limit of the feed excess."""
     options = write.RegionWriter.options
 
-    def unlimited(self: write.RegionWriter, *args: object) -> _core.ShapingOptions:
+    def options_of(self: write.RegionWriter, *args: object) -> _core.ShapingOptions:
         found = options(self, *args)  # type: ignore[arg-type]
         found.feed_excess_ratio = math.inf
         return found
 
-    monkeypatch.setattr(write.RegionWriter, "options", unlimited)
+    monkeypatch.setattr(write.RegionWriter, "options", options_of)
+
+
+@pytest.mark.usefixtures("unlimited")
+def test_what_runs_too_fast_is_a_miss_that_says_where(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plan, "_MIN_FEED_RATIO", 1.0)
     conversion, measured = converted(SMALL_ARCS)
     assert not conversion.ok
@@ -85,15 +91,8 @@ def test_what_runs_too_fast_is_a_miss_that_says_where(monkeypatch: pytest.Monkey
     assert row.limit == pytest.approx(5.0) and row.emitted > 5.0
 
 
-def test_a_region_that_runs_too_fast_is_slowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    options = write.RegionWriter.options
-
-    def unlimited(self: write.RegionWriter, *args: object) -> _core.ShapingOptions:
-        found = options(self, *args)  # type: ignore[arg-type]
-        found.feed_excess_ratio = math.inf
-        return found
-
-    monkeypatch.setattr(write.RegionWriter, "options", unlimited)
+@pytest.mark.usefixtures("unlimited")
+def test_a_region_that_runs_too_fast_is_slowed() -> None:
     conversion, measured = converted(SMALL_ARCS)
     assert measured.ratio <= 1.05
     assert conversion.ok

@@ -1,9 +1,8 @@
-"""The rules of the house: who may use whom, what is loaded when, what every public name must say."""
+"""The rules of the house: who may include whom in C++, what is loaded when, what every public name must say."""
 
 from __future__ import annotations
 
 import ast
-import functools
 import importlib.metadata
 import inspect
 import re
@@ -152,100 +151,12 @@ def test_headers_are_included_by_their_whole_path() -> None:
     assert offenders(cpp_files("include", "src"), is_short) == []
 
 
-@functools.cache
-def names_in(file: Path) -> tuple[frozenset[str], frozenset[str], tuple[str, ...]]:
-    """Top-level packages that a Python file loads, own modules that it imports, also for types, and its classes."""
-    loaded, own, classes, for_types = set(), set(), [], set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), filename=str(file))):
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            for_types |= {*node.body}
-        elif isinstance(node, ast.ClassDef):
-            classes.append(node.name)
-        elif isinstance(node, ast.Import):
-            names = {alias.name for alias in node.names}
-            own |= names
-            loaded |= set() if node in for_types else names
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            own |= {f"{node.module}.{alias.name}" for alias in node.names}
-            loaded |= set() if node in for_types else {node.module}
-    return (
-        frozenset(name.split(".")[0] for name in loaded),
-        frozenset(name for name in own if name.split(".")[0] == "shapegcode"),
-        tuple(classes),
-    )
-
-
-def own_imports(file: Path) -> frozenset[str]:
-    """Full names of the own modules that a Python file imports, anywhere in it."""
-    return names_in(file)[1]
-
-
-# The folders of the package from the bottom up: each may import what stands before it.
-PACKAGE_ORDER = (
-    "io settings results machine program model shaping verdict simulation timing checking metrology identification "
-    "cutting feed conversion characterization testcut demos setup batching studies cli"
-)
-PACKAGE_FOLDERS = PACKAGE_ORDER.split()
-# What stands at the root of the package; `errors` and the extension module may be imported by all.
+# What stands at the root of the package; its folders and who may import whom are import-linter's (pyproject.toml).
 ROOT_MODULES = {"__init__", "__main__", "errors", "_core"}
 
 
 def test_the_root_of_the_package_stays_small() -> None:
     assert {file.stem for file in PACKAGE.glob("*.py*")} <= ROOT_MODULES
-    assert {file.name for file in PACKAGE.iterdir() if file.is_dir()} <= {*PACKAGE_FOLDERS, "data", "__pycache__"}
-
-
-def test_package_folders_use_only_whom_they_may() -> None:
-    offenders = []
-    for file in sorted(PACKAGE.rglob("*.py")):
-        if file.parent == PACKAGE:
-            continue
-        folder = file.relative_to(PACKAGE).parts[0]
-        allowed = {*PACKAGE_FOLDERS[: PACKAGE_FOLDERS.index(folder) + 1], "errors", "_core", "__version__"}
-        offenders += [
-            f"{file.relative_to(ROOT)} imports {name}"
-            for name in own_imports(file)
-            if name.split(".")[1] not in allowed
-        ]
-    assert offenders == []
-
-
-def test_no_module_imports_itself_through_others() -> None:
-    """Also where the import is inside a function or only for types."""
-    files = {}
-    for file in PACKAGE.rglob("*.py"):
-        parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
-        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
-    uses = {
-        name: {one for full in own_imports(file) for one in (full, full.rpartition(".")[0]) if one in files} - {name}
-        for name, file in files.items()
-        if name != "shapegcode"
-    }
-    while ends := {name for name, used in uses.items() if not used & uses.keys()}:
-        uses = {name: used for name, used in uses.items() if name not in ends}
-    assert sorted(uses) == [], "these import each other, or what does"
-
-
-def users_of(package: str) -> set[str]:
-    """The files of the package that load another one."""
-    files = PACKAGE.rglob("*.py")
-    return {file.relative_to(PACKAGE).as_posix() for file in files if package in names_in(file)[0]}
-
-
-def test_only_plots_import_matplotlib() -> None:
-    assert [name for name in users_of("matplotlib") if not re.search(r"(^|[/_])plots?\.py$", name)] == []
-
-
-def test_only_files_of_settings_import_pydantic() -> None:
-    assert {name for name in users_of("pydantic") if not name.startswith(("machine/", "settings/"))} == {
-        "timing/calibration/runs_file.py", "characterization/programs.py", "testcut/cut.py",
-        "cutting/stock.py", "cutting/tool.py", "setup/answers.py", "studies/study_file.py",
-    }  # fmt: skip
-
-
-def test_only_shapes_of_the_stock_import_shapely() -> None:
-    assert users_of("shapely") == {"cutting/stock_shape.py"}
-    assert "shapely" not in loaded_after("import shapegcode.cutting.stock_shape")
 
 
 def loaded_after(statement: str) -> set[str]:
@@ -254,6 +165,10 @@ def loaded_after(statement: str) -> set[str]:
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     return set(run.stdout.split())
+
+
+def test_shapely_is_loaded_with_the_first_shape() -> None:
+    assert "shapely" not in loaded_after("import shapegcode.cutting.stock_shape")
 
 
 HEAVY = {"numpy", "scipy", "matplotlib", "pydantic", "rich"}
@@ -423,7 +338,7 @@ def test_no_two_classes_share_a_name() -> None:
     classes = [value for name in sg.__all__ if inspect.isclass(value := getattr(sg, name))]
     homes = {value.__name__: ["core"] for value in classes if value.__module__ == "shapegcode._core"}
     for file in sorted(PACKAGE.rglob("*.py")):
-        for name in names_in(file)[2]:
+        for name in re.findall(r"^ *class (\w+)", file.read_text(encoding="utf-8"), re.MULTILINE):
             homes.setdefault(name, []).append(file.relative_to(PACKAGE).as_posix())
     assert {name: files for name, files in homes.items() if len(files) > 1} == {}
 

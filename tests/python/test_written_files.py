@@ -100,43 +100,35 @@ def test_a_picture_for_which_there_is_no_room_is_named(tmp_path: Path) -> None:
         save(Figure().subplots(), tmp_path / "a.png")
 
 
-def test_ctrl_c_within_a_finalizer_is_not_lost(folder: Path) -> None:
-    """Python drops what is raised there: the command would go on."""
-    code = """
+#: The command in a Python that looks for modules through `Finder`.
+WITH_FINDER = """
 import runpy, signal, sys
 class Finder:
     def find_spec(self, name, *_):
-        if name == "numpy":
-            Last()
+        if name == MODULE:
+            FOUND
+sys.modules.pop(MODULE, None)
+sys.meta_path.insert(0, Finder())
+sys.argv = ["shapegcode", "convert", "p.nc", "-m", "vx500", "-o", "o.nc"]
+runpy.run_module("shapegcode", run_name="__main__")
+"""
+INTERRUPT = "signal.raise_signal(signal.SIGINT)"
+#: Python drops what is raised within a finalizer: the command would go on.
+LAST = f"""
+import signal
 class Last:
     def __del__(self):
-        signal.raise_signal(signal.SIGINT)
+        {INTERRUPT}
         for _ in range(100):
             pass
-sys.meta_path.insert(0, Finder())
-sys.argv = ["shapegcode", "convert", "p.nc", "-m", "vx500", "-o", "o.nc"]
-runpy.run_module("shapegcode", run_name="__main__")
 """
-    done = command(folder, python=("-c", code))
-    sound(done, "shapegcode: stopped", code=130)
-    assert not (folder / "o.nc").exists()
 
 
-@pytest.mark.parametrize("instant", ["argparse", "numpy", "shapegcode._core", "pydantic", "shapegcode.conversion.plan"])
-def test_ctrl_c_while_modules_load_is_no_traceback(instant: str, folder: Path) -> None:
-    code = f"""
-import runpy, signal, sys
-class Finder:
-    def find_spec(self, name, *_):
-        if name == {instant!r}:
-            signal.raise_signal(signal.SIGINT)
-sys.modules.pop({instant!r}, None)
-sys.meta_path.insert(0, Finder())
-sys.argv = ["shapegcode", "convert", "p.nc", "-m", "vx500", "-o", "o.nc"]
-runpy.run_module("shapegcode", run_name="__main__")
-"""
-    done = command(folder, python=("-c", code))
-    sound(done, "shapegcode: stopped", code=130)
+@pytest.mark.parametrize("module", ["argparse", "numpy", "shapegcode._core", "pydantic", "shapegcode.conversion.plan"])
+def test_ctrl_c_while_modules_load_is_no_traceback(module: str, folder: Path) -> None:
+    found = "Last()" if module == "numpy" else INTERRUPT
+    code = LAST + WITH_FINDER.replace("MODULE", repr(module)).replace("FOUND", found)
+    sound(command(folder, python=("-c", code)), "shapegcode: stopped", code=130)
     assert not (folder / "o.nc").exists()
 
 

@@ -138,7 +138,7 @@ class Spending:
         design: Callable[[float], Grid],
         write: Callable[[Grid], Written],
     ) -> Grid:
-        """Choose the block period with the largest gain within the rate limits; among equals the shortest shaper."""
+        """Choose the block period of the largest `_worth`; the given one if fixed or if all its cuts keep the rates."""
         weights = [residual * 1e3 / unit for unit, residual in zip(self._unit_um, residuals_mm, strict=True)]
         written = write(grid)
         loads = written.loads

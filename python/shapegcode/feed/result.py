@@ -113,7 +113,7 @@ class FeedSchedule(Result):
         program: name of the program.
         machine: name of the machine.
         tools: names of the tools that cut.
-        margin: safety margin to each limit of the load, as a ratio; none to that of the feed per tooth.
+        margin: safety ratio to each limit of the load; the limit of the feed per tooth has no margin.
         feed_mm_per_min: range of the written feeds.
         resultant_force_n: resultant over all cutting moves whose load is known.
         peak: largest loads along the program.

@@ -216,9 +216,9 @@ def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record
 
 
 def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: model_search.Sought) -> Identification:
-    """Find modes in the first third of the stops of ordinary runs, then again in all stops that these modes explain.
+    """Find modes in a third of the stops of ordinary runs, 4 or more, then again in all that these modes explain.
 
-    Stops are in the order of the records; within each record those with the least slow motion come first.
+    That third has the least slow motion; the stops of all records are sorted together.
     """
     forced = [record for record in records if record.force_n is not None]
     if forced:

@@ -208,7 +208,7 @@ class EdgeCapture:
     def position(self, axis: int | str, *, actual: bool = False) -> FloatArray:
         """Position of an axis, with a rotary axis' wraps by whole turns removed.
 
-        No axis moves half a turn within one cycle (90 m/s, 15 000 rpm at 2 ms). A larger step is a wrap if, with whole
+        No axis moves 180 degrees or mm in a cycle (15000 rpm, 90 m/s at 2 ms). A larger step is a wrap if, with whole
         turns subtracted, it nearly equals the step before. The number of turns in a gap is unknown: after a gap the
         file's value is used unchanged. Command and actual position are unwrapped by the same turns, so that their
         difference is unchanged.

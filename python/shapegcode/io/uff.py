@@ -324,7 +324,7 @@ def is_frf_uff(path: Path, options: ReadOptions) -> bool:
 
 
 def read_frf_uff(path: Path, options: ReadOptions) -> list[FrequencyResponse]:
-    """Read frequency responses of a universal file: numbered ones, else along the axis, at the driving point if any."""
+    """Read frequency responses of a universal file: stated datasets, else along the axis (driving point if present)."""
     file = UffFile(path, options)
     functions = _functions(file)
     units = next((file.dataset(k) for k, kind in enumerate(file.types) if kind == 164), None)

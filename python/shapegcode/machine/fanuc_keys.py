@@ -99,7 +99,7 @@ def _look_ahead_filter(draft: Draft, time_s: float) -> None:
 
 
 def _cutting_feeds(draft: Draft) -> None:
-    """Set the maximum feeds: per axis the smallest of parameters 1422 (always), 1430 (look-ahead off), 1432 (on)."""
+    """Set the maximum feeds: per axis the smallest of parameters 1422, 1430 (look-ahead off), 1432 (on)."""
     values = draft.values
     found = {n: values.per_axis(n, unit="mm/min") for n in (1422, 1430, 1432)}
     for k, name in enumerate("xyz"):

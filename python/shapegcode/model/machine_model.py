@@ -408,7 +408,7 @@ _STEPS = 20.0  # a kink ratio is rounded up to a multiple of 1/20
 def ini_lines(
     paths: Iterable[_core.Path], machine: Machine
 ) -> Iterator[tuple[Literal["kink_ratio", "ramp_frequency"], int, str]]:
-    """LinuxCNC settings to change: key, line of the worst kink (0: ramps), sentence; nothing for other controls."""
+    """LinuxCNC settings to change: key, line of the worst kink (else 0), sentence; nothing for other controls."""
     if machine.controller.kind != "linuxcnc":
         return
     model = fanuc_model(machine)

@@ -235,7 +235,7 @@ def _least_worst(
     options: DesignOptions,
     found: Sequence[Design],
 ) -> list[Design]:
-    """On each grid the design within the longest duration that has the smallest worst residual.
+    """The design with the smallest worst residual on each grid, within `max_duration_s`.
 
     Empty if a non-negative design keeps the limit, no mode is uncertain, or robust designs are not to be compared.
     """

@@ -22,7 +22,7 @@ _ROUNDING = 1e-6  # relative tolerance of a limit
 
 
 def _merits(each: Design) -> tuple[float, float, float, float]:
-    """Figures to minimise: duration, worst residual, magnitude of the contour cost, sum of magnitudes."""
+    """Figures to minimise: duration, worst residual, magnitude of the contour cost (variance), sum of magnitudes."""
     values = (each.duration_s, max(each.worst_residual, NO_RESIDUAL), abs(each.variance_s2), each.abs_sum)
     duration, residual, contour, magnitudes = (float(f"{value:.{_DIGITS}g}") for value in values)
     return duration, residual, contour, magnitudes

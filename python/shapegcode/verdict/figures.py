@@ -357,7 +357,7 @@ def stated_cases(machine: Machine) -> list[Case]:
     """Operating conditions of the verdict for a machine; the nominal ones come first (FANUC: ceil, carry).
 
     Feed overrides from 50 to 120 % and at both ends of `verdict.override_percent` (none if the override is locked);
-    each mode, and all modes at once, shifted up and down by the uncertainty with the lowest damping; all modes shifted
+    each mode, and all modes at once, shifted up and down by the uncertainty, at the lowest damping; all modes shifted
     at both ends of the override range; look-ahead left on (for a controller that has it); and a buffer underrun. The
     last two are left out for a control whose planner cannot be switched off: it plans in every condition, and stops in
     time if its buffer runs empty.

@@ -64,7 +64,7 @@ class ServoAxis:
         lag_rms: root mean square of command minus actual position.
         deviation_rms: RMS of the control's contour deviation; null if not recorded.
         models: models compared with the record; none if they cannot be fitted, see `note`.
-        parameters: of the dead time and servo lag, then of the torque and of the drive.
+        parameters: of the model "dead time and servo lag", of the torque, of the drive.
         note: undetermined or unexplained behaviour.
         curves: data to plot.
     """
