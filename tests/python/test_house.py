@@ -264,17 +264,20 @@ def test_the_long_checks_run_for_what_changed(tmp_path: Path) -> None:
     subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
 
     def said(command: str) -> list[str]:
-        words = [sys.executable, "tests/tools/full_pass.py", command]
+        words = [sys.executable, "tests/tools/full_pass.py", *command.split()]
         return subprocess.run(words, cwd=tmp_path, check=True, capture_output=True, text=True).stdout.split()
 
     assert said("changed") == ["core", "python"]  # nothing ever passed
     said("write")
-    assert len((tmp_path / "tests/full_pass.txt").read_text().splitlines()) == 4
+    assert len((tmp_path / "tests/full_pass.txt").read_text().splitlines()) == 6
     assert (said("changed"), said("files")) == ([], [])
     (tmp_path / texts[0]).write_text("other")
     assert (said("changed"), said("files")) == (["core", "python"], texts[:2])
+    said("write tidy")
+    assert (said("changed"), said("files")) == (["core", "python"], [])
     (tmp_path / texts[0]).write_text(f"{texts[0]}\n")
-    assert said("changed") == []
+    assert (said("changed"), said("files")) == ([], texts[:2])
+    said("write")
     (tmp_path / texts[4]).unlink()
     assert (said("changed"), said("files")) == (["python"], [])
     said("write")

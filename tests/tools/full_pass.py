@@ -1,10 +1,11 @@
-"""What changed since `make test-all` last passed: `full_pass.py write | changed [core|python] | files`.
+"""What changed since `make test-all` last passed: `full_pass.py write [tidy] | changed | files`.
 
 `write` puts a hash of each group of files that the long checks guard into tests/full_pass.txt, which is committed: a
 folder of cpp/, or all of another place. `changed` prints what must run again (core, python) because a file of it is
 new, gone or another one; nothing: all of it passed as it is. `files` prints the sources and headers of the core's
-folders that changed or include a header of one that did, for clang-tidy, which reads a folder as one and finds in the
-others what it found before. A change of the core counts for the Python tests too.
+folders that clang-tidy must read again, which reads a folder as one and finds in the others what it found before: those
+that changed since it last passed, which `write tidy` notes in the same file, or include a header of one that did. A
+change of the core counts for the Python tests too.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ PYTHON = (
     "tests/rejected/",
     "pyproject.toml",
 )
+TIDIED = ("cpp/src", "cpp/include", ".clang-tidy")
+TIDY = "tidy "  # before the names of these groups: what clang-tidy has read
 SUFFIXES = {
     ".cpp",
     ".hpp",
@@ -99,19 +102,24 @@ def included_files(name: str) -> set[str]:
 
 def main() -> None:
     """See the module's docstring."""
-    command = sys.argv[1]
+    command, *only = sys.argv[1:]
     groups = guarded()
     now = {group: mark_of(names) for group, names in groups.items()}
-    if command == "write":
-        STAMP.write_text("".join(f"{mark} {group}\n" for group, mark in sorted(now.items())), encoding="utf-8")
-        return
+    now |= {f"{TIDY}{group}": mark for group, mark in now.items() if group.startswith(TIDIED)}
     lines = STAMP.read_text(encoding="utf-8").splitlines() if STAMP.is_file() else []
     then = {group: mark for mark, group in (line.split(" ", 1) for line in lines)}
+    if command == "write":
+        kept = {group: mark for group, mark in then.items() if only and not group.startswith(TIDY)}
+        kept |= {group: mark for group, mark in now.items() if not only or group.startswith(TIDY)}
+        STAMP.write_text("".join(f"{mark} {group}\n" for group, mark in sorted(kept.items())), encoding="utf-8")
+        return
     changed = {group for group in now.keys() | then.keys() if now.get(group) != then.get(group)}
     if command == "files":
-        folders = core_folders(groups, changed)
+        tidied = {group.removeprefix(TIDY) for group in changed if group.startswith(TIDY)}
+        folders = core_folders(groups, tidied)
         print(*(name for group in folders for name in groups[group] if name.endswith((".cpp", ".hpp"))), sep="\n")
         return
+    changed = {group for group in changed if not group.startswith(TIDY)}
     if any(group.startswith(CORE) for group in changed):
         print("core")
     if changed:
