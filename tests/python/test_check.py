@@ -235,6 +235,8 @@ def test_short_blocks_by_hand() -> None:
     assert region.lines == (5, 9)
     assert (region.count, region.blocks) == (2, 5)
     assert checked("G1X10.F6000.\nX10.4\n", block_time_s=0.004).counts_by_code == {}
+    (half,) = checked("G1X10.F6000.\nX10.4\n", block_time_s=0.0045).findings
+    assert half.severity == "note" and "0.104 s at its feeds, takes less than 1 ms more" in half.message
 
 
 def test_short_blocks_of_each_region_and_its_lines_in_the_source() -> None:

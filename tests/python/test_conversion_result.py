@@ -174,3 +174,5 @@ def test_an_override_stays_on_the_line_of_its_percent() -> None:
     crowded = replace(case, name="override 110 %", share_of_limit=45.67, residual_um=Xyz(234.56, 234.56, 234.56))
     text = str(case_table([crowded], None))
     assert "override 110 %" in text and max(map(len, text.splitlines())) <= 80
+    # Nor is "100 %" said of what is out of its limit.
+    assert ">\xa0100" in str(case_table([replace(case, share_of_limit=1.003, within=False)], None))

@@ -185,7 +185,7 @@ class Hosts:
     def _run_in(self, folder: Path, packed: Packed) -> JobOutcome:
         names = [*packed.files]
         # Names may contain "..": the folder of the run is nested so deep that they stay within the temporary folder.
-        depth = max(_ups(word) for word in (*names, *packed.words))
+        depth = max(os.path.normpath(word).split(os.sep).count("..") for word in (*names, *packed.words))
         cwd = folder.joinpath("files", *("d" for _ in range(depth)))
         cwd.mkdir(parents=True)
         for name, content in packed.files.items():
@@ -221,11 +221,6 @@ _of_worker = Hosts()
 def run_packed(packed: Packed) -> JobOutcome:
     """`Hosts.run` on a Dask worker, whose fork servers live as long as the worker."""
     return _of_worker.run(packed)
-
-
-def _ups(word: str) -> int:
-    """Number of ".." in an argument that may be a path."""
-    return sum(part == ".." for part in Path(os.path.normpath(word)).parts) if ".." in word else 0
 
 
 def _ending(answer: Mapping[str, Any], packed: Packed, complained: str) -> tuple[Ending, str]:

@@ -254,13 +254,14 @@ def _short_findings(program: Program, machine: Machine, runs: Iterable[CuttingRu
     block_time_s = machine.controller.block_time_s
     for run in runs:
         if run.short_blocks:
+            lost = run.taken_s - run.time_s >= _LOST_S
+            price = f"takes {run.taken_s:.3f} s" if lost else f"takes less than {_LOST_S * 1e3:g} ms more"
             message = (
                 f"{run.short_blocks} of the {run.blocks} blocks that end with {_end(program, run)}: "
                 f"shorter than the block time of {block_time_s * 1e3:g} ms, the shortest {run.shortest_s * 1e3:.3g} "
                 "ms; with an empty block buffer the control stops between blocks (buffer underrun), and "
-                f"the sequence, {run.time_s:.3f} s at its feeds, takes {run.taken_s:.3f} s"
+                f"the sequence, {run.time_s:.3f} s at its feeds, {price}"
             )
-            lost = run.taken_s - run.time_s >= _LOST_S
             yield _at(program, "warning" if lost else "note", "short_block", run.first_short_line, message)
 
 

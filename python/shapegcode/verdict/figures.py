@@ -441,7 +441,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         Column("command", value=lambda case: _known(case.contour_error_um.command, 1)),
         Column("table", value=lambda case: _known(case.contour_error_um.response, 1)),
         Column("s", value=lambda case: _known(case.time_s, 2)),
-        Column("of limit", value=lambda case: _share(case.share_of_limit)),
+        Column("of limit", value=_share),
         Column("verdict", value=lambda case: _verdict(case, case is worst), left=True),
     )
     shown = sum(not case.counts for case in cases)
@@ -465,8 +465,9 @@ def _known(value: float | None, digits: int) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def _share(share: float | None) -> str:
-    return "limit is 0" if share is None else f"{share * 100:.0f} %"
+def _share(case: CaseVerdict) -> str:
+    percent = "limit is 0" if case.share_of_limit is None else f"{case.share_of_limit * 100:.0f} %"
+    return f"> {percent}" if percent == "100 %" and not case.within else percent
 
 
 def _verdict(case: CaseVerdict, worst: bool) -> str:
