@@ -24,6 +24,14 @@ _RENAMED = {
 }
 
 
+# Names that a user of other packages may look for.
+_MEANT = {
+    "design_shaper": "choose_shaper", "shaper": "choose_shaper", "ei": "choose_shaper", "si": "choose_shaper",
+    "zvd": "repeated_zv", "read": "Program.read", "parse": "Program.read", "load": "Program.read",
+    "machines": "Machine.builtin_names", "list_machines": "Machine.builtin_names", "optimize_feed": "schedule_feed",
+}  # fmt: skip
+
+
 @functools.cache
 def _home() -> dict[str, str]:
     """Module of each public name, from the stub."""
@@ -59,10 +67,13 @@ def __getattr__(name: str) -> Any:
 
 def _near(name: str) -> str:
     """Hint with the most similar public name."""
-    import difflib
+    if name in _MEANT:
+        return f"; did you mean {_MEANT[name]!r}?"
+    if name.startswith("_"):
+        return ""
+    from shapegcode.errors import hint
 
-    near = [] if name.startswith("_") else difflib.get_close_matches(name, _home(), n=1)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    return hint(name, _home())
 
 
 def __dir__() -> list[str]:

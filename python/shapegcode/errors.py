@@ -7,6 +7,7 @@ files: :class:`FileError` and its subclasses, such as :class:`MachineError`. Fro
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from shapegcode._core import ArgumentError, DesignError, NumericError, ProgramError, ShapegcodeError
@@ -15,6 +16,20 @@ __all__ = [
     "ArgumentError", "DesignError", "FileError", "MachineError", "NumericError", "Problem", "ProgramError",
     "RecordError", "RoundTripError", "RunsFileError", "ShapegcodeError", "StockError", "ToolError",
 ]  # fmt: skip
+
+
+def hint(name: str, known: Iterable[str]) -> str:
+    """``; did you mean 'known'?`` with the name closest to an unknown one; empty if none is."""
+    import difflib
+
+    names = sorted(each for each in known if not each.startswith("_"))
+    longer = [each for each in names if each.startswith(f"{name}_")]
+    words = set(name.split("_"))
+    alike = sorted(names, key=lambda each: -len(words.intersection(each.split("_"))))[:1]
+    near = (
+        longer or difflib.get_close_matches(name, names, n=1) or [each for each in alike if words & {*each.split("_")}]
+    )
+    return f"; did you mean {near[0]!r}?" if near and not name.startswith("_") else ""
 
 
 def located_error(source: str, line: int, column: int, message: str, alarm: int = 0) -> ProgramError:

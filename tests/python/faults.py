@@ -14,8 +14,18 @@ import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-__all__ = ["MAX_BYTES", "MAX_CPU_S", "RECORD_BOMBS", "TOML_BOMBS", "Done", "changed", "command", "sound"]
+__all__ = ["ANSWERS", "MAX_BYTES", "MAX_CPU_S", "RECORD_BOMBS", "TOML_BOMBS", "Done", "changed", "command", "sound"]
 
+#: Valid answers for `setup`.
+ANSWERS = """\
+name = "VMC-3"
+rapid_mm_per_min = { x = 24000, y = 24000, z = 18000 }
+delivery = "dnc"
+dnc_baud = 9600
+look_ahead = "G05.1"
+contour_um = 15
+modes = { x = "46:0.02", z = "rigid" }
+"""
 MAX_BYTES = 1 << 30
 MAX_CPU_S = 10.0
 _WAIT_S = 120.0  # nothing is this slow: who still runs then, waits

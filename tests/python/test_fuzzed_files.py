@@ -22,7 +22,7 @@ from typing import Any
 import pytest
 
 from effort import trials
-from faults import MAX_BYTES, MAX_CPU_S, changed
+from faults import ANSWERS, MAX_BYTES, MAX_CPU_S, changed
 
 TESTS = Path(__file__).resolve().parents[1]
 DATA = TESTS.parent / "python" / "shapegcode" / "data"
@@ -30,14 +30,6 @@ _QUICK, _MANY = 30, trials(3000)
 #: Each file of these starts a process.
 _SLOW_KINDS = {"mat": 6}
 
-ANSWERS = """name = "VMC-3"
-rapid_mm_per_min = { x = 24000, y = 24000, z = 18000 }
-delivery = "dnc"
-dnc_baud = 9600
-look_ahead = "G05.1"
-contour_um = 15
-modes = { x = "46:0.02", z = "rigid" }
-"""
 JSON_ANSWERS = '{"name": "VMC-3", "dnc_baud": 9600, "delivery": "dnc", "contour_um": 15, "modes": {"x": "46:0.02"}}'
 RUNS = """[[runs]]
 program = "p.nc"

@@ -124,11 +124,50 @@ def test_a_simple_machine() -> None:
         sg.Machine.simple(modes={"x": -46})
 
 
-def test_errors_say_what_to_do() -> None:
-    with pytest.raises(AttributeError, match="did you mean 'convert'"):
-        sg.conver  # noqa: B018
+@pytest.mark.parametrize(
+    ("guess", "said"),
+    [
+        ("sg.conver", "did you mean 'convert'"),
+        ("sg.zvd", "did you mean 'repeated_zv'"),
+        ("sg.zv(46).duration", "did you mean 'duration_s'"),
+        ("sg.Mode(frequency=46)", "did you mean 'frequency_hz'"),
+        ("sg.MotionController(shaper='zv')", "was given shaper: str"),
+        ("sg.minimal_shapers([46, 131])", "required argument: 'max_duration_s'"),
+        ("sg.Machine('vx500')", "Machine.load"),
+        ("sg.Machine.simple({'x': (46, 0.02)})", "is Mode"),
+        ("sg.Machine.load('vx500').with_values('contour_um', 5)", "did you mean tolerance.contour_um"),
+        ("sg.Machine.load('vx500').to_toml('mine.toml')", "write_text"),
+        ("sg.cycle_time(TEXT, 'vx500').time", "did you mean 'cycle_time_s'"),
+        ("sg.cycle_time(TEXT, 'vx500', feed_override=50)", "0.5 is 50 %"),
+        ("sg.convert(TEXT, 'vx500').cycle_time_s.real", "original.real"),
+        ("sg.convert(TEXT, 'vx500').report('out.json')", "to_json"),
+        ("sg.identify(TIME_S, TIME_S, quantity='mm')", "acceleration, velocity, displacement"),
+        ("sg.identify(TIME_S)", "time_s, response"),
+        ("sg.simulate(b'part.nc', 'vx500')", "file name is needed"),
+    ],
+)
+def test_errors_say_what_to_do(guess: str, said: str) -> None:
+    with pytest.raises((AttributeError, TypeError, sg.ShapegcodeError), match=said) as caught:
+        eval(guess)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_value_is_set_by_with_values() -> None:
     with pytest.raises(AttributeError, match="with_values"):
         sg.Machine.load("vx500").name = "other"  # type: ignore[misc]
+
+
+def test_what_one_function_gives_the_others_take() -> None:
+    """Modes that were identified; numbers in Hz wherever modes are taken; the emitted text, which is bytes."""
+    (found,) = sg.identify(TIME_S, decay(46.0, 0.02)).modes
+    mode = sg.Mode(float(found.frequency_hz), float(found.damping_ratio))
+    assert f"{found.frequency_hz:.0f}" == "46"
+    assert sg.zv(found) == sg.zv(mode)  # type: ignore[arg-type]
+    assert sg.choose_shaper([found], families="zv", periods_s=0.001).ok
+    assert sg.Machine.simple({"x": found}).axes.x.modes == sg.Machine.simple({"x": mode}).axes.x.modes  # type: ignore[dict-item]
+    assert sg.repeated_zv(46, 2) == sg.repeated_zv(sg.Mode(46), 2)  # type: ignore[arg-type]
+    assert sg.shortest_non_negative([46], 0.005) == sg.shortest_non_negative([sg.Mode(46)], 0.005)  # type: ignore[list-item]
+    assert sg.simulate(sg.convert(TEXT, "vx500").text, "vx500").ok  # type: ignore[arg-type]
 
 
 def test_names_of_the_version_before_are_read_with_a_warning() -> None:

@@ -115,7 +115,7 @@ def test_a_result_comes_back_from_its_json(shown: Shown) -> None:
     assert beside["provenance"]["result"] == shown.name
     result = load_result(shown.json)
     assert type(result).__name__ == shown.name
-    assert result.from_json
+    assert result.is_read_back
     # Where a file was written, the next step is what to do with it, which only the command knows.
     own = result.to_dict()
     assert alike(own, written | {"next_step": own["next_step"]})

@@ -19,20 +19,12 @@ from prompt_toolkit.output import DummyOutput
 
 import shapegcode as sg
 from command import run
+from faults import ANSWERS
 from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.results.json import schema
 from shapegcode.settings.describe import toml_schema
 from shapegcode.setup.ask import ask_all
 
-ANSWERS = """\
-name = "VMC-3"
-rapid_mm_per_min = { x = 24000, y = 24000, z = 18000 }
-delivery = "dnc"
-dnc_baud = 9600
-look_ahead = "G05.1"
-contour_um = 15
-modes = { x = "46:0.02", z = "rigid" }
-"""
 PART = "%\nO0001\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\nX30. Y40.\nX60. Y0.\nG0 Z5.\nM30\n%\n"
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -33,7 +33,7 @@ the keys of its JSON are in [schemas](schemas.md). `result.plots()` draws its pi
     conversion = sg.convert("part.nc", machine)
     print(conversion.answer, conversion.next_step)
 
-What can be guessed:
+What can be guessed; a wrong name, argument or attribute is answered with the one that was probably meant:
 
 | line | what it gives |
 |---|---|
@@ -44,6 +44,8 @@ What can be guessed:
 | `sg.plot_sensitivity(shaper)` | residual vibration over frequency, of a comparison, a shaper or a dict of shapers |
 | `sg.identify(t, y)`, `sg.identify(t, y, force)` | modes of a decay, of an impact test, from arrays |
 | `sg.Machine.simple(modes={"x": 46, "y": [131, 200]})` | a machine of which nothing but its modes is known |
+| `sg.zv(found.modes[0])`, `sg.Machine.simple({"x": found.modes})` | modes that `identify` found serve wherever modes are taken |
+| `sg.simulate(conversion.text, "vx500")` | the emitted text, which is bytes, is a program too |
 | `sg.MotionController(shaper=sg.Mode(46, 0.02), ...)` | a controller with the ZV shaper of a mode, on its own grid |
 
 | name | home | what it is |

@@ -222,7 +222,7 @@ def _sheet(conversion: Conversion, provenance: Provenance | None) -> model.Secti
     if output is not None:
         sha256 = output.sha256
     else:
-        sha256 = "not known" if conversion.from_json else hashlib.sha256(conversion.text).hexdigest()
+        sha256 = "not known" if conversion.is_read_back else hashlib.sha256(conversion.text).hexdigest()
     rows = [("load program", f"{name}, for {conversion.machine}, {conversion.bytes_emitted} bytes")]
     rows.append(("SHA-256 of the program", sha256))
     for role, name in (("input", "original program"), ("machine", "machine file")):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import typing
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
@@ -99,11 +100,15 @@ def identify(
             raise ArgumentError(f"{name} = {number}: must be from 1 to {_LARGEST_MODEL}")
     if isinstance(response, ReadOptions):
         options, response = response, None
+    if quantity not in (kinds := typing.get_args(Quantity)):
+        raise ArgumentError(f"quantity = {quantity!r}: must be one of {', '.join(kinds)}")
     if response is not None:
         source = [_record_of(source, response, force, quantity)]
     elif force is not None:
         raise ArgumentError("force is given without a response: identify(time_s, response, force)")
     sources: Sequence[Any] = [source] if isinstance(source, str | Path) else source  # type: ignore[assignment]
+    if any(isinstance(each, float | int | np.ndarray | np.generic) for each in sources):
+        raise ArgumentError("arrays: identify(time_s, response) or identify(time_s, response, force), each of (n,)")
     names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
     window_s = None if options is None else options.exponential_window_s
     sought = model_search.Sought(band_hz, max_modes, modes, accepted_percent, window_s)

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from shapegcode._core import Mode
 from shapegcode.identification.checks import Prepared, RecordUse
 from shapegcode.io.record import ComplexArray, FrequencyResponse, Record
 from shapegcode.io.units import FloatArray
@@ -38,6 +39,12 @@ class Estimate:
     def __post_init__(self) -> None:
         for name in ("value", "low", "high"):
             object.__setattr__(self, name, float(getattr(self, name)))
+
+    def __float__(self) -> float:
+        return self.value
+
+    def __format__(self, spec: str) -> str:
+        return format(self.value, spec) if spec else str(self)
 
     @property
     def uncertainty_percent(self) -> float:
@@ -82,6 +89,11 @@ class IdentifiedMode:
     refusal: str = ""
     left_out: bool = False
     moves: Xyz[Estimate | None] | None = field(default=None, metadata=sparse())
+
+    @property
+    def mode(self) -> Mode:
+        """Its frequency and damping ratio, for a shaper or a machine."""
+        return Mode(self.frequency_hz.value, self.damping_ratio.value)
 
 
 _SKEWED = 1.2

@@ -47,6 +47,7 @@ from shapegcode.settings.load import (
     with_values,
 )
 
+_LOWEST_HZ = 0.1  # of a mode, in `Machine.simple`
 _ASSUMED_DAMPING_RATIO = 0.02  # structures with guides have 0.01 to 0.05
 # Limits of every axis of `Machine.simple`
 _SIMPLE_LIMITS = {"max_feed_mm_per_min": 12_000.0, "rapid_mm_per_min": 24_000.0, "max_acceleration_mm_s2": 3000.0}
@@ -73,6 +74,17 @@ class Machine(TomlTable):
     tolerance: Tolerance = key("tolerances of an emitted program", default={})
     price: Price = key("limits of the time added by shaping", default={})
     verdict: Verdict = key("operating conditions in which the tolerances must be kept", default={})
+
+    def __new__(cls, *args: object, **values: object) -> Machine:
+        """Refuse values: what is read from a file is validated with its lines."""
+        if args or values:
+            raise ArgumentError("use Machine.load(name or file), Machine.simple(modes) or Machine.from_toml(text)")
+        return super().__new__(cls)
+
+    def __repr__(self) -> str:
+        return f"<Machine {self.name!r}: values() lists its keys>"
+
+    __str__ = __repr__
 
     @model_validator(mode="after")
     def _block_period_fits(self) -> Machine:
@@ -290,8 +302,8 @@ class Machine(TomlTable):
         Everything else is a default of the machine file.
 
         Args:
-            modes: by axis ("x", "y", "z"): natural frequencies in Hz (damping ratio 0.02 assumed) or modes, one or
-                several; an axis without an entry is simulated as rigid.
+            modes: by axis ("x", "y", "z"): natural frequencies in Hz (damping ratio 0.02 assumed) or modes, also
+                those that `identify` found, one or several; an axis without an entry is simulated as rigid.
             name: of the machine.
             max_feed_mm_per_min: largest cutting feed of an axis, mm/min; None: 12 000 is assumed.
             rapid_mm_per_min: rapid traverse of an axis, mm/min; None: 24 000 is assumed.
@@ -301,7 +313,7 @@ class Machine(TomlTable):
             The machine; `with_values` changes keys, `to_toml` returns its file.
 
         Raises:
-            ArgumentError: an axis other than x, y, z.
+            ArgumentError: an axis other than x, y, z; a frequency below 0.1 Hz, such as a damping ratio.
             MachineError: a value that is invalid in a machine file.
         """
         if unknown := set(modes) - set("xyz"):
@@ -316,7 +328,9 @@ class Machine(TomlTable):
         axes = {}
         for axis in "xyz":
             given = modes.get(axis, ())
-            several = [given] if isinstance(given, int | float | Mode) else given
+            several = given if isinstance(given, Sequence) else [given]
+            if any(isinstance(each, int | float) and 0.0 < each < _LOWEST_HZ for each in several):
+                raise ArgumentError(f"modes of {axis}: {given}: a frequency with a damping ratio is Mode(46, 0.02)")
             axes[axis] = {**limits, "modes": [_table_of(mode) for mode in several]}
         machine = validated(cls, {"name": name, "axes": axes}, "Machine.simple", "", MachineError)
         return machine.with_remarks({f"axes.{axis}.{limit}": "assumed" for axis in "xyz" for limit in assumed})
@@ -406,7 +420,10 @@ class Machine(TomlTable):
 
         Raises:
             KeyError: a remark for a key that does not exist, unless `short`.
+            ArgumentError: a file name: the text is returned.
         """
+        if isinstance(remarks, str | Path):
+            raise ArgumentError(f"to_toml returns the text: Path({str(remarks)!r}).write_text(machine.to_toml())")
         from shapegcode.settings.describe import write_toml
 
         if short:
@@ -478,7 +495,8 @@ def inherited_text(name: str) -> str:
     return with_remarks(text, remark)
 
 
-def _table_of(mode: float | Mode) -> dict[str, float | dict[str, float]]:
+def _table_of(mode: float | Mode | tuple[float, float]) -> dict[str, float | dict[str, float]]:
+    mode = Mode(*mode) if isinstance(mode, tuple) else getattr(mode, "mode", mode)
     if not isinstance(mode, Mode):
         return {"frequency_hz": mode, "damping_ratio": _ASSUMED_DAMPING_RATIO}
     directions = {"excited_by": dict(zip("xyz", mode.excited_by, strict=True))} if any(mode.excited_by) else {}

@@ -9,29 +9,92 @@ import re
 from typing import Any, TypeVar
 
 from shapegcode import _core
+from shapegcode.errors import hint
 
 T = TypeVar("T")
 
 
 def with_signature(value: T) -> T:
-    """Set the signature of a core function or class from its docstring."""
+    """Set the signature of a core function or class from its docstring; wrong arguments are refused by it."""
+    _add_hints()
     if isinstance(value, type):
         if not issubclass(value, BaseException) and (found := _signature(value.__init__.__doc__)):
             taken = list(found.parameters.values())[1:]  # without self
             shown = found.replace(parameters=taken, return_annotation=inspect.Signature.empty)
             setattr(value, "__signature__", shown)  # noqa: B010
+            begin = value.__init__
+
+            @functools.wraps(begin)
+            def begun(self: Any, *args: Any, **kwargs: Any) -> None:
+                try:
+                    begin(self, *args, **kwargs)
+                except TypeError as error:
+                    raise _refusal(error, type(self).__name__, shown, args, kwargs) from None
+
+            setattr(value, "__init__", begun)  # noqa: B010
         return value
     if not inspect.isbuiltin(value) or not (found := _signature(value.__doc__)):
         return value
 
     @functools.wraps(value)
     def called(*args: Any, **kwargs: Any) -> Any:
-        return value(*args, **kwargs)
+        try:
+            return value(*args, **kwargs)
+        except TypeError as error:
+            first = error
+        try:
+            given = _with_modes(found, args, kwargs)
+            return value(*given.args, **given.kwargs)
+        except TypeError:
+            raise _refusal(first, value.__name__, found, args, kwargs) from None
 
     called.__module__ = "shapegcode"
     called.__doc__ = (value.__doc__ or "").partition("\n\n")[2].strip()
     setattr(called, "__signature__", found)  # noqa: B010
     return called  # type: ignore[return-value]
+
+
+@functools.cache
+def _add_hints() -> None:
+    """Objects of the core suggest a name for one that they do not have."""
+
+    def missing(self: object, name: str) -> Any:
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint(name, dir(type(self)))}")
+
+    for each in vars(_core).values():
+        if isinstance(each, type) and not issubclass(each, BaseException):
+            setattr(each, "__getattr__", missing)  # noqa: B010
+
+
+def _with_modes(found: inspect.Signature, args: Any, kwargs: Any) -> inspect.BoundArguments:
+    """The arguments; where modes are expected, numbers are undamped modes in Hz, and identified modes are modes."""
+    given = found.bind(*args, **kwargs)
+    for name, value in given.arguments.items():
+        expected = str(found.parameters[name].annotation)
+        if "Mode" in expected.split(" | "):
+            given.arguments[name] = _mode(value)
+        elif "[Mode]" in expected and not isinstance(value, str | bytes):
+            given.arguments[name] = [_mode(each) for each in value]
+    return given
+
+
+def _mode(value: Any) -> Any:
+    return _core.Mode(value, 0.0) if isinstance(value, int | float) else getattr(value, "mode", value)
+
+
+def _refusal(error: TypeError, name: str, found: inspect.Signature, args: Any, kwargs: Any) -> TypeError:
+    """pybind11's list of signatures and arguments in one line."""
+    if "incompatible" not in str(error) or not found.parameters:
+        return error
+    taken = f"it takes {str(found).replace(chr(39), '')}"
+    if unknown := [key for key in kwargs if key not in found.parameters]:
+        return TypeError(f"{name}() has no argument {unknown[0]!r}{hint(unknown[0], found.parameters)}; {taken}")
+    try:
+        given = found.bind(*args, **kwargs).arguments
+    except TypeError as wrong:
+        return TypeError(f"{name}(): {wrong}; {taken}")
+    shown = (f"{key}: {type(value).__name__}{getattr(value, 'shape', '')}" for key, value in given.items())
+    return TypeError(f"{name}() was given {', '.join(shown)}; {taken}")
 
 
 def _signature(doc: str | None) -> inspect.Signature | None:

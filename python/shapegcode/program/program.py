@@ -52,10 +52,13 @@ class Program:
     number: int | str | None = None
     foreign: ForeignProgram | None = None
 
+    def __repr__(self) -> str:
+        return f"<Program {self.source}: {len(self.regions)} cuts>"
+
     @classmethod
     def read(
         cls,
-        path: str | Path,
+        path: str | bytes | Path,
         machine: Machine | str | Path | None = None,
         *,
         program_number: int | str | None = None,
@@ -67,7 +70,7 @@ class Program:
         Called programs are looked for in the file, in its folder, and in `input.program_folders`.
 
         Args:
-            path: the file; a string of several lines is the program's text itself.
+            path: the file; a string or bytes of several lines are the program's text itself.
             machine: machine whose controller reads it, its file or built-in name.
             program_number: program of a multi-program file: its O number, or an address as in
                 `shapegcode.program.reading.ProgramPlace`; None: the first.

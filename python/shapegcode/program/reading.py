@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import cast
 
 from shapegcode import _core
 from shapegcode.io.data_file import named_errors, open_file
@@ -256,8 +257,9 @@ def _apply(foreign: ForeignSettings, options: _core.ReaderOptions) -> None:
 
 
 def is_program_text(given: object) -> bool:
-    """Whether a string is the text of a program and not a file name: it contains a line end."""
-    return isinstance(given, str) and ("\n" in given or "\r" in given)
+    """Whether it is the text of a program and not a file name: it contains a line end."""
+    text = given.decode("latin-1") if isinstance(given, bytes) else given
+    return isinstance(text, str) and ("\n" in text or "\r" in text)
 
 
 def reader_options(machine: Machine, *, emitted: bool = False) -> _core.ReaderOptions:
@@ -337,11 +339,12 @@ def program_bytes(path: str | Path, most: int) -> bytes:
         return file.read(size)
 
 
-def given_text(program: str | Path, machine: Machine) -> tuple[bytes, str, Path | None]:
+def given_text(program: str | bytes | Path, machine: Machine) -> tuple[bytes, str, Path | None]:
     """Text of a program (given, or from its file), its name in messages, and its folder."""
     if is_program_text(program):
-        return str(program).encode(), "<text>", None
-    return program_bytes(program, machine.controller.max_program_bytes), str(program), Path(program).parent
+        return program if isinstance(program, bytes) else str(program).encode(), "<text>", None
+    file = cast("str | Path", program)  # bytes are refused where it is opened
+    return program_bytes(file, machine.controller.max_program_bytes), str(file), Path(file).parent
 
 
 def program_loader(folders: Sequence[Path], most: int) -> Finder:

@@ -23,6 +23,7 @@ from typing import Any, Self, cast
 
 import numpy as np
 
+from shapegcode.errors import hint
 from shapegcode.io.data_file import open_file
 
 FORMAT = 1  # format of the JSON of results: increased when older files can no longer be read
@@ -125,6 +126,9 @@ def renamed_of(cls: type) -> Mapping[str, str]:
     return {old: new for base in cls.__mro__ for old, new in RENAMED.get(base.__name__, {}).items()}
 
 
+_MEANT = {"save": "report", "to_html": "report"}
+
+
 class OldNames:
     """Base of classes with renamed fields: the former name gives the value, with a warning."""
 
@@ -134,7 +138,8 @@ class OldNames:
             """Value of a renamed field."""
             new = renamed_of(type(self)).get(name)
             if new is None:
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+                near = "" if name.startswith("_") else hint(_MEANT.get(name, name), dir(self))
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{near}")
             what = type(self).__name__
             warnings.warn(f"{what}.{name} is {what}.{new} now", FutureWarning, stacklevel=2)
             return getattr(self, new)
@@ -251,9 +256,9 @@ def _object(
     left_out = {field.name for field in dataclasses.fields(cls) if field.metadata.get("sparse")}
     written: dict[str, Any] = {"plots": tuple[str, ...], "output": str, "provenance": Provenance} if files else {}
     properties = {}
-    for name, hint in (shown | written).items():
+    for name, kind in (shown | written).items():
         meaning = {"description": meanings[name]} if name in meanings else {}
-        properties[name] = _of(arguments.get(hint, hint), definitions) | meaning
+        properties[name] = _of(arguments.get(kind, kind), definitions) | meaning
     return {
         "type": "object",
         "description": (cls.__doc__ or "").strip().partition("\n")[0],

@@ -132,6 +132,11 @@ class Pair(Generic[T]):
     original: T
     emitted: T
 
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            raise AttributeError(f"a pair of figures has no {name!r}: .original.{name} or .emitted.{name}?")
+
 
 @dataclass(frozen=True)
 class Xyz(Generic[T]):
@@ -160,7 +165,7 @@ class Xyz(Generic[T]):
 class Outcome(OldNames):
     """Interface of every result; `json_extra`: properties written to the JSON in addition to the fields, with types."""
 
-    from_json: bool = False
+    is_read_back: bool = False
     """True if it was read back from JSON: data that are not in the JSON are missing."""
 
     json_extra: ClassVar[dict[str, Any]] = {"ok": bool, "warnings": tuple[str, ...], "next_step": str}
@@ -235,7 +240,7 @@ class Outcome(OldNames):
 
     def _drawable(self, plots_of: Callable[[], Mapping[str, Plot]]) -> Mapping[str, Plot]:
         """Pictures, without those that need data missing in a result read back from JSON."""
-        if not self.from_json:
+        if not self.is_read_back:
             return plots_of()
         try:
             return {name: plot for name, plot in plots_of().items() if _draws(plot)}

@@ -55,7 +55,7 @@ class Result(Outcome):
     @property
     def citations(self) -> tuple[str, ...]:
         """BibTeX entries of this program and of the papers on its methods, printed by ``--cite``."""
-        if self.from_json:
+        if self.is_read_back:
             raise NotKeptError("citations: the JSON of a result does not contain its methods; use --cite")
         return entries_of(self.methods)
 
@@ -112,7 +112,7 @@ class Result(Outcome):
         """
         simulated = self.simulated if motion else None
         scene = None if simulated is None else simulated.scene(on_progress)
-        if scene is not None and not self.from_json:
+        if scene is not None and not self.is_read_back:
             scene = self._completed(scene)
         return page_of(self, self.light, self.page_sections(provenance), scene, provenance, problems)
 
@@ -131,12 +131,14 @@ class Result(Outcome):
             The files written.
 
         Raises:
-            ArgumentError: another word for `script`.
+            ArgumentError: another word for `script`, or the name of a JSON, CSV, PNG or NC file.
             MachineError, NumericError: a program cannot be simulated.
             OSError: a file cannot be written.
         """
         from shapegcode.results.page.html import save
 
+        if Path(path).suffix.lower() in {".json", ".nc", ".csv", ".png"}:
+            raise ArgumentError(f"{path}: report() writes an HTML page; JSON: to_json(), pictures: plot()")
         return save(self.page(), path, script)
 
     def plot(self, name: str = "", ax: Axes | None = None) -> Axes:

@@ -203,7 +203,7 @@ def _object(cls: Any, arguments: Sequence[Any], data: Any, where: str, bound: Ma
 
 def _from_json(value: Any) -> Any:
     if isinstance(value, Outcome):
-        object.__setattr__(value, "from_json", True)
+        object.__setattr__(value, "is_read_back", True)
     return value
 
 

@@ -159,6 +159,9 @@ def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
     if model is None:
         return ""
     name = str(location[-1])[:_LONGEST_NAME]
+    tables = root.model_fields.items() if len(location) == 1 else ()
+    if homes := [f"{table}.{name}" for table, each in tables if name in getattr(table_type(each), "model_fields", ())]:
+        return f"; did you mean {homes[0]}?"
     close = difflib.get_close_matches(name, model.model_fields, n=1, cutoff=0.5)
     return f"; did you mean {close[0]}?" if close else f"{_KNOWN}{', '.join(model.model_fields)}"
 

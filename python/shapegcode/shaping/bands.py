@@ -146,11 +146,13 @@ def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
 
 
 def mode_band(given: float | str | Mode | ModeBand, uncertainty: float = 0.0) -> ModeBand:
-    """Convert a frequency in Hz, a text for `parse_mode_band`, or a mode to a `ModeBand`."""
-    if isinstance(given, Mode):
-        return ModeBand(given, uncertainty)
+    """Convert a frequency in Hz, a text for `parse_mode_band`, a pair (Hz, damping ratio) or a mode to a `ModeBand`."""
     if isinstance(given, ModeBand):
         return given
+    if isinstance(given, list | tuple) and len(given) == 2:
+        given = Mode(*given)
+    if isinstance(given := getattr(given, "mode", given), Mode):
+        return ModeBand(given, uncertainty)
     return parse_mode_band(given if isinstance(given, str) else f"{float(given):.17g}", uncertainty)
 
 

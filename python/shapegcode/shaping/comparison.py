@@ -48,8 +48,8 @@ def choose_shaper(
     *,
     machine: Machine | str | Path | None = None,
     uncertainty: float = 0.0,
-    periods_s: Sequence[float | None] | None = None,
-    families: Sequence[str] | None = None,
+    periods_s: float | Sequence[float | None] | None = None,
+    families: str | Sequence[str] | None = None,
     max_duration_s: float | None = None,
     max_abs_sum: float = 10.0,
     vibration_limit: float | None = None,
@@ -65,7 +65,7 @@ def choose_shaper(
 
     Args:
         modes: frequencies in Hz of undamped modes, texts such as ``46:0.02±5%`` (Hz, damping ratio, band), modes or
-            bands; one or several; empty: those of the machine.
+            bands, pairs (Hz, damping ratio) in a list, modes that `identify` found; empty: those of the machine.
         machine: source of the modes, unless given, and of the block periods to try.
         uncertainty: relative half width of the band of modes given without a band.
         periods_s: grids on which the impulses may lie, s; an item None stands for continuous times. No list: with a
@@ -92,8 +92,8 @@ def choose_shaper(
     machine = None if machine is None else Machine.of(machine)
     # Convert arrays to lists of Python numbers.
     several: list[float | str | Mode | ModeBand] = np.atleast_1d(np.asarray(modes, dtype=object)).tolist()
-    periods = None if periods_s is None else np.asarray(periods_s, dtype=object).tolist()
-    families = None if families is None else np.asarray(families, dtype=object).tolist()
+    periods = None if periods_s is None else np.atleast_1d(np.asarray(periods_s, dtype=object)).tolist()
+    families = None if families is None else np.atleast_1d(np.asarray(families, dtype=object)).tolist()
     if several:
         bands = [mode_band(each, uncertainty) for each in several]
     elif machine is not None:

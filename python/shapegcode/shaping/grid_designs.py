@@ -25,6 +25,7 @@ from shapegcode.shaping.bands import (
     ModeBand,
     check_modes_and_times,
     check_times,
+    mode_band,
     mode_names,
     ms,
     proven_worst,
@@ -64,6 +65,7 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
 
     Source: this project.
     """
+    modes = [mode_band(each).mode for each in modes]
     check_modes_and_times(modes, period_s=period_s, max_duration_s=max_duration_s)
     search = _GridSearch(Conditions(zeros=tuple(map(Zero, modes))), period_s)
     shaper = search.shortest(whole_periods(max_duration_s, period_s))

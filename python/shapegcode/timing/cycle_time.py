@@ -27,6 +27,8 @@ from shapegcode.timing.result import PARTS, BlockTime, CycleTime, LogNext, OpenP
 _KINDS = {kind.value: name for name, kind in _core.BlockKind.__members__.items()}
 _CUTTING, _RAPID = _core.BlockKind.cutting.value, _core.BlockKind.rapid.value
 
+_MAX_OVERRIDE = 2.54  # of controls whose switch has eight bits
+
 
 def cycle_time(
     program: Program | str | Path,
@@ -62,7 +64,7 @@ def cycle_time(
 
     Raises:
         ArgumentError: an invalid controller value, an override at which full interpolation would take the
-            program beyond `controller.max_program_s`, or `log_next` with an uncalibrated machine.
+            program beyond `controller.max_program_s`, one above 254 %, or `log_next` with an uncalibrated machine.
         ProgramError, OSError: a program cannot be read.
     """
     machine = Machine.of(machine)
@@ -71,6 +73,8 @@ def cycle_time(
         feed_override = machine.times.feed_override_percent / 100.0
     if rapid_override is None:
         rapid_override = machine.times.rapid_override_percent / 100.0
+    if (largest := max(feed_override, rapid_override)) > _MAX_OVERRIDE:
+        raise _core.ArgumentError(f"override {largest:g}: a ratio of at most {_MAX_OVERRIDE:g} (0.5 is 50 %)")
     model = fanuc_model(machine, feed_override=feed_override, rapid_override=rapid_override)
     timed = _core.time_program(program.core, model, per_block)
     slowest, limit_s = min(feed_override, rapid_override, 1.0), machine.controller.max_program_s

@@ -275,7 +275,7 @@ def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Sectio
         yield Section("pictures", "Pictures", tuple(chosen))
     if others := tuple(each for each in pictures if each not in chosen):
         yield Section("more-pictures", "More pictures", others, printed=False)
-    if result.from_json:
+    if result.is_read_back:
         left_out = "Pictures that need the samples of the run are missing: the JSON does not contain them."
         yield Section("no-pictures", "Missing pictures", (Text((left_out,)),), printed=False)
 
