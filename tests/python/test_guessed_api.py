@@ -128,11 +128,11 @@ def test_a_simple_machine() -> None:
     ("guess", "said"),
     [
         ("sg.conver", "did you mean 'convert'"),
-        ("sg.zvd", "did you mean 'repeated_zv'"),
+        ("sg.MotionController().push_line([10, 0], 50)", "end_mm: list.2., feed_mm_per_s: int; it takes"),
         ("sg.zv(46).duration", "did you mean 'duration_s'"),
         ("sg.Mode(frequency=46)", "did you mean 'frequency_hz'"),
         ("sg.MotionController(shaper='zv')", "was given shaper: str"),
-        ("sg.minimal_shapers([46, 131])", "required argument: 'max_duration_s'"),
+        ("sg.zv(46).residual(46, damping=0.02)", "did you mean 'damping_ratio'"),
         ("sg.Machine('vx500')", "Machine.load"),
         ("sg.Machine.simple({'x': (46, 0.02)})", "is Mode"),
         ("sg.Machine.load('vx500').with_values('contour_um', 5)", "did you mean tolerance.contour_um"),

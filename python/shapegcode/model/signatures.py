@@ -16,24 +16,8 @@ T = TypeVar("T")
 
 def with_signature(value: T) -> T:
     """Set the signature of a core function or class from its docstring; wrong arguments are refused by it."""
-    _add_hints()
-    if isinstance(value, type):
-        if not issubclass(value, BaseException) and (found := _signature(value.__init__.__doc__)):
-            taken = list(found.parameters.values())[1:]  # without self
-            shown = found.replace(parameters=taken, return_annotation=inspect.Signature.empty)
-            setattr(value, "__signature__", shown)  # noqa: B010
-            begin = value.__init__
-
-            @functools.wraps(begin)
-            def begun(self: Any, *args: Any, **kwargs: Any) -> None:
-                try:
-                    begin(self, *args, **kwargs)
-                except TypeError as error:
-                    raise _refusal(error, type(self).__name__, shown, args, kwargs) from None
-
-            setattr(value, "__init__", begun)  # noqa: B010
-        return value
-    if not inspect.isbuiltin(value) or not (found := _signature(value.__doc__)):
+    _sign_classes()
+    if isinstance(value, type) or not inspect.isbuiltin(value) or not (found := _signature(value.__doc__)):
         return value
 
     @functools.wraps(value)
@@ -54,9 +38,39 @@ def with_signature(value: T) -> T:
     return called  # type: ignore[return-value]
 
 
+def _sign_methods(kind: type) -> None:
+    for name, member in [*vars(kind).items()]:
+        found = _signature(member.__doc__) if name == "__init__" or inspect.isroutine(member) else None
+        # `step` is called a thousand times a second.
+        if found is None or not found.parameters or (name.startswith("_") and name != "__init__") or name == "step":
+            continue
+        taken = [each for each in found.parameters.values() if each.name != "self"]
+        if name == "__init__":
+            found = found.replace(return_annotation=inspect.Signature.empty)
+            setattr(kind, "__signature__", found.replace(parameters=taken))  # noqa: B010
+        if taken and not isinstance(member, staticmethod):
+            called = kind.__name__ if name == "__init__" else name
+            method = _refusing(getattr(kind, name), called, found.replace(parameters=taken))
+            setattr(method, "__signature__", found)  # noqa: B010
+            setattr(kind, name, method)
+
+
+def _refusing(function: Any, name: str, found: inspect.Signature) -> Any:
+    """A method that refuses wrong arguments in one line."""
+
+    @functools.wraps(function)
+    def called(self: Any, *args: Any, **kwargs: Any) -> Any:
+        try:
+            return function(self, *args, **kwargs)
+        except TypeError as error:
+            raise _refusal(error, name, found, args, kwargs) from None
+
+    return called
+
+
 @functools.cache
-def _add_hints() -> None:
-    """Objects of the core suggest a name for one that they do not have."""
+def _sign_classes() -> None:
+    """The same for the methods of the core's classes, which also suggest a name for one that they do not have."""
 
     def missing(self: object, name: str) -> Any:
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint(name, dir(type(self)))}")
@@ -64,6 +78,7 @@ def _add_hints() -> None:
     for each in vars(_core).values():
         if isinstance(each, type) and not issubclass(each, BaseException):
             setattr(each, "__getattr__", missing)  # noqa: B010
+            _sign_methods(each)
 
 
 def _with_modes(found: inspect.Signature, args: Any, kwargs: Any) -> inspect.BoundArguments:
@@ -93,7 +108,8 @@ def _refusal(error: TypeError, name: str, found: inspect.Signature, args: Any, k
         given = found.bind(*args, **kwargs).arguments
     except TypeError as wrong:
         return TypeError(f"{name}(): {wrong}; {taken}")
-    shown = (f"{key}: {type(value).__name__}{getattr(value, 'shape', '')}" for key, value in given.items())
+    sizes = {key: f"({len(value)})" if isinstance(value, list | tuple) else "" for key, value in given.items()}
+    shown = (f"{key}: {type(value).__name__}{getattr(value, 'shape', sizes[key])}" for key, value in given.items())
     return TypeError(f"{name}() was given {', '.join(shown)}; {taken}")
 
 
@@ -126,7 +142,7 @@ def _value(default: ast.expr | None) -> Any:
         return float(default.id)
     if isinstance(default, ast.Attribute) and isinstance(default.value, ast.Name):
         return getattr(getattr(_core, default.value.id), default.attr)
-    return ast.literal_eval(default)
+    return ... if isinstance(default, ast.Call) else ast.literal_eval(default)  # an object of the core, as in the stub
 
 
 class _Short(ast.NodeTransformer):
