@@ -48,7 +48,8 @@ def test_plot_sensitivity_of_a_shaper() -> None:
     curve = sg.plot_sensitivity(sg.zv(50)).lines[0]
     frequencies, percent = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
     assert percent == pytest.approx(100.0 * np.abs(np.cos(0.5 * np.pi * frequencies / 50.0)), abs=1e-9)
-    sg.plot_sensitivity({"zv": sg.zv(50), "other": sg.zv(60)}, modes=[50, "60:0.01±5%"])
+    for several in ({"zv": sg.zv(50), "other": sg.zv(60)}, [sg.zv(50), sg.zv(60)]):
+        sg.plot_sensitivity(several, modes=[50, "60:0.01±5%"])
     plt.close("all")
 
 
@@ -89,8 +90,7 @@ def test_convert_takes_a_text_a_file_and_a_program(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("function", ["simulate", "check", "cycle_time", "compare", "expand"])
 def test_a_machine_is_named_wherever_one_is_taken(function: str) -> None:
-    given = (TEXT, TEXT) if function == "compare" else (TEXT,)
-    assert getattr(sg, function)(*given, "vx500") is not None
+    assert getattr(sg, function)(*[TEXT] * (2 if function == "compare" else 1), "vx500") is not None
 
 
 def test_a_controller_takes_a_mode() -> None:

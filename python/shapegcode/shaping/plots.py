@@ -24,7 +24,7 @@ _FREQUENCIES = 601
 _PERIODS_IN_DURATION = 2.0
 _SAMPLES_OF_A_STEP = 3000
 _CYCLES_SHOWN = 3.0  # cycles of the slowest mode after the longest shaper
-Shapers = Recommendation | Shaper | Mapping[str, Shaper]
+Shapers = Recommendation | Shaper | Sequence[Shaper] | Mapping[str, Shaper]
 
 
 def plots_of(result: Recommendation) -> dict[str, Plot]:
@@ -76,7 +76,11 @@ def _shapers_and_bands(
             for each in selected(result)
         }
         return shapers, result.modes
-    return {"shaper": result} if isinstance(result, Shaper) else result, [mode_band(each) for each in modes]
+    if isinstance(result, Shaper):
+        result = {"shaper": result}
+    elif not isinstance(result, Mapping):
+        result = {f"shaper {number}": each for number, each in enumerate(result, 1)}
+    return result, [mode_band(each) for each in modes]
 
 
 def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
@@ -133,7 +137,7 @@ def plot_sensitivity(
     """Plot the residual vibration over the frequency of a mode, bands shaded.
 
     Args:
-        result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, or shapers by name.
+        result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, several, or shapers by name.
         modes: modes to mark if shapers are given, as for `choose_shaper`; empty: curves without damping, up to the
             frequency with 2.5 cycles in the duration of the longest shaper.
         ax: where to draw; None: a new figure.
