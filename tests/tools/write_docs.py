@@ -41,10 +41,10 @@ What can be guessed; a wrong name, argument or attribute is answered with the on
 | `sg.zv(46, 0.02)` | the ZV shaper of 46 Hz with a damping ratio of 0.02; `sg.Mode(46, 0.02)` is that mode |
 | `sg.zv(46).residual(frequencies_hz)` | its residual vibration over an array of frequencies |
 | `sg.choose_shaper([46, 131])` | every family of shapers for two modes, and the one to take |
-| `sg.plot_sensitivity(shaper)` | residual vibration over frequency, of a comparison, a shaper, several or a dict of shapers |
+| `sg.plot_sensitivity(shaper)` | residual over frequency, of a comparison, a shaper, a list or dict of shapers |
 | `sg.identify(t, y)`, `sg.identify(t, y, force)` | modes of a decay, of an impact test, from arrays |
 | `sg.Machine.simple(modes={"x": 46, "y": [131, 200]})` | a machine of which nothing but its modes is known |
-| `sg.zv(found.modes[0])`, `sg.Machine.simple({"x": found.modes})` | modes that `identify` found serve wherever modes are taken |
+| `sg.zv(found.modes[0])`, `sg.Machine.simple({"x": found.modes})` | identified modes serve wherever modes are taken |
 | `sg.simulate(conversion.text, "vx500")` | the emitted text, which is bytes, is a program too |
 | `sg.MotionController(shaper=sg.Mode(46, 0.02), ...)` | a controller with the ZV shaper of a mode, on its own grid |
 

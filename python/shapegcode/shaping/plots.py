@@ -137,7 +137,7 @@ def plot_sensitivity(
     """Plot the residual vibration over the frequency of a mode, bands shaded.
 
     Args:
-        result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, several, or shapers by name.
+        result: a comparison (one curve for each of `selected`, the limit dashed), a shaper, several, or by name.
         modes: modes to mark if shapers are given, as for `choose_shaper`; empty: curves without damping, up to the
             frequency with 2.5 cycles in the duration of the longest shaper.
         ax: where to draw; None: a new figure.
