@@ -27,7 +27,7 @@ _RENAMED = {
 # Names that a user of other packages may look for.
 _MEANT = {
     "design_shaper": "choose_shaper", "shaper": "choose_shaper", "ei": "choose_shaper", "si": "choose_shaper",
-    "zvd": "repeated_zv", "read": "Program.read", "parse": "Program.read", "load": "Program.read",
+    "zvd": "repeated_zv", "read": "Program.read", "parse": "Program.read",
     "machines": "Machine.builtin_names", "list_machines": "Machine.builtin_names", "optimize_feed": "schedule_feed",
 }  # fmt: skip
 

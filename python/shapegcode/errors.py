@@ -26,9 +26,8 @@ def hint(name: str, known: Iterable[str]) -> str:
     longer = [each for each in names if each.startswith(f"{name}_")]
     words = set(name.split("_"))
     alike = sorted(names, key=lambda each: -len(words.intersection(each.split("_"))))[:1]
-    near = (
-        longer or difflib.get_close_matches(name, names, n=1) or [each for each in alike if words & {*each.split("_")}]
-    )
+    close = difflib.get_close_matches(name, names, n=1) or difflib.get_close_matches(name.lower(), names, n=1)
+    near = longer or close or [each for each in alike if words & {*each.split("_")}]
     return f"; did you mean {near[0]!r}?" if near and not name.startswith("_") else ""
 
 

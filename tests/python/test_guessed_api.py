@@ -54,8 +54,8 @@ def test_plot_sensitivity_of_a_shaper() -> None:
 
 
 def test_identify_arrays() -> None:
-    (mode,) = sg.identify(TIME_S, decay(46.0, 0.02)).modes
-    assert mode.frequency_hz.value == pytest.approx(46.0, rel=1e-3)
+    (mode,) = (found := sg.identify(TIME_S, decay(46.0, 0.02), options=sg.ReadOptions(axis="x"))).modes
+    assert mode.frequency_hz.value == pytest.approx(46.0, rel=1e-3) and found.axis == "x"
     assert mode.damping_ratio.value == pytest.approx(0.02, rel=0.02)
     with pytest.raises(sg.RecordError, match=r"\(1000,\) instants and \(5,\) samples"):
         sg.identify(TIME_S, TIME_S[:5])
@@ -161,9 +161,9 @@ def test_what_one_function_gives_the_others_take() -> None:
     """Modes that were identified; numbers in Hz wherever modes are taken; the emitted text, which is bytes."""
     (found,) = sg.identify(TIME_S, decay(46.0, 0.02)).modes
     mode = sg.Mode(float(found.frequency_hz), float(found.damping_ratio))
-    assert f"{found.frequency_hz:.0f}" == "46"
-    assert sg.zv(found) == sg.zv(mode)  # type: ignore[arg-type]
-    assert sg.choose_shaper([found], families="zv", periods_s=0.001).ok
+    assert f"{found.frequency_hz:.0f}" == "46" and sg.zv(found) == sg.zv(mode)  # type: ignore[arg-type]
+    shaper = sg.choose_shaper([found], families="zv", periods_s=0.001).shaper
+    assert shaper.amplitudes == pytest.approx(sg.zv_on_grid(mode, 0.001).amplitudes)
     assert sg.Machine.simple({"x": found}).axes.x.modes == sg.Machine.simple({"x": mode}).axes.x.modes  # type: ignore[dict-item]
     assert sg.repeated_zv(46, 2) == sg.repeated_zv(sg.Mode(46), 2)  # type: ignore[arg-type]
     assert sg.shortest_non_negative([46], 0.005) == sg.shortest_non_negative([sg.Mode(46)], 0.005)  # type: ignore[list-item]

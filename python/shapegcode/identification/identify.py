@@ -103,7 +103,8 @@ def identify(
     if quantity not in (kinds := typing.get_args(Quantity)):
         raise ArgumentError(f"quantity = {quantity!r}: must be one of {', '.join(kinds)}")
     if response is not None:
-        source = [_record_of(source, response, force, quantity)]
+        axis = None if options is None else options.axis
+        source = [replace(_record_of(source, response, force, quantity), axis=axis)]
     elif force is not None:
         raise ArgumentError("force is given without a response: identify(time_s, response, force)")
     sources: Sequence[Any] = [source] if isinstance(source, str | Path) else source  # type: ignore[assignment]

@@ -70,7 +70,8 @@ def update_machine(path: str | Path, found: Identification, *, keep_modes: str =
         OSError: it cannot be read.
     """
     if found.axis is None:
-        raise ArgumentError(f"{found.files[0]} does not say along which axis it was measured: add --axis x, y or z")
+        cure = "add --axis x, y or z; in Python ReadOptions(axis=...)"
+        raise ArgumentError(f"{found.files[0]} does not say along which axis it was measured: {cure}")
     check_updatable(path)
     text = read_text(Path(path), MachineError)
     return update_modes(

@@ -126,7 +126,7 @@ def renamed_of(cls: type) -> Mapping[str, str]:
     return {old: new for base in cls.__mro__ for old, new in RENAMED.get(base.__name__, {}).items()}
 
 
-_MEANT = {"save": "report", "to_html": "report"}
+_MEANT = {"save": "text", "write": "text", "to_html": "report"}
 
 
 class OldNames:
@@ -138,7 +138,8 @@ class OldNames:
             """Value of a renamed field."""
             new = renamed_of(type(self)).get(name)
             if new is None:
-                near = "" if name.startswith("_") else hint(_MEANT.get(name, name), dir(self))
+                names = [] if name.startswith("_") else dir(self)
+                near = hint(_MEANT[name] if _MEANT.get(name) in names else name, names)
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{near}")
             what = type(self).__name__
             warnings.warn(f"{what}.{name} is {what}.{new} now", FutureWarning, stacklevel=2)

@@ -131,13 +131,13 @@ class Result(Outcome):
             The files written.
 
         Raises:
-            ArgumentError: another word for `script`, or the name of a JSON, CSV, PNG or NC file.
+            ArgumentError: another word for `script`, or a file name that ends otherwise, such as .json.
             MachineError, NumericError: a program cannot be simulated.
             OSError: a file cannot be written.
         """
         from shapegcode.results.page.html import save
 
-        if Path(path).suffix.lower() in {".json", ".nc", ".csv", ".png"}:
+        if Path(path).suffix.lower() in {".json", ".nc", ".csv", ".png", ".pdf", ".svg", ".md", ".txt"}:
             raise ArgumentError(f"{path}: report() writes an HTML page; JSON: to_json(), pictures: plot()")
         return save(self.page(), path, script)
 

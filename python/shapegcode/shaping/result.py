@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from shapegcode._core import ArgumentError
+from shapegcode._core import ArgumentError, Shaper
 from shapegcode.results.outcome import Plot
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
@@ -198,6 +198,11 @@ class Recommendation(Result):
     def design(self) -> Design:
         """The recommended design."""
         return self.designs[self.recommended]
+
+    @property
+    def shaper(self) -> Shaper:
+        """The recommended shaper."""
+        return self.design.shaper
 
     @property
     def ok(self) -> bool:
