@@ -25,6 +25,8 @@ def with_signature(value: T) -> T:
         try:
             return value(*args, **kwargs)
         except TypeError as error:
+            if "incompatible" not in str(error):  # a callback's own
+                raise
             first = error
         try:
             given = _with_modes(found, args, kwargs)
