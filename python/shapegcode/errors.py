@@ -20,6 +20,8 @@ __all__ = [
 
 def hint(name: str, known: Iterable[str]) -> str:
     """``; did you mean 'known'?`` with the name closest to an unknown one; empty if none is."""
+    if name.startswith("_"):
+        return ""
     import difflib
 
     names = sorted(each for each in known if not each.startswith("_"))
@@ -28,7 +30,14 @@ def hint(name: str, known: Iterable[str]) -> str:
     alike = sorted(names, key=lambda each: -len(words.intersection(each.split("_"))))[:1]
     close = difflib.get_close_matches(name, names, n=1) or difflib.get_close_matches(name.lower(), names, n=1)
     near = longer or close or [each for each in alike if words & {*each.split("_")}]
-    return f"; did you mean {near[0]!r}?" if near and not name.startswith("_") else ""
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def missing_attribute(owner: object, name: str, meant: str) -> AttributeError:
+    """An AttributeError whose hint is the attribute of `owner` closest to `meant`."""
+    # Python and NumPy ask for many names with an underscore.
+    near = "" if name.startswith("_") else hint(meant, dir(owner))
+    return AttributeError(f"{type(owner).__name__!r} object has no attribute {name!r}{near}")
 
 
 def located_error(source: str, line: int, column: int, message: str, alarm: int = 0) -> ProgramError:

@@ -298,7 +298,11 @@ def test_the_command_draws_and_writes_its_page(tmp_path: Path) -> None:
         ("sd = 2.0", "sd = -2.0", 'STUDY.toml:5: vary."axes.x.modes.1.frequency_hz".sd = -2.0: must be greater than 0'),
         ("sd = 2.0", "sd = 30.0", "axes.x.modes.1.frequency_hz = -"),
         ("x.modes.1", "x.modes.0", "axes.x.modes.0.frequency_hz: no such key: axes.x.modes counts from 1"),
-        ("x.modes.1", "x.modes.2", "axes.x.modes.2.frequency_hz: no such key: axes.x.modes counts from 1, and there"),
+        (
+            "x.modes.1",
+            "x.modes.2",
+            "axes.x.modes.2.frequency_hz: no such key: axes.x.modes counts from 1, and there is 1",
+        ),
         ("frequency_hz", "frequenzy_hz", "did you mean frequency_hz?"),
         (
             "controller.shaped_time_constant_s = [0.0, 0.008]",

@@ -97,16 +97,32 @@ def test_a_file_is_read_from_disk_and_named_in_messages(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("flute_length_mm = 20.0", "flute_length_mm = 31", "6: tool.flute_length_mm = 31.0: must not exceed overhang"),
-        ("flutes = 6", "flutes = 3\nrunout_um = [1, 2]", "5: tool.runout_um = [1.0, 2.0]: has 2 values: must have"),
-        ("flutes = 6", "flutes = 1\nrunout_um = [4000]", "5: tool.runout_um = [4000.0]: must stay below the radius"),
+        (
+            "flute_length_mm = 20.0",
+            "flute_length_mm = 31",
+            "6: tool.flute_length_mm = 31.0: must not exceed overhang_mm",
+        ),
+        (
+            "flutes = 6",
+            "flutes = 3\nrunout_um = [1, 2]",
+            "5: tool.runout_um = [1.0, 2.0]: has 2 values: must have one per",
+        ),
+        (
+            "flutes = 6",
+            "flutes = 1\nrunout_um = [4000]",
+            "5: tool.runout_um = [4000.0]: must stay below the radius, 4000",
+        ),
         ("helix_deg = 50.0", "helix_deg = 81", "5: tool.helix_deg = 81: must be 80 or less (unit: degrees)"),
         ("flutes = 6", "flutes = 6.5", "4: tool.flutes = 6.5: must be a whole number"),
         ("diameter_mm = 8.0", "diameter_mm = nan", "3: tool.diameter_mm = nan: must be"),
         ("overhang_mm = 30.0\n", "", " tool.overhang_mm: required, but missing (unit: mm)"),
         ("flutes = 6", "flute = 6", "4: tool.flute = 6: unknown key; did you mean flutes?"),
         ("al6061-t6-carbide-6", "al6061", '10: cutting.material = "al6061": no such material; known are al6061-t6-'),
-        (MATERIAL, "ratio = 0.3", "9: cutting: needs material, or both specific_n_per_mm2 and ratio: specific_n"),
+        (
+            MATERIAL,
+            "ratio = 0.3",
+            "9: cutting: needs material, or both specific_n_per_mm2 and ratio: specific_n_per_mm2 is",
+        ),
         (
             MATERIAL,
             "ratio = 0.3\nspecific_n_per_mm2 = 700\nspecific_exponent = -0.6\nratio_exponent = -0.5",

@@ -124,9 +124,13 @@ class Last:
 """
 
 
-@pytest.mark.parametrize("module", ["argparse", "numpy", "shapegcode._core", "pydantic", "shapegcode.conversion.plan"])
-def test_ctrl_c_while_modules_load_is_no_traceback(module: str, folder: Path) -> None:
-    found = "Last()" if module == "numpy" else INTERRUPT
+MODULES = ["argparse", "numpy", "shapegcode._core", "pydantic", "shapegcode.conversion.plan"]
+
+
+@pytest.mark.parametrize(
+    ("module", "found"), [*((each, INTERRUPT) for each in MODULES), ("numpy", "Last()")], ids=[*MODULES, "finalizer"]
+)
+def test_ctrl_c_while_modules_load_is_no_traceback(module: str, found: str, folder: Path) -> None:
     code = LAST + WITH_FINDER.replace("MODULE", repr(module)).replace("FOUND", found)
     sound(command(folder, python=("-c", code)), "shapegcode: stopped", code=130)
     assert not (folder / "o.nc").exists()

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import typing
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -100,7 +99,7 @@ def identify(
             raise ArgumentError(f"{name} = {number}: must be from 1 to {_LARGEST_MODEL}")
     if isinstance(response, ReadOptions):
         options, response = response, None
-    if quantity not in (kinds := typing.get_args(Quantity)):
+    if quantity not in (kinds := get_args(Quantity)):
         raise ArgumentError(f"quantity = {quantity!r}: must be one of {', '.join(kinds)}")
     if response is not None:
         axis = None if options is None else options.axis

@@ -9,7 +9,7 @@ import re
 from typing import Any, TypeVar
 
 from shapegcode import _core
-from shapegcode.errors import hint
+from shapegcode.errors import hint, missing_attribute
 
 T = TypeVar("T")
 
@@ -75,7 +75,7 @@ def _sign_classes() -> None:
     """The same for the methods of the core's classes, which also suggest a name for one that they do not have."""
 
     def missing(self: object, name: str) -> Any:
-        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint(name, dir(type(self)))}")
+        raise missing_attribute(self, name, name)
 
     for each in vars(_core).values():
         if isinstance(each, type) and not issubclass(each, BaseException):

@@ -23,7 +23,7 @@ from typing import Any, Self, cast
 
 import numpy as np
 
-from shapegcode.errors import hint
+from shapegcode.errors import missing_attribute
 from shapegcode.io.data_file import open_file
 
 FORMAT = 1  # format of the JSON of results: increased when older files can no longer be read
@@ -138,9 +138,9 @@ class OldNames:
             """Value of a renamed field."""
             new = renamed_of(type(self)).get(name)
             if new is None:
-                names = [] if name.startswith("_") else dir(self)
-                near = hint(_MEANT[name] if _MEANT.get(name) in names else name, names)
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{near}")
+                meant = _MEANT.get(name, name)
+                is_there = meant in vars(self) or hasattr(type(self), meant)
+                raise missing_attribute(self, name, meant if is_there else name)
             what = type(self).__name__
             warnings.warn(f"{what}.{name} is {what}.{new} now", FutureWarning, stacklevel=2)
             return getattr(self, new)
