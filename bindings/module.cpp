@@ -7,10 +7,10 @@ PYBIND11_MODULE(_core, module) {
   module.doc() = "Compiled core of shapegcode: program text, motion, filters, shapers, plant and metrology.";
   module.attr("__version__") = SHAPEGCODE_VERSION;
   register_errors(module);
+  register_filter(module);  // of which a shaper makes one
   register_shaping(module);
   register_shaping_families(module);
   register_minimal(module);
-  register_filter(module);
   register_path(module);
   register_motion(module);
   register_planner_models(module);

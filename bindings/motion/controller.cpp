@@ -1,5 +1,6 @@
 #include "motion/controller.hpp"
 
+#include <fmt/format.h>
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
@@ -55,6 +56,14 @@ ControllerShaper shaper_of(const AnyShaper& given, double period_s) {
 
 AxisShapers shaper_of(const AnyAxisShaper& given, double period_s) {
   return std::visit([period_s](const auto& shaper) -> AxisShapers { return filter_of(shaper, period_s); }, given);
+}
+
+/// No switch goes beyond 254 %: a larger number is meant in percent.
+double checked_override(double ratio) {
+  if (ratio > 2.54) {
+    throw Error(ErrorKind::argument, fmt::format("override {:.6g}: a ratio of at most 2.54 (0.5 is 50 %)", ratio));
+  }
+  return ratio;
 }
 
 // What Python names one by one.
@@ -521,12 +530,15 @@ Raises:
       .def("plan", &PyController::plan,
            "Plans until enough motion lies ahead; only with `lead_periods`, from one thread. False: nothing to do.")
       .def(
-          "feed_override", [](PyController& self, double ratio) { self.control().feed_override(ratio); },
+          "feed_override",
+          [](PyController& self, double ratio) { self.control().feed_override(checked_override(ratio)); },
           py::arg("ratio"),
-          "Sets the feed override, a ratio of 0 to 2; a value outside is limited to this range. It acts on motion not "
+          "Sets the feed override, a ratio of 0 to 2; up to 2.54 it is limited to this range, more is refused. It acts "
+          "on motion not "
           "yet planned: after 8 to 32 periods and the lead; 0 is a hold.")
       .def(
-          "rapid_override", [](PyController& self, double ratio) { self.control().rapid_override(ratio); },
+          "rapid_override",
+          [](PyController& self, double ratio) { self.control().rapid_override(checked_override(ratio)); },
           py::arg("ratio"), "Sets the override of rapids, likewise. The feed override has no effect on them.")
       .def(
           "exchange_shaper",

@@ -164,6 +164,18 @@ Returns:
 
 Raises:
     ArgumentError: A value is outside its range.)")
+      .def("to_fir", &shapegcode::to_fir, py::arg("period_s"),
+           R"(The shaper as a filter of samples: ``shaper.to_fir(0.001).apply(samples)``.
+
+Args:
+    period_s: Period of the samples in s, above 0.
+
+Returns:
+    The filter; its delays are the times of the impulses in periods.
+
+Raises:
+    ArgumentError: The period is not above 0, or the shaper is too long.
+    DesignError: A time is not a multiple of the period, as those of `zv_on_grid` are: times are never rounded.)")
       .def("__repr__",
            [](const Shaper& self) {
              return "Shaper(times_s=" + repr(self.times_s) + ", amplitudes=" + repr(self.amplitudes) + ")";

@@ -29,6 +29,7 @@ _MEANT = {
     "design_shaper": "choose_shaper", "shaper": "choose_shaper", "ei": "choose_shaper", "si": "choose_shaper",
     "zvd": "repeated_zv", "read": "Program.read", "parse": "Program.read",
     "machines": "Machine.builtin_names", "list_machines": "Machine.builtin_names", "optimize_feed": "schedule_feed",
+    "plot": "Result.plot",
 }  # fmt: skip
 
 
@@ -57,11 +58,27 @@ def __getattr__(name: str) -> Any:
     if (name != "__version__" and name.startswith("_")) or name not in _home():
         raise AttributeError(f"module 'shapegcode' has no attribute {name!r}{_near(name)}")
     value = getattr(importlib.import_module(_home()[name]), name)
-    if callable(value) and _home()[name] == "shapegcode._core":
+    if callable(value):
+        value = _with_hints(value, _home()[name] == "shapegcode._core")
+    globals()[name] = value
+    return value
+
+
+def _with_hints(value: Any, of_core: bool) -> Any:
+    """A function or class that says which argument was probably meant by one that it does not have."""
+    if of_core:
         from shapegcode.model.signatures import with_signature
 
-        value = with_signature(value)
-    globals()[name] = value
+        return with_signature(value)
+    from shapegcode.errors import with_keyword_hint
+
+    if isinstance(value, type):
+        for name, member in [*vars(value).items()]:
+            if isinstance(member, classmethod) and not name.startswith("_"):
+                setattr(value, name, classmethod(with_keyword_hint(member.__func__)))
+        return value
+    value = with_keyword_hint(value)
+    value.__module__ = __name__  # for pickle
     return value
 
 

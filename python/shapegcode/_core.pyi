@@ -31,277 +31,6 @@ class NumericError(ShapegcodeError):
     """
     A solver failed or did not converge; the message says which.
     """
-class Mode:
-    """
-    One vibration mode as it moves one axis, base-excited by the command of that axis or of others. Immutable.
-    
-    Args:
-        frequency_hz: Undamped natural frequency in Hz, above 0.
-        damping_ratio: Damping ratio (no unit), 0 <= zeta < 1.
-        participation: Factor of this mode's relative deflection in the response (no unit), finite.
-        excited_by: Factors of the accelerations of X, Y and Z that excite it (no unit), finite; all zero: the axis which
-            it moves, with factor one.
-    
-    Raises:
-        ArgumentError: A value is outside its range.
-    """
-    def __eq__(self, arg0: Mode) -> bool:
-        ...
-    def __getstate__(self) -> tuple[float, float, float, typing.Annotated[list[float], "FixedSize(3)"]]:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __init__(self, frequency_hz: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, participation: typing.SupportsFloat | typing.SupportsIndex = 1.0, excited_by: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] = [0.0, 0.0, 0.0]) -> None:
-        """
-        Raises ArgumentError on a value outside its range.
-        """
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: tuple) -> None:
-        ...
-    @property
-    def damping_ratio(self) -> float:
-        """
-        Damping ratio, no unit.
-        """
-    @property
-    def excited_by(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
-        """
-        Factors of the accelerations of X, Y, Z that excite it; all zero: 1 for the axis it moves.
-        """
-    @property
-    def frequency_hz(self) -> float:
-        """
-        Undamped natural frequency in Hz.
-        """
-    @property
-    def participation(self) -> float:
-        """
-        Factor of this mode's relative deflection in the response, no unit.
-        """
-    @property
-    def pole(self) -> complex:
-        """
-        Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (paper 002, eq. 7).
-        """
-class Shaper:
-    """
-    Input shaper: impulses at ascending times, whose amplitudes add up to one. Immutable.
-    
-    Args:
-        times_s: Times of the impulses in s, shape (n,), n >= 1, strictly ascending from exactly 0.
-        amplitudes: Amplitudes of the impulses (no unit), shape (n,), sum 1 within 1e-9; may be negative.
-    
-    Raises:
-        ArgumentError: Unequal lengths, no impulse, a value that is not finite, times that do not ascend from 0, or a sum
-            other than 1.
-    
-    Source: paper 002, eq. 4 and 9.
-    """
-    __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: Shaper) -> bool:
-        ...
-    def __getstate__(self) -> tuple[list[float], list[float]]:
-        ...
-    def __init__(self, times_s: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], amplitudes: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
-        """
-        Raises ArgumentError if the impulses are not as the class states.
-        """
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: tuple) -> None:
-        ...
-    def residual(self, frequency_hz: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] = 0.0) -> typing.Any:
-        """
-        Residual vibration over frequency: `residual_ratio` of modes of these frequencies.
-        
-        Args:
-            frequency_hz: Natural frequency in Hz, above 0; a number or an array of any shape.
-            damping_ratio: Damping ratio (no unit), 0 <= zeta < 1; a number, or an array that broadcasts with the frequencies.
-        
-        Returns:
-            The ratio (no unit): a number for numbers, else an array of the broadcast shape.
-        
-        Raises:
-            ArgumentError: A value is outside its range.
-        """
-    def residual_ratio(self, mode: Mode) -> float:
-        """
-        Residual vibration of a mode after the last impulse, relative to the unshaped one.
-        
-        V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation has no effect.
-        V has a rounding floor of about 1e-16*(1 + omega*t_N)*abs_sum.
-        
-        Args:
-            mode: The mode that vibrates; it need not be one that the shaper was designed for.
-        
-        Returns:
-            The ratio V (no unit), 0 where the shaper cancels the mode.
-        
-        Source: paper 002, eq. 8.
-        """
-    @property
-    def abs_sum(self) -> float:
-        """
-        Sum of the amplitudes' magnitudes (no unit): 1 for a non-negative shaper.
-        """
-    @property
-    def amplitudes(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Amplitudes of the impulses (no unit), shape (n,), read-only view.
-        """
-    @property
-    def duration_s(self) -> float:
-        """
-        Time of the last impulse in s, by which the shaped command is longer.
-        """
-    @property
-    def has_negative(self) -> bool:
-        """
-        True if any amplitude is below zero.
-        """
-    @property
-    def mean_s(self) -> float:
-        """
-        First moment in s: the mean delay of the shaped command.
-        """
-    @property
-    def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Times of the impulses in s, shape (n,), read-only view.
-        """
-    @property
-    def variance_s2(self) -> float:
-        """
-        Second central moment in s^2; radius error of a circle: dR/R = variance*(v/R)^2/2.
-        """
-class ExtraInsensitive:
-    """
-    An extra-insensitive shaper, with the zeros and maxima of its residual.
-    """
-    @property
-    def humps_hz(self) -> list[float]:
-        """
-        Natural frequencies in Hz, ascending, at which the residual is the vibration limit.
-        """
-    @property
-    def shaper(self) -> Shaper:
-        """
-        The shaper, humps+2 non-negative impulses.
-        """
-    @property
-    def zeros_hz(self) -> list[float]:
-        """
-        Natural frequencies without residual in Hz, ascending, one more than humps.
-        """
-class WorstResidual:
-    """
-    The largest residual over a band of frequencies.
-    """
-    @property
-    def frequency_hz(self) -> float:
-        """
-        Natural frequency in Hz at which it was found.
-        """
-    @property
-    def residual_ratio(self) -> float:
-        """
-        Residual ratio at frequency_hz, no unit.
-        """
-    @property
-    def upper_bound(self) -> float:
-        """
-        No frequency of the band has a larger residual ratio; above residual_ratio by at most 1e-6 of it, or 1e-12.
-        """
-class FrequencyBand:
-    """
-    A band of frequencies.
-    """
-    @property
-    def highest_hz(self) -> float:
-        """
-        Upper end in Hz.
-        """
-    @property
-    def lowest_hz(self) -> float:
-        """
-        Lower end in Hz.
-        """
-class MinimalShapers:
-    """
-    The minimal shapers of some modes, and what is known about others.
-    """
-    @property
-    def boxes(self) -> int:
-        """
-        Boxes of times examined by the proof.
-        """
-    @property
-    def complete(self) -> bool:
-        """
-        True if every box of times was decided: there is no other shaper in the range.
-        """
-    @property
-    def complete_up_to_s(self) -> float:
-        """
-        Duration in s up to which there is no other shaper; 0: nothing is proven.
-        """
-    @property
-    def converged(self) -> int:
-        """
-        Starts that reached a shaper in the range.
-        """
-    @property
-    def found_once(self) -> int:
-        """
-        Shapers reached by one start only. Divided by `converged`, the number estimates the ratio of starts that would reach a shaper not yet listed (Good 1953).
-        """
-    @property
-    def max_abs_sum(self) -> float:
-        """
-        Range of the search: largest sum of magnitudes.
-        """
-    @property
-    def max_duration_s(self) -> float:
-        """
-        Range of the search: largest duration in s.
-        """
-    @property
-    def shapers(self) -> list[Shaper]:
-        """
-        The shapers, ascending in duration, then in the times.
-        """
-    @property
-    def starts(self) -> int:
-        """
-        Newton starts.
-        """
-    @property
-    def unresolved(self) -> int:
-        """
-        Boxes too small to halve further that could not be decided: solutions there are not isolated.
-        """
-class MinimalBranches:
-    """
-    The minimal shapers of two modes over the ratio of their frequencies, joined into curves.
-    """
-    @property
-    def amplitudes(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Amplitudes (no unit), shape (n_branches, n_ratios, 3), NaN as in `times_s`; read-only view.
-        """
-    @property
-    def ratios(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Frequency ratios (no unit), shape (n_ratios,), read-only view.
-        """
-    @property
-    def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Times of the impulses in s, shape (n_branches, n_ratios, 3), NaN where a curve has no shaper; read-only view.
-        
-        [..., 2] is the duration.
-        """
 class Fir:
     """
     Weights on the sample grid that add up to one: an acceleration filter (moving average) or an input shaper. One filter type for both.
@@ -474,6 +203,291 @@ class FollowingFir:
     def position_mm(self) -> list[float]:
         """
         Positions of the filters, mm.
+        """
+class Mode:
+    """
+    One vibration mode as it moves one axis, base-excited by the command of that axis or of others. Immutable.
+    
+    Args:
+        frequency_hz: Undamped natural frequency in Hz, above 0.
+        damping_ratio: Damping ratio (no unit), 0 <= zeta < 1.
+        participation: Factor of this mode's relative deflection in the response (no unit), finite.
+        excited_by: Factors of the accelerations of X, Y and Z that excite it (no unit), finite; all zero: the axis which
+            it moves, with factor one.
+    
+    Raises:
+        ArgumentError: A value is outside its range.
+    """
+    def __eq__(self, arg0: Mode) -> bool:
+        ...
+    def __getstate__(self) -> tuple[float, float, float, typing.Annotated[list[float], "FixedSize(3)"]]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, frequency_hz: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, participation: typing.SupportsFloat | typing.SupportsIndex = 1.0, excited_by: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] = [0.0, 0.0, 0.0]) -> None:
+        """
+        Raises ArgumentError on a value outside its range.
+        """
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    @property
+    def damping_ratio(self) -> float:
+        """
+        Damping ratio, no unit.
+        """
+    @property
+    def excited_by(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
+        """
+        Factors of the accelerations of X, Y, Z that excite it; all zero: 1 for the axis it moves.
+        """
+    @property
+    def frequency_hz(self) -> float:
+        """
+        Undamped natural frequency in Hz.
+        """
+    @property
+    def participation(self) -> float:
+        """
+        Factor of this mode's relative deflection in the response, no unit.
+        """
+    @property
+    def pole(self) -> complex:
+        """
+        Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (paper 002, eq. 7).
+        """
+class Shaper:
+    """
+    Input shaper: impulses at ascending times, whose amplitudes add up to one. Immutable.
+    
+    Args:
+        times_s: Times of the impulses in s, shape (n,), n >= 1, strictly ascending from exactly 0.
+        amplitudes: Amplitudes of the impulses (no unit), shape (n,), sum 1 within 1e-9; may be negative.
+    
+    Raises:
+        ArgumentError: Unequal lengths, no impulse, a value that is not finite, times that do not ascend from 0, or a sum
+            other than 1.
+    
+    Source: paper 002, eq. 4 and 9.
+    """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: Shaper) -> bool:
+        ...
+    def __getstate__(self) -> tuple[list[float], list[float]]:
+        ...
+    def __init__(self, times_s: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], amplitudes: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        """
+        Raises ArgumentError if the impulses are not as the class states.
+        """
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def residual(self, frequency_hz: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] = 0.0) -> typing.Any:
+        """
+        Residual vibration over frequency: `residual_ratio` of modes of these frequencies.
+        
+        Args:
+            frequency_hz: Natural frequency in Hz, above 0; a number or an array of any shape.
+            damping_ratio: Damping ratio (no unit), 0 <= zeta < 1; a number, or an array that broadcasts with the frequencies.
+        
+        Returns:
+            The ratio (no unit): a number for numbers, else an array of the broadcast shape.
+        
+        Raises:
+            ArgumentError: A value is outside its range.
+        """
+    def residual_ratio(self, mode: Mode) -> float:
+        """
+        Residual vibration of a mode after the last impulse, relative to the unshaped one.
+        
+        V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation has no effect.
+        V has a rounding floor of about 1e-16*(1 + omega*t_N)*abs_sum.
+        
+        Args:
+            mode: The mode that vibrates; it need not be one that the shaper was designed for.
+        
+        Returns:
+            The ratio V (no unit), 0 where the shaper cancels the mode.
+        
+        Source: paper 002, eq. 8.
+        """
+    def to_fir(self, period_s: typing.SupportsFloat | typing.SupportsIndex) -> Fir:
+        """
+        The shaper as a filter of samples: ``shaper.to_fir(0.001).apply(samples)``.
+        
+        Args:
+            period_s: Period of the samples in s, above 0.
+        
+        Returns:
+            The filter; its delays are the times of the impulses in periods.
+        
+        Raises:
+            ArgumentError: The period is not above 0, or the shaper is too long.
+            DesignError: A time is not a multiple of the period, as those of `zv_on_grid` are: times are never rounded.
+        """
+    @property
+    def abs_sum(self) -> float:
+        """
+        Sum of the amplitudes' magnitudes (no unit): 1 for a non-negative shaper.
+        """
+    @property
+    def amplitudes(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Amplitudes of the impulses (no unit), shape (n,), read-only view.
+        """
+    @property
+    def duration_s(self) -> float:
+        """
+        Time of the last impulse in s, by which the shaped command is longer.
+        """
+    @property
+    def has_negative(self) -> bool:
+        """
+        True if any amplitude is below zero.
+        """
+    @property
+    def mean_s(self) -> float:
+        """
+        First moment in s: the mean delay of the shaped command.
+        """
+    @property
+    def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Times of the impulses in s, shape (n,), read-only view.
+        """
+    @property
+    def variance_s2(self) -> float:
+        """
+        Second central moment in s^2; radius error of a circle: dR/R = variance*(v/R)^2/2.
+        """
+class ExtraInsensitive:
+    """
+    An extra-insensitive shaper, with the zeros and maxima of its residual.
+    """
+    @property
+    def humps_hz(self) -> list[float]:
+        """
+        Natural frequencies in Hz, ascending, at which the residual is the vibration limit.
+        """
+    @property
+    def shaper(self) -> Shaper:
+        """
+        The shaper, humps+2 non-negative impulses.
+        """
+    @property
+    def zeros_hz(self) -> list[float]:
+        """
+        Natural frequencies without residual in Hz, ascending, one more than humps.
+        """
+class WorstResidual:
+    """
+    The largest residual over a band of frequencies.
+    """
+    @property
+    def frequency_hz(self) -> float:
+        """
+        Natural frequency in Hz at which it was found.
+        """
+    @property
+    def residual_ratio(self) -> float:
+        """
+        Residual ratio at frequency_hz, no unit.
+        """
+    @property
+    def upper_bound(self) -> float:
+        """
+        No frequency of the band has a larger residual ratio; above residual_ratio by at most 1e-6 of it, or 1e-12.
+        """
+class FrequencyBand:
+    """
+    A band of frequencies.
+    """
+    @property
+    def highest_hz(self) -> float:
+        """
+        Upper end in Hz.
+        """
+    @property
+    def lowest_hz(self) -> float:
+        """
+        Lower end in Hz.
+        """
+class MinimalShapers:
+    """
+    The minimal shapers of some modes, and what is known about others.
+    """
+    @property
+    def boxes(self) -> int:
+        """
+        Boxes of times examined by the proof.
+        """
+    @property
+    def complete(self) -> bool:
+        """
+        True if every box of times was decided: there is no other shaper in the range.
+        """
+    @property
+    def complete_up_to_s(self) -> float:
+        """
+        Duration in s up to which there is no other shaper; 0: nothing is proven.
+        """
+    @property
+    def converged(self) -> int:
+        """
+        Starts that reached a shaper in the range.
+        """
+    @property
+    def found_once(self) -> int:
+        """
+        Shapers reached by one start only. Divided by `converged`, the number estimates the ratio of starts that would reach a shaper not yet listed (Good 1953).
+        """
+    @property
+    def max_abs_sum(self) -> float:
+        """
+        Range of the search: largest sum of magnitudes.
+        """
+    @property
+    def max_duration_s(self) -> float:
+        """
+        Range of the search: largest duration in s.
+        """
+    @property
+    def shapers(self) -> list[Shaper]:
+        """
+        The shapers, ascending in duration, then in the times.
+        """
+    @property
+    def starts(self) -> int:
+        """
+        Newton starts.
+        """
+    @property
+    def unresolved(self) -> int:
+        """
+        Boxes too small to halve further that could not be decided: solutions there are not isolated.
+        """
+class MinimalBranches:
+    """
+    The minimal shapers of two modes over the ratio of their frequencies, joined into curves.
+    """
+    @property
+    def amplitudes(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Amplitudes (no unit), shape (n_branches, n_ratios, 3), NaN as in `times_s`; read-only view.
+        """
+    @property
+    def ratios(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Frequency ratios (no unit), shape (n_ratios,), read-only view.
+        """
+    @property
+    def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Times of the impulses in s, shape (n_branches, n_ratios, 3), NaN where a curve has no shaper; read-only view.
+        
+        [..., 2] is the duration.
         """
 class SegmentKind:
     """
@@ -1782,7 +1796,7 @@ class MotionController:
         """
     def feed_override(self, ratio: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
-        Sets the feed override, a ratio of 0 to 2; a value outside is limited to this range. It acts on motion not yet planned: after 8 to 32 periods and the lead; 0 is a hold.
+        Sets the feed override, a ratio of 0 to 2; up to 2.54 it is limited to this range, more is refused. It acts on motion not yet planned: after 8 to 32 periods and the lead; 0 is a hold.
         """
     def flush(self) -> None:
         """

@@ -1,5 +1,7 @@
 """What a notebook user guesses: each line works without a look at the book, or says what to do."""
 
+import json
+import pickle
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -144,6 +146,15 @@ def test_a_simple_machine() -> None:
         ("sg.identify(TIME_S, TIME_S, quantity='mm')", "acceleration, velocity, displacement"),
         ("sg.identify(TIME_S)", "time_s, response"),
         ("sg.simulate(b'part.nc', 'vx500')", "file name is needed"),
+        ("sg.convert(TEXT, 'vx500', tolerance=10)", "'tolerance_curve' or 'contour_tolerance_um'"),
+        ("sg.Machine.load(file='vx500')", "it takes path_or_name"),
+        ("sg.convert('vx500', TEXT)", "not the text of a program"),
+        ("sg.Machine.list()", "use Machine.builtin_names"),
+        ("sg.Machine.load('vx500').axis", "did you mean 'axes'"),
+        ("sg.Program.read(TEXT).length", "sg.cycle_time"),
+        ("sg.zv(46).filter([0.0, 1.0])", "to_fir"),
+        ("sg.zv(46).to_fir(0.001)", "is not on the grid"),
+        ("sg.MotionController().feed_override(50)", "0.5 is 50 %"),
     ],
 )
 def test_errors_say_what_to_do(guess: str, said: str) -> None:
@@ -168,6 +179,30 @@ def test_what_one_function_gives_the_others_take() -> None:
     assert sg.repeated_zv(46, 2) == sg.repeated_zv(sg.Mode(46), 2)  # type: ignore[arg-type]
     assert sg.shortest_non_negative([46], 0.005) == sg.shortest_non_negative([sg.Mode(46)], 0.005)  # type: ignore[list-item]
     assert sg.simulate(sg.convert(TEXT, "vx500").text, "vx500").ok  # type: ignore[arg-type]
+
+
+def test_a_shaper_filters_samples() -> None:
+    """Against NumPy's convolution of a step; an axis of a machine by its name."""
+    shaper = sg.zv_on_grid(sg.Mode(46, 0.02), 0.001)
+    impulses = np.zeros(round(shaper.duration_s / 0.001) + 1)
+    impulses[np.rint(shaper.times_s / 0.001).astype(int)] = shaper.amplitudes
+    step = np.repeat([0.0, 1.0], 40)
+    shaped = shaper.to_fir(0.001).apply(step)
+    assert shaped[: step.size] == pytest.approx(np.convolve(step, impulses)[: step.size], abs=1e-15)
+    machine = sg.Machine.load("vx500")
+    assert machine.axes["y"] is machine.axes.y
+    with pytest.raises(KeyError):
+        machine.axes["a"]
+
+
+def test_a_result_is_kept_as_json(tmp_path: Path) -> None:
+    """As a file of `json.dump`, and as its content; functions can be pickled."""
+    result = sg.cycle_time(TEXT, "vx500")
+    (file := tmp_path / "time.json").write_text(json.dumps(result.to_json()))
+    assert str(sg.load_result(file)) == str(sg.load_result(result.to_json())) == str(result)
+    with pytest.raises(sg.ArgumentError, match=r"use to_json\(\)"):
+        sg.load_result(result.to_dict())
+    assert pickle.loads(pickle.dumps(sg.cycle_time)) is sg.cycle_time
 
 
 def test_names_of_the_version_before_are_read_with_a_warning() -> None:

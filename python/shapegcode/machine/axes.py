@@ -267,6 +267,13 @@ class Axes(TomlTable):
         """The three axes in the order X, Y, Z."""
         return (self.x, self.y, self.z)
 
+    def __getitem__(self, axis: str) -> Axis:
+        """The axis of a name, x, y or z."""
+        if axis not in ("x", "y", "z"):
+            raise KeyError(axis)
+        found: Axis = getattr(self, axis)
+        return found
+
 
 def check_axes(keep: str, rigid: str) -> None:
     """Refuse names that are not axes, and axes that are both kept and rigid."""

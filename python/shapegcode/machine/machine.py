@@ -285,6 +285,8 @@ class Machine(TomlTable):
             return machine
         if not isinstance(machine, str | Path):
             raise ArgumentError(f"machine: must be a Machine, a file or a built-in name, not {type(machine).__name__}")
+        if isinstance(machine, str) and "\n" in machine:
+            raise ArgumentError("machine: must be a Machine, a file or a built-in name, not the text of a program")
         return cls.load(machine)
 
     @classmethod

@@ -75,7 +75,7 @@ def _sign_classes() -> None:
     """The same for the methods of the core's classes, which also suggest a name for one that they do not have."""
 
     def missing(self: object, name: str) -> Any:
-        raise missing_attribute(self, name, name)
+        raise missing_attribute(self, name)
 
     for each in vars(_core).values():
         if isinstance(each, type) and not issubclass(each, BaseException):

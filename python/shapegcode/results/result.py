@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import numpy as np
 
 from shapegcode._core import ArgumentError
-from shapegcode.results.json import Provenance, plain
+from shapegcode.results.json import FORMAT, Provenance, plain, this_version
 from shapegcode.results.outcome import NotKeptError, Outcome
 from shapegcode.results.page.model import Figure, Light, Page, Script, Section, page_of, sections_of, short_html
 
@@ -119,6 +119,11 @@ class Result(Outcome):
     def _completed(self, scene: Scene) -> Scene:
         """Add data of the result to the motion for a page; here none, overridden by results that have such data."""
         return scene
+
+    def to_json(self) -> dict[str, Any]:
+        """`to_dict` with class and version, so that a file of it is read by `load_result`; `json.dump` can write it."""
+        provenance = Provenance(type(self).__name__, this_version(), FORMAT, "", ())
+        return {**super().to_json(), "provenance": plain(provenance)}
 
     def report(self, path: str | Path, script: Script = "inline") -> list[str]:
         """Write the page of the result: one HTML file, readable offline.

@@ -71,11 +71,11 @@ def _no_number(path: str | Path, word: str) -> typing.NoReturn:
     raise ArgumentError(f"{path}: {word} is not a number in JSON: not a file of --json")
 
 
-def load_result(path: str | Path) -> Result:
-    """Read back a result that a command wrote with ``--json``.
+def load_result(path: str | Path | Mapping[str, Any]) -> Result:
+    """Read back a result that a command wrote with ``--json``, or that `json.dump` wrote from its `to_json()`.
 
     Args:
-        path: path of the file.
+        path: path of the file, or its content, such as `to_json()` gives it.
 
     Returns:
         The result, with all data of its JSON.
@@ -84,6 +84,8 @@ def load_result(path: str | Path) -> Result:
         ArgumentError: truncated, not a JSON of a result, several results, or from an incompatible version.
         OSError: the file cannot be read.
     """
+    if isinstance(path, Mapping):
+        return revived(path)
     reports = written_reports(path)
     if len(reports) > 1:
         raise ArgumentError(f"{path}: contains {len(reports)} results (--program all), and one is needed")
@@ -101,7 +103,7 @@ def provenance_in(report: Mapping[str, Any]) -> Provenance:
     if "provenance" not in report:
         raise ArgumentError(
             "key provenance is missing: the JSON was written by an older version or by to_dict(); run the command "
-            "again with --json"
+            "again with --json, or use to_json()"
         )
     provenance: Provenance = _value(Provenance, report["provenance"], "provenance")
     if provenance.format != FORMAT:

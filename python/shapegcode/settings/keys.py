@@ -19,10 +19,12 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
 from pydantic.fields import FieldInfo
+
+from shapegcode.errors import missing_attribute
 
 Origin = Literal["measured", "dump", "inherited", "assumed", "choice", "file", "default"]
 """Origin of a value: measured on this machine; read from the control's dump; inherited from another machine; assumed; a
@@ -209,7 +211,22 @@ def key(meaning: str, *, unit: str = "", fanuc: str = "", assumed: Any = _KNOWN,
     return Field(description=meaning, json_schema_extra=noted, **field)
 
 
-class TomlTable(BaseModel):
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
+
+
+class _Table(ModelMetaclass):
+    def __getattr__(cls, name: str) -> Any:
+        """Refuse an attribute that the class does not have, with a hint."""
+        try:
+            return super().__getattr__(name)  # type: ignore[misc]
+        except AttributeError:
+            raise missing_attribute(cls, name) from None
+
+
+class TomlTable(BaseModel, metaclass=_Table):
     """Base of every table of the file: unknown keys are errors and values never change after loading."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
@@ -221,6 +238,13 @@ class TomlTable(BaseModel):
             noted = field.json_schema_extra
             if isinstance(noted, dict) and noted.get("unit") == "":
                 noted["unit"] = _UNITS[max((end for end in _UNITS if name.endswith(end)), key=len, default="")]
+
+    def __getattr__(self, name: str) -> Any:
+        """Refuse an attribute that the table does not have, with a hint."""
+        try:
+            return super().__getattr__(name)  # type: ignore[misc]
+        except AttributeError:
+            raise missing_attribute(self, name) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse to set a key, and name the alternative."""
