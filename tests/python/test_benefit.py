@@ -134,7 +134,16 @@ def test_no_benefit_asks_for_the_unit_first() -> None:
 
 
 @pytest.mark.parametrize(
-    ("prologue", "off"), [(["G05.1 Q0"], True), (["G08P0"], True), (["G05.1Q1"], False), (["G64"], False), ([], False)]
+    ("prologue", "off"),
+    [
+        (["G05.1 Q0"], True),
+        (["G08P0"], True),
+        (["G05P0"], True),
+        (["G05.1Q1"], False),
+        (["G5P10000"], False),
+        (["G64"], False),
+        ([], False),
+    ],
 )
 def test_no_advice_to_do_what_the_prologue_does(prologue: list[str], off: bool) -> None:
     machine = machine_with({"emission.prologue": prologue, "controller.corner_speed_difference_mm_per_min": 1.0})

@@ -47,7 +47,7 @@ What can be guessed; a wrong name, argument or attribute is answered with the on
 | `sg.zv(found.modes[0])`, `sg.Machine.simple({"x": found.modes})` | identified modes serve wherever modes are taken |
 | `sg.simulate(conversion.text, "vx500")` | the emitted text, which is bytes, is a program too |
 | `sg.zv_on_grid(mode, 0.001).to_fir(0.001).apply(samples)` | samples of 1 ms, shaped |
-| `json.dump(result.to_json(), file)`, `sg.load_result("part.json")` | a result kept for later; also written by `--json` |
+| `json.dump(result.to_json(), file)`, `sg.load_result("part.json")` | a result kept for later; `--json` writes it too |
 | `sg.MotionController(shaper=sg.Mode(46, 0.02), ...)` | a controller with the ZV shaper of a mode, on its own grid |
 
 | name | home | what it is |

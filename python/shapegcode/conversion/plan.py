@@ -396,7 +396,7 @@ def curve_table(curve: ToleranceCurve) -> Table:
         Column("increase %", value="time_increase_percent", digits=1),
         Column("", value="remarks", text=True),
     )
-    caption = f"cuts shaped or tried: {curve.cuts}"
+    caption = f"cuts in this table: {curve.cuts}"
     return Table("tolerance against time", columns, curve.points, caption)
 
 

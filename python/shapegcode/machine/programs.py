@@ -136,7 +136,7 @@ class Input(TomlTable):
 
 _BLOCK_CHARACTERS = re.compile(r"[A-Z0-9 .,+\-*/=#\[\]()<>_:;&]*")
 _FANUC_LOCK = (("#33=#3004", "#3004=[#33OR2]"), ("G53", "#3004=#33"))
-_LOOK_AHEAD = re.compile(r"G(?:0?5\.1 *Q|0?8 *P)(\d)(?!\d)")
+_LOOK_AHEAD = re.compile(r"G(?:0?5\.1 *Q|0?[58] *P)(\d+)")
 
 
 class Emission(TomlTable):
@@ -310,7 +310,7 @@ class Emission(TomlTable):
 
     @property
     def leaves_look_ahead(self) -> bool:
-        """True if the prologue leaves a look-ahead mode off: the last of its look-ahead words is G05.1 Q0 or G08 P0."""
+        """True if the last word for a look-ahead mode in the prologue is G05.1 Q0, G05 P0 or G08 P0."""
         last = [found for line in self.prologue for found in _LOOK_AHEAD.findall(line)]
         return bool(last) and last[-1] == "0"
 
@@ -438,7 +438,7 @@ class Verdict(TomlTable):
         default="modal",
     )
     override_percent: tuple[_Override, _Override] = key(
-        "lowest and highest feed override of the program: every override in between must be within tolerance. The "
+        "lowest and highest feed override of the program: those tested in between must be within tolerance. The "
         "header of a program asks for 100 %: by default only 100 % counts",
         default=(100.0, 100.0),
     )

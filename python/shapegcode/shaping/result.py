@@ -365,7 +365,7 @@ class Recommendation(Result):
         return Table("no design", columns, list(times.items()))
 
     def plots(self) -> Mapping[str, Plot]:
-        """Pareto front, sensitivity, impulses, steps, and for two modes the branches of minimal shapers."""
+        """Pareto front, sensitivity, impulses, steps, and for two modes the shapers of three impulses."""
         return self._drawn_beside()
 
 

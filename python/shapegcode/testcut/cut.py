@@ -258,7 +258,7 @@ class Edge:
 def unrolled_edge(
     s_mm: FloatArray, radial_depth_mm: FloatArray, radius_mm: float, stock_mm: float, at_mm: float
 ) -> Edge:
-    """Edge on which a straight pass has the radial depth of another path at each distance."""
+    """Edge that gives a straight pass, at each distance, another path's radial depth."""
     depth = radial_depth_mm
     if depth.max() >= radius_mm:
         raise ArgumentError(
