@@ -65,7 +65,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _with_hints(value: Any, of_core: bool) -> Any:
-    """A function or class that says which argument was probably meant by one that it does not have."""
+    """A function or class whose error on an unknown argument says which was probably meant."""
     if of_core:
         from shapegcode.model.signatures import with_signature
 

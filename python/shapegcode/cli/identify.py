@@ -137,7 +137,7 @@ IDENTIFY = arguments.Interface(
         *options.MACHINE_OR_NONE,
         ("--modes", "N", arguments.count, "number of modes (default: by information criterion)"),
         ("--max-modes --most-modes", "N", {"dest": "max_modes", "type": arguments.count},
-         "largest number of modes (default: frequency fit 40, time fit 8, sweep without force 4)"),
+         "largest number of modes (default: frequency fit 40, time fit 8); Klipper's sweep: 4"),
         ("--force", None, bool, "write modes with --update even if the verdict is 'do not use'"),
         ("--frequencies", "LOW:HIGH", arguments.frequency_band, "find modes only between these frequencies, Hz"),
         ("--decay --ignore-force", None, {"dest": "ignore_force", "action": "store_true"},

@@ -103,9 +103,9 @@ def update_modes(
 ) -> MachineUpdate:
     """Replace the modes of one axis in the text of a machine file by identified ones; idempotent.
 
-    A mode within 10 % of one in the file overwrites its values there. Unmeasured ones stay, except a mass, and so does
-    a frequency uncertainty that is larger than the new one and was not measured. A mode of the file within 10 % of a
-    refused one stays unchanged. The axis' remaining tables are deleted; identified modes
+    A mode within 10 % of one in the file overwrites its values there. Values that the new mode lacks stay, except a
+    mass; so does a frequency uncertainty that is larger than the new one and was not measured. A mode of the file
+    within 10 % of a refused one stays unchanged. The axis' remaining tables are deleted; identified modes
     without a table get new ones.
     """
     if axis not in ("x", "y", "z"):

@@ -242,7 +242,7 @@ class Axis(TomlTable):
     )
     rigid: Bool = key(
         "whether this axis is known, from a test or by your decision, to have no significant vibration mode. false "
-        "without modes: not known; the axis is then simulated as rigid, and every verdict reports it",
+        "without modes: not known; it is simulated as rigid, and reported if a shaped cut moves it",
         default=False,
     )
     drive: Drive | None = optional(

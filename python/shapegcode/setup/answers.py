@@ -171,7 +171,7 @@ def _of_modes(modes: ModesAnswer) -> str:
     if not unknown:
         return "The shaper is designed for these modes; rigid axes are ignored."
     are = "is tapped it is" if len(unknown) == 1 else "are tapped they are"
-    return f"Until {', '.join(unknown)} {are} simulated as rigid, and every verdict says so."
+    return f"Until {', '.join(unknown)} {are} simulated as rigid, and reported if shaped cuts move them."
 
 
 EXPLAINED: Mapping[str, Callable[[Any], str]] = {

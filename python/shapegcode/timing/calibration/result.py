@@ -159,7 +159,7 @@ class CycleTimeCalibration(Result):
         remarks: source of each key that was set in the machine file, with its interval if known, by dotted name.
         undetermined: parameters that the logs do not determine, in words.
         warnings: runs with errors above 2 %, and holds.
-        largest_error_percent: of a run, by cross-validation if possible, without holds; null: no complete run.
+        largest_error_percent: of a run less its holds, by cross-validation if possible; null: no complete run.
     """
 
     machine: str
