@@ -24,15 +24,6 @@ _RENAMED = {
 }
 
 
-# Names that a user of other packages may look for.
-_MEANT = {
-    "design_shaper": "choose_shaper", "shaper": "choose_shaper", "ei": "choose_shaper", "si": "choose_shaper",
-    "zvd": "repeated_zv", "read": "Program.read", "parse": "Program.read",
-    "machines": "Machine.builtin_names", "list_machines": "Machine.builtin_names", "optimize_feed": "schedule_feed",
-    "plot": "Result.plot",
-}  # fmt: skip
-
-
 @functools.cache
 def _home() -> dict[str, str]:
     """Module of each public name, from the stub."""
@@ -56,7 +47,9 @@ def __getattr__(name: str) -> Any:
         return __getattr__(new)
     # Python itself asks for names such as __path__ and _core, before a public one is used.
     if (name != "__version__" and name.startswith("_")) or name not in _home():
-        raise AttributeError(f"module 'shapegcode' has no attribute {name!r}{_near(name)}")
+        from shapegcode.hints import hint
+
+        raise AttributeError(f"module 'shapegcode' has no attribute {name!r}{hint(name, _home(), __name__)}")
     value = getattr(importlib.import_module(_home()[name]), name)
     if callable(value):
         value = _with_hints(value, _home()[name] == "shapegcode._core")
@@ -65,32 +58,19 @@ def __getattr__(name: str) -> Any:
 
 
 def _with_hints(value: Any, of_core: bool) -> Any:
-    """A function or class whose error on an unknown argument says which was probably meant."""
+    """A function or class whose error on a wrong argument says which was probably meant."""
     if of_core:
         from shapegcode.model.signatures import with_signature
 
         return with_signature(value)
-    from shapegcode.errors import with_keyword_hint
+    from shapegcode.hints import with_hints, with_hints_in
 
     if isinstance(value, type):
-        for name, member in [*vars(value).items()]:
-            if isinstance(member, classmethod) and not name.startswith("_"):
-                setattr(value, name, classmethod(with_keyword_hint(member.__func__)))
+        with_hints_in(value)
         return value
-    value = with_keyword_hint(value)
+    value = with_hints(value)
     value.__module__ = __name__  # for pickle
     return value
-
-
-def _near(name: str) -> str:
-    """Hint with the most similar public name."""
-    if name in _MEANT:
-        return f"; did you mean {_MEANT[name]!r}?"
-    if name.startswith("_"):
-        return ""
-    from shapegcode.errors import hint
-
-    return hint(name, _home())
 
 
 def __dir__() -> list[str]:

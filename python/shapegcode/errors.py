@@ -7,11 +7,7 @@ files: :class:`FileError` and its subclasses, such as :class:`MachineError`. Fro
 
 from __future__ import annotations
 
-import functools
-import re
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, TypeVar
 
 from shapegcode._core import ArgumentError, DesignError, NumericError, ProgramError, ShapegcodeError
 
@@ -19,68 +15,6 @@ __all__ = [
     "ArgumentError", "DesignError", "FileError", "MachineError", "NumericError", "Problem", "ProgramError",
     "RecordError", "RoundTripError", "RunsFileError", "ShapegcodeError", "StockError", "ToolError",
 ]  # fmt: skip
-
-
-def hint(name: str, known: Iterable[str]) -> str:
-    """``; did you mean 'known'?`` with the names, at most two, closest to an unknown one; empty if none is."""
-    if name.startswith("_"):
-        return ""
-    import difflib
-
-    names = sorted(each for each in known if not each.startswith("_"))
-    words = set(name.lower().split("_"))
-    with_all = sorted((each for each in names if words <= {*each.split("_")}), key=len)
-    close = difflib.get_close_matches(name, names, n=1) or difflib.get_close_matches(name.lower(), names, n=1)
-    alike = sorted(names, key=lambda each: -len(words.intersection(each.split("_"))))[:1]
-    near = with_all[:2] or close or [each for each in alike if words & {*each.split("_")}]
-    return f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
-
-
-F = TypeVar("F", bound=Callable[..., Any])
-
-# What gives the thing that a user of other packages looks for: by class, then by attribute.
-_INSTEAD = {
-    "Machine": {"save": "Path(file).write_text(machine.to_toml())", "list": "Machine.builtin_names()"},
-    "Program": {
-        "length": "sg.cycle_time(program, machine)",
-        "plot": "sg.plot_path(sg.simulate_motion(program, machine))",
-    },
-    "Shaper": {"apply": "shaper.to_fir(period_s).apply(samples)", "plot": "sg.plot_sensitivity(shaper)"},
-}  # fmt: skip
-_SAME = {"filter": "apply", "convolve": "apply", "write": "save", "names": "list", "duration": "length"}
-
-
-def missing_attribute(owner: object, name: str, meant: str = "") -> AttributeError:
-    """An AttributeError whose hint is the attribute of `owner`, an object or a class, closest to `meant`."""
-    kind = owner if isinstance(owner, type) else type(owner)
-    instead = _INSTEAD.get(kind.__name__, {})
-    if found := instead.get(name) or instead.get(_SAME.get(name, "")):
-        near = f"; use {found}"
-    else:  # Python and NumPy ask for many names with an underscore.
-        near = "" if name.startswith("_") else hint(meant or name, dir(owner))
-    what = f"type object {kind.__name__!r}" if owner is kind else f"{kind.__name__!r} object"
-    return AttributeError(f"{what} has no attribute {name!r}{near}")
-
-
-def with_keyword_hint(function: F) -> F:
-    """The function, which names the keyword that was probably meant by one that it does not have."""
-
-    @functools.wraps(function)
-    def called(*args: Any, **kwargs: Any) -> Any:
-        try:
-            return function(*args, **kwargs)
-        except TypeError as error:
-            wrong = re.search(r"unexpected keyword argument '(\w+)'$", str(error))
-            # A deeper traceback: an error inside of the function.
-            if wrong is None or error.__traceback__ is None or error.__traceback__.tb_next is not None:
-                raise
-            import inspect
-
-            names = [name for name in inspect.signature(function).parameters if name != "cls"]
-            near = f"{hint(wrong[1], names)}; it takes {', '.join(names)}"
-            raise TypeError(f"{function.__qualname__}() has no argument {wrong[1]!r}{near}") from None
-
-    return called  # type: ignore[return-value]
 
 
 def located_error(source: str, line: int, column: int, message: str, alarm: int = 0) -> ProgramError:

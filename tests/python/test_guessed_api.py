@@ -1,7 +1,12 @@
 """What a notebook user guesses: each line works without a look at the book, or says what to do."""
 
+import dataclasses
+import functools
+import inspect
 import json
 import pickle
+import re
+import tomllib
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -146,7 +151,12 @@ def test_a_simple_machine() -> None:
         ("sg.identify(TIME_S, TIME_S, quantity='mm')", "acceleration, velocity, displacement"),
         ("sg.identify(TIME_S)", "time_s, response"),
         ("sg.simulate(b'part.nc', 'vx500')", "file name is needed"),
-        ("sg.convert(TEXT, 'vx500', tolerance=10)", "'tolerance_curve' or 'contour_tolerance_um'"),
+        ("sg.convert(TEXT, 'vx500', tolerance=10)", "use contour_tolerance_um"),
+        ("sg.convert(TEXT, 'vx500').plots(show=False)", "use plot"),
+        ("sg.convert(TEXT)", "it takes program, machine"),
+        ("sg.Shaper('ei', 46, 0.02)", "choose_shaper"),
+        ("sg.ZVD(46)", "use repeated_zv"),
+        ("sg.Machine.load('vx500').modes", "use machine.axes.x.modes"),
         ("sg.Machine.load(file='vx500')", "it takes path_or_name"),
         ("sg.convert('vx500', TEXT)", "not the text of a program"),
         ("sg.Machine.list()", "use Machine.builtin_names"),
@@ -161,6 +171,22 @@ def test_errors_say_what_to_do(guess: str, said: str) -> None:
     with pytest.raises((AttributeError, TypeError, sg.ShapegcodeError), match=said) as caught:
         eval(guess)
     assert "\n" not in str(caught.value)
+
+
+def test_what_is_suggested_is_there() -> None:
+    """Each table of hints.toml is of something public; none of its names exists, all that is suggested does."""
+    tables = tomllib.loads((Path(sg.__file__).parent / "hints.toml").read_text(encoding="utf-8"))
+    modes = {"AxisMode": type(sg.Machine.load("vx500").axes.x.modes[0])}
+    for owner, table in tables.items():
+        at = sg if owner == "shapegcode" else modes.get(owner) or functools.reduce(getattr, owner.split("."), sg)
+        keywords = [] if owner == "shapegcode" or isinstance(at, type) else list(inspect.signature(at).parameters)
+        fields = {field.name for field in dataclasses.fields(at)} if dataclasses.is_dataclass(at) else set()
+        for name in " ".join(table).split():
+            assert name not in (keywords or {*dir(at)} | fields), (owner, name)
+        for use in table.values():
+            assert set(re.findall(r"sg\.(\w+)", use)) <= set(dir(sg)), use
+            if keywords and use.isidentifier():
+                assert use in keywords
 
 
 def test_a_value_is_set_by_with_values() -> None:

@@ -152,7 +152,7 @@ def test_headers_are_included_by_their_whole_path() -> None:
 
 
 # What stands at the root of the package; its folders and who may import whom are import-linter's (pyproject.toml).
-ROOT_MODULES = {"__init__", "__main__", "errors", "_core"}
+ROOT_MODULES = {"__init__", "__main__", "errors", "hints", "_core"}
 
 
 def test_the_root_of_the_package_stays_small() -> None:

@@ -9,7 +9,7 @@ import re
 from typing import Any, TypeVar
 
 from shapegcode import _core
-from shapegcode.errors import hint, missing_attribute
+from shapegcode.hints import guess, missing_attribute, wrong_argument
 
 T = TypeVar("T")
 
@@ -103,9 +103,10 @@ def _refusal(error: TypeError, name: str, found: inspect.Signature, args: Any, k
     """pybind11's list of signatures and arguments in one line."""
     if "incompatible" not in str(error) or not found.parameters:
         return error
-    taken = f"it takes {str(found).replace(chr(39), '')}"
+    signature = str(found).replace("'", "")
     if unknown := [key for key in kwargs if key not in found.parameters]:
-        return TypeError(f"{name}() has no argument {unknown[0]!r}{hint(unknown[0], found.parameters)}; {taken}")
+        return wrong_argument(name, unknown[0], found.parameters, signature)
+    taken = f"it takes {signature}{guess('()', name)}"
     try:
         given = found.bind(*args, **kwargs).arguments
     except TypeError as wrong:

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
-from shapegcode.errors import ProgramError, located_error, missing_attribute
+from shapegcode.errors import ProgramError, located_error
+from shapegcode.hints import missing_attribute
 from shapegcode.io.units import MM_PER_INCH
 from shapegcode.machine import Machine
 from shapegcode.program.computer import require_memory_for_lines

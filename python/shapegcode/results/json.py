@@ -23,7 +23,7 @@ from typing import Any, Self, cast
 
 import numpy as np
 
-from shapegcode.errors import missing_attribute
+from shapegcode.hints import missing_attribute
 from shapegcode.io.data_file import open_file
 
 FORMAT = 1  # format of the JSON of results: increased when older files can no longer be read
@@ -126,9 +126,6 @@ def renamed_of(cls: type) -> Mapping[str, str]:
     return {old: new for base in cls.__mro__ for old, new in RENAMED.get(base.__name__, {}).items()}
 
 
-_MEANT = {"save": "text", "write": "text", "to_html": "report"}
-
-
 class OldNames:
     """Base of classes with renamed fields: the former name gives the value, with a warning."""
 
@@ -138,9 +135,7 @@ class OldNames:
             """Value of a renamed field."""
             new = renamed_of(type(self)).get(name)
             if new is None:
-                meant = _MEANT.get(name, name)
-                is_there = meant in vars(self) or hasattr(type(self), meant)
-                raise missing_attribute(self, name, meant if is_there else name)
+                raise missing_attribute(self, name)
             what = type(self).__name__
             warnings.warn(f"{what}.{name} is {what}.{new} now", FutureWarning, stacklevel=2)
             return getattr(self, new)

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
 from pydantic.fields import FieldInfo
 
-from shapegcode.errors import missing_attribute
+from shapegcode.hints import missing_attribute
 
 Origin = Literal["measured", "dump", "inherited", "assumed", "choice", "file", "default"]
 """Origin of a value: measured on this machine; read from the control's dump; inherited from another machine; assumed; a
