@@ -70,7 +70,7 @@ def with_hints(function: F) -> F:
             # A deeper traceback: an error inside of the function.
             if wrong is None or error.__traceback__ is None or error.__traceback__.tb_next is not None:
                 raise
-            name = function.__qualname__
+            name = function.__qualname__.removesuffix(".__init__")
             names = [each for each in inspect.signature(function).parameters if each not in ("cls", "self")]
             taken = ", ".join(names)
             if wrong[1]:
@@ -89,6 +89,8 @@ def with_hints_in(kind: type) -> None:
             return
         if not each.__module__.startswith("shapegcode.") or each.__module__ == "shapegcode._core":
             continue
+        if guess(_ALL, each.__name__) and inspect.isfunction(first := vars(each).get("__init__")):
+            setattr(each, "__init__", with_hints(first))  # noqa: B010
         for name, member in [*vars(each).items()]:
             if isinstance(member, classmethod) and not name.startswith("_"):
                 setattr(each, name, classmethod(with_hints(member.__func__)))

@@ -16,6 +16,7 @@ import pytest
 import shapegcode as sg
 
 TEXT = "%\nO1\nG21 G90 G17 G94\nG00 X0. Y0. Z0.\nG01 X10. F500.\nY10.\nM30\n%\n"
+AXIS_X = sg.ReadOptions(axis="x")
 TIME_S = np.arange(0.0, 1.0, 1e-3)
 
 
@@ -156,6 +157,18 @@ def test_a_simple_machine() -> None:
         ("sg.convert(TEXT)", "it takes program, machine"),
         ("sg.Shaper('ei', 46, 0.02)", "choose_shaper"),
         ("sg.ZVD(46)", "use repeated_zv"),
+        ("sg.Program('part.nc')", "use sg.Program.read"),
+        ("sg.Tool(diameter=10)", "Tool: .*; use sg.Tool.load"),
+        ("sg.Machine.load('vx500').update", "use sg.update_machine"),
+        ("sg.convert(TEXT, 'vx500', only=(10, 20))", "only: pairs of lines"),
+        ("sg.convert(TEXT, 'vx500', shape_all='no')", "shape_all = 'no': must be True or False"),
+        ("sg.identify(TIME_S, TIME_S + 1j)", "complex; of a frequency response"),
+        ("sg.identify(TIME_S, TIME_S, axis='x')", "use options=sg.ReadOptions"),
+        ("sg.batch('a.nc', sg.Machine.load('vx500'), 'out')", "files or built-in names"),
+        (
+            "sg.update_machine(sg.Machine.load('vx500'), sg.identify(TIME_S, decay(46, 0.02), options=AXIS_X))",
+            "not Machine",
+        ),
         ("sg.Machine.load('vx500').modes", "use machine.axes.x.modes"),
         ("sg.Machine.load(file='vx500')", "it takes path_or_name"),
         ("sg.convert('vx500', TEXT)", "not the text of a program"),
@@ -204,7 +217,11 @@ def test_what_one_function_gives_the_others_take() -> None:
     assert sg.Machine.simple({"x": found}).axes.x.modes == sg.Machine.simple({"x": mode}).axes.x.modes  # type: ignore[dict-item]
     assert sg.repeated_zv(46, 2) == sg.repeated_zv(sg.Mode(46), 2)  # type: ignore[arg-type]
     assert sg.shortest_non_negative([46], 0.005) == sg.shortest_non_negative([sg.Mode(46)], 0.005)  # type: ignore[list-item]
-    assert sg.simulate(sg.convert(TEXT, "vx500").text, "vx500").ok  # type: ignore[arg-type]
+    conversion = sg.convert(TEXT, "vx500")
+    assert sg.simulate(conversion.text, "vx500").ok  # type: ignore[arg-type]
+    assert sg.compare(TEXT, conversion, "vx500", allow="blocks,feeds,path=30um").ok  # type: ignore[arg-type]
+    compared = sg.choose_shaper(sg.Machine.load("vx500"), families=["zv", "zvd"], periods_s=0.005)  # type: ignore[arg-type]
+    assert compared.designs == sg.choose_shaper(machine="vx500", families=["zv", "zvd"], periods_s=0.005).designs
 
 
 def test_a_shaper_filters_samples() -> None:

@@ -308,8 +308,8 @@ class Runs:
 
 
 def batch(
-    programs: Sequence[str | Path],
-    machines: Sequence[str | Path],
+    programs: str | Path | Sequence[str | Path],
+    machines: str | Path | Sequence[str | Path],
     output: str | Path,
     *,
     command: str = "convert",
@@ -355,6 +355,9 @@ def batch(
     if jobs < 0 or not time_limit_s >= 0.0 or memory_limit_bytes < 0:
         raise ArgumentError(f"jobs {jobs}, time limit {time_limit_s}, memory limit {memory_limit_bytes}: not below 0")
     begin = time.monotonic()
+    programs, machines = ([each] if isinstance(each, str | Path) else each for each in (programs, machines))
+    if any(not isinstance(each, str | Path) for each in (*programs, *machines)):
+        raise ArgumentError("programs, machines: files or built-in names are needed, since each run reads them anew")
     folders = [Path(output), *([Path(html)] if html is not None else [])]
     processes = jobs or cores()
     with contextlib.ExitStack() as stack:

@@ -100,6 +100,9 @@ def convert(
         "price.program_time_percent": max_time_increase_percent,
         "price.cut_time_percent": max_cut_time_increase_percent,
     }
+    for name, value in (("shape_all", shape_all), ("tolerance_curve", tolerance_curve)):
+        if not isinstance(value, bool):
+            raise _core.ArgumentError(f"{name} = {value!r}: must be True or False")
     program, machine = read(program, machine, stated)
     if is_foreign := machine.emission.dialect != "fanuc":
         # A large module that FANUC programs do not need.

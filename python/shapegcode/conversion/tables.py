@@ -432,6 +432,8 @@ def chosen_cuts(program: Program, only: Sequence[Lines] | None, leave: Sequence[
     last = program.core.line_count
     spans = [(region.first_line, region.last_line) for region in program.regions]
     for option, ranges in (("--only", only or ()), ("--leave", leave)):
+        if any(not isinstance(each, tuple | list) or len(each) != 2 for each in ranges):
+            raise _core.ArgumentError(f"{option[2:]}: pairs of lines are needed, such as [(10, 20), (35, 40)]")
         for begin, end in ranges:
             if not 1 <= begin <= end <= last:
                 raise _core.ArgumentError(f"{option} {begin}-{end}: {program.source} has lines 1 to {last}")

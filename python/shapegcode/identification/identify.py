@@ -38,7 +38,7 @@ _FIRST_STOPS, _STOP_LEFT = 4, 0.1  # least number of stops fitted first; largest
 
 
 def identify(
-    source: str | Path | Sequence[str | Path] | Sequence[Record] | Sequence[FrequencyResponse] | ArrayLike,
+    source: str | Path | Record | FrequencyResponse | Sequence[str | Path | Record | FrequencyResponse] | ArrayLike,
     response: ArrayLike | ReadOptions | None = None,
     force: ArrayLike | None = None,
     *,
@@ -58,7 +58,7 @@ def identify(
     """Identify modes from taps of one point (with force), free decays (without force), sweeps or frequency responses.
 
     Args:
-        source: a file (CSV, UFF, WAV, MATLAB), several files, records or frequency responses. All are
+        source: a file (CSV, UFF, WAV, MATLAB), a record, a frequency response, or several of one kind. All are
             of one axis and one point; only frequency responses may be of several points. With `response`: the instants
             of its samples in s, shape (n,), evenly spaced.
         response: what a sensor measured at these instants, shape (n,), in the unit of `quantity`. A `ReadOptions`
@@ -106,7 +106,10 @@ def identify(
         source = [replace(_record_of(source, response, force, quantity), axis=axis)]
     elif force is not None:
         raise ArgumentError("force is given without a response: identify(time_s, response, force)")
-    sources: Sequence[Any] = [source] if isinstance(source, str | Path) else source  # type: ignore[assignment]
+    is_one = isinstance(source, str | Path | Record | FrequencyResponse)
+    sources: Sequence[Any] = [source] if is_one else source  # type: ignore[assignment]
+    if hasattr(source, "columns"):
+        raise ArgumentError("a table: identify(table[...].to_numpy(), ...) with its columns as arrays")
     if any(isinstance(each, float | int | np.ndarray | np.generic) for each in sources):
         raise ArgumentError("arrays: identify(time_s, response) or identify(time_s, response, force), each of (n,)")
     names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
@@ -249,6 +252,8 @@ def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: m
 
 
 def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quantity: Quantity) -> Record:
+    if np.iscomplexobj(response):
+        raise RecordError("arrays: complex; of a frequency response: identify(sg.FrequencyResponse(...))")
     times = np.asarray(time_s, dtype=np.float64)
     samples = np.asarray(response, dtype=np.float64)
     if times.shape != samples.shape or times.ndim != 1 or len(times) < _MIN_SAMPLES:

@@ -38,6 +38,9 @@ class MachineUpdate:
     machine: Machine
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        return f"<MachineUpdate of {self.machine.name}, not yet written: {'; '.join(self.notes)}>"
+
     def noted_in(self, found: Identification, path: str | Path) -> Identification:
         """Set `machine_file` in the identification.
 
@@ -82,6 +85,8 @@ def update_machine(path: str | Path, found: Identification, *, keep_modes: str =
 
 def check_updatable(path: str | Path) -> Machine:
     """Read the machine before the calculation; refuse a built-in one, which `update_machine` could not change."""
+    if not isinstance(path, str | Path):
+        raise ArgumentError(f"the file of a machine is needed, not {type(path).__name__}")
     if isinstance(path, str) and path in Machine.builtin_names():
         raise ArgumentError(
             f"{path} is a built-in machine, which stays as it is: shapegcode machine init {path} -o mine.toml makes a "

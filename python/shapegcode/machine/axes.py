@@ -269,10 +269,7 @@ class Axes(TomlTable):
 
     def __getitem__(self, axis: str) -> Axis:
         """The axis of a name, x, y or z."""
-        if axis not in ("x", "y", "z"):
-            raise KeyError(axis)
-        found: Axis = getattr(self, axis)
-        return found
+        return dict(zip("xyz", self.as_tuple(), strict=True))[axis.lower()]
 
 
 def check_axes(keep: str, rigid: str) -> None:

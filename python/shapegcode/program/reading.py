@@ -341,6 +341,7 @@ def program_bytes(path: str | Path, most: int) -> bytes:
 
 def given_text(program: str | bytes | Path, machine: Machine) -> tuple[bytes, str, Path | None]:
     """Text of a program (given, or from its file), its name in messages, and its folder."""
+    program = getattr(program, "text", program)  # of a conversion
     if is_program_text(program):
         return program if isinstance(program, bytes) else str(program).encode(), "<text>", None
     file = cast("str | Path", program)  # bytes are refused where it is opened

@@ -47,6 +47,9 @@ class Result(Outcome):
     published: ClassVar[tuple[str, ...]] = ()
     """Published methods on which every result of the class is based."""
 
+    main_list: ClassVar[str] = ""
+    """The list that `to_pandas` takes unless another one is named; empty: the first one."""
+
     @property
     def methods(self) -> tuple[str, ...]:
         """Published methods on which it is based, by their names in `METHODS`."""
@@ -169,7 +172,7 @@ class Result(Outcome):
         """One of its lists as a pandas table, one row per entry, units in the names; needs `shapegcode[study]`.
 
         Args:
-            what: name of a list attribute, such as "regions" or "cases"; empty: the first one.
+            what: name of a list attribute, such as "regions" or "cases"; empty: `main_list`.
 
         Returns:
             The table; columns of nested values have dots in their names.
@@ -182,7 +185,7 @@ class Result(Outcome):
 
         lists = {field.name: getattr(self, field.name) for field in _fields(self)}
         lists = {name: rows for name, rows in lists.items() if _is_list_of_rows(rows)}
-        name = _chosen(what, lists, "a list of rows")
+        name = _chosen(what or self.main_list, lists, "a list of rows")
         table = pd.json_normalize([plain(row) for row in lists[name]])
         table.attrs = {"of": name, "units": {str(column): unit for column in table if (unit := _unit(str(column)))}}
         return table

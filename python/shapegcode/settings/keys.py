@@ -21,10 +21,11 @@ from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict, ValidationError
 from pydantic.fields import FieldInfo
 
-from shapegcode.hints import missing_attribute
+from shapegcode._core import ArgumentError
+from shapegcode.hints import guess, missing_attribute
 
 Origin = Literal["measured", "dump", "inherited", "assumed", "choice", "file", "default"]
 """Origin of a value: measured on this machine; read from the control's dump; inherited from another machine; assumed; a
@@ -218,6 +219,18 @@ else:
 
 
 class _Table(ModelMetaclass):
+    def __call__(cls, *args: Any, **values: Any) -> Any:
+        """Make a table in Python; wrong values are refused in one line."""
+        try:
+            return super().__call__(*args, **values)
+        except ValidationError as error:
+            wrong = [f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in error.errors()]
+            raise ArgumentError(f"{cls.__name__}: {'; '.join(wrong)}{guess('()', cls.__name__)}") from None
+
+    def __dir__(cls) -> list[str]:
+        """Names of its own, without Pydantic's."""
+        return sorted({*super().__dir__()} - {*type.__dir__(BaseModel)})
+
     def __getattr__(cls, name: str) -> Any:
         """Refuse an attribute that the class does not have, with a hint."""
         try:
@@ -238,6 +251,10 @@ class TomlTable(BaseModel, metaclass=_Table):
             noted = field.json_schema_extra
             if isinstance(noted, dict) and noted.get("unit") == "":
                 noted["unit"] = _UNITS[max((end for end in _UNITS if name.endswith(end)), key=len, default="")]
+
+    def __dir__(self) -> list[str]:
+        """Names of its own, without Pydantic's."""
+        return sorted({*super().__dir__()} - {*type.__dir__(BaseModel)})
 
     def __getattr__(self, name: str) -> Any:
         """Refuse an attribute that the table does not have, with a hint."""

@@ -44,7 +44,7 @@ _NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of cyc
 
 
 def choose_shaper(
-    modes: float | str | Mode | ModeBand | Sequence[float | str | Mode | ModeBand] = (),
+    modes: float | str | Mode | ModeBand | Machine | Sequence[float | str | Mode | ModeBand] = (),
     *,
     machine: Machine | str | Path | None = None,
     uncertainty: float = 0.0,
@@ -65,7 +65,7 @@ def choose_shaper(
 
     Args:
         modes: frequencies in Hz of undamped modes, texts such as ``46:0.02±5%`` (Hz, damping ratio, band), modes or
-            bands, pairs (Hz, damping ratio) in a list, modes that `identify` found; empty: those of the machine.
+            bands, pairs (Hz, damping ratio) in a list, modes that `identify` found; empty, or a machine: its own.
         machine: source of the modes, unless given, and of the block periods to try.
         uncertainty: relative half width of the band of modes given without a band.
         periods_s: grids on which the impulses may lie, s; an item None stands for continuous times. No list: with a
@@ -89,6 +89,8 @@ def choose_shaper(
         ArgumentError: no modes, given or of a machine; two equal modes; or a value outside its range.
         DesignError: a mode cannot be cancelled on any of the grids, or no family has a design within the limits.
     """
+    if isinstance(modes, Machine):
+        machine, modes = modes, ()
     machine = None if machine is None else Machine.of(machine)
     # Convert arrays to lists of Python numbers.
     several: list[float | str | Mode | ModeBand] = np.atleast_1d(np.asarray(modes, dtype=object)).tolist()

@@ -175,6 +175,7 @@ class Recommendation(Result):
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "recommended_on_grid": int | None}
+    main_list: ClassVar[str] = "designs"
 
     modes: tuple[ModeBand, ...]
     designs: tuple[Design, ...]
