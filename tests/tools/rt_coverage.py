@@ -6,14 +6,31 @@ Lines of templates and headers count once, as run if they ran anywhere. Branches
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections import defaultdict
 from pathlib import Path
 
-from rt_page import rt_files
+ROOT = Path(__file__).resolve().parents[2]
 
 Counts = dict[str, dict[tuple[int, int], bool]]
+
+
+def cmake_list(name: str) -> list[str]:
+    """A list of CMakeLists.txt."""
+    text = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    found = re.search(rf"^set\({name}\s+([^)]*)\)", text, re.MULTILINE)
+    if found is None:
+        raise ValueError(f"CMakeLists.txt has no list {name}")
+    return found[1].split()
+
+
+def rt_files() -> dict[str, list[Path]]:
+    """All that shapegcode_rt is compiled of, by folder, as CMakeLists.txt has it."""
+    source, public = ROOT / "cpp" / "src", ROOT / "cpp" / "include" / "shapegcode"
+    files = {folder: sorted((source / folder).rglob("*.[ch]pp")) for folder in cmake_list("rt_folders")}
+    return files | {"public headers": [public / name for name in cmake_list("rt_headers")]}
 
 
 def counted(build: Path) -> tuple[Counts, Counts]:

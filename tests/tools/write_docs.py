@@ -10,7 +10,6 @@ from pathlib import Path
 import write_schemas
 from dialects_page import dialects_documentation
 from machine_page import machine_documentation
-from rt_page import rt_documentation
 from tool_files_page import file_documentation
 
 import shapegcode as sg
@@ -104,7 +103,6 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/tool_files.md": file_documentation,
     "reference/api.md": api_documentation,
     "reference/schemas.md": schema_documentation,
-    "reference/shapegcode_rt.md": rt_documentation,
 }
 """What writes each page, by its name."""
 
