@@ -24,7 +24,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from processes import ROOT, launched
+from places import GOLDEN
+from processes import launched
 from table import Sample
 
 from shapegcode.batching.plan import find_programs, plan
@@ -86,7 +87,7 @@ def make(folder: Path, count: int, sizes: tuple[int, ...]) -> None:
         (parts / f"p{rank:05d}.nc").write_text(polygon(draw, draw.choice(sizes)))
     if len(sizes) > 1:
         for rank, name in enumerate(SAMPLES):
-            shutil.copy(ROOT / "tests" / "golden" / "programs" / name, parts / f"p{rank:05d}.nc")
+            shutil.copy(GOLDEN / name, parts / f"p{rank:05d}.nc")
 
 
 def loop(folder: Path) -> float:

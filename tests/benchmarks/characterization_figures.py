@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import shutil
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
+import places  # noqa: F401
 
 import shapegcode as sg
 from judge.characterization import Deviation, controllers, fill_in_logs, fill_in_times, truth_of

@@ -18,6 +18,7 @@ from unittest import mock
 
 import closed_rival
 import numpy as np
+from places import GOLDEN, ROOT
 from table import markdown
 
 import shapegcode as sg
@@ -30,13 +31,11 @@ from shapegcode.shaping import design, machine_bands
 from shapegcode.shaping.grid import Grid, choose_grid, make_grid
 from shapegcode.verdict.figures import Placed
 
-_ROOT = Path(__file__).resolve().parents[2]
-_GOLDEN = _ROOT / "tests" / "golden" / "programs"
 PROGRAMS = {
-    "the path of paper 000, 200 mm/s": _ROOT / "python" / "shapegcode" / "data" / "paper_path.nc",
-    "PARALLEL.NC": _GOLDEN / "PARALLEL.NC",
-    "PROGRAM2.NC": _GOLDEN / "PROGRAM2.NC",
-    "TEST_G90.NC": _GOLDEN / "TEST_G90.NC",
+    "the path of paper 000, 200 mm/s": ROOT / "python" / "shapegcode" / "data" / "paper_path.nc",
+    "PARALLEL.NC": GOLDEN / "PARALLEL.NC",
+    "PROGRAM2.NC": GOLDEN / "PROGRAM2.NC",
+    "TEST_G90.NC": GOLDEN / "TEST_G90.NC",
 }
 WIDE_UM, TIGHT_UM = 1000.0, 10.0  # contour tolerances: none of the shapers is slowed by it, all are
 BANDS = (0.05, 0.10)

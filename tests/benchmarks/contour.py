@@ -12,16 +12,13 @@ import math
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import solveh_banded
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
-
+import places  # noqa: F401
 from contour_figures import arcs_and_corners
+from scipy.linalg import solveh_banded
 from table import Row, Sample, comparison_table, markdown
 
 import shapegcode as sg

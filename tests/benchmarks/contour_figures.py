@@ -8,15 +8,12 @@ from __future__ import annotations
 import argparse
 import functools
 import math
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
+import places  # noqa: F401
 
 import shapegcode as sg
 from acceptance import Judged, convert, machine_with

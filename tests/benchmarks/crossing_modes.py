@@ -6,10 +6,8 @@ Run from the root of the repository: ``python tests/benchmarks/crossing_modes.py
 from __future__ import annotations
 
 import argparse
-import sys
-from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
+import places  # noqa: F401
 
 import random_verdict
 import shapegcode as sg

@@ -8,15 +8,15 @@ writes the picture.
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 import numpy as np
+from places import ROOT
 from scipy.optimize import minimize_scalar
 
 import shapegcode as sg
 from shapegcode.identification.servo.fit import delayed, rms
 
-SHIPPED = Path(__file__).resolve().parents[2] / "python/shapegcode/data/measured/sinumerik/capture.json.gz"
+SHIPPED = ROOT / "python/shapegcode/data/measured/sinumerik/capture.json.gz"
 
 
 def own_dead_time(capture: sg.EdgeCapture, axis: int) -> tuple[float, float]:

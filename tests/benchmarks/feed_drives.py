@@ -8,16 +8,12 @@ from __future__ import annotations
 
 import argparse
 import copy
-import sys
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
-
+import places  # noqa: F401
 from table import Row, Sample, comparison_table, markdown
 
 import feed_drive_reference as reference

@@ -8,15 +8,13 @@ package.
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
+import places  # noqa: F401
 from table import markdown
 
 import shapegcode as sg
-from shapegcode.demos.path import path_program
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 from judge import Mode, interpret, play, residual_um
+from shapegcode.demos.path import path_program
 
 DIAL = (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15, 1.2)
 

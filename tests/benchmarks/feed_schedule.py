@@ -1,7 +1,7 @@
 """What a feed schedule reaches, and what it costs: `python tests/benchmarks/feed_schedule.py [--json FILE] [--quick]`.
 
 The corners of paper 001 with 30 mm of straight before and behind them, and a pocket (tests/golden/feed): peak resultant
-against the limit, at another resolution and by brute force too (cut_by_points.py), share of the path near the limit,
+against the limit, at another resolution and by brute force too (tests/oracles/judge), share of the path near the limit,
 time against the constant feed that keeps the same limit. Then the speed of engagement and force over the number of
 blocks. Exit code 1 if a figure misses its target.
 """
@@ -11,16 +11,21 @@ from __future__ import annotations
 import argparse
 import json
 import re
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cut_by_points import Block, Cutter, Vector, engaged, peak_resultant_n
+import numpy.typing as npt
+import shapely
+from places import TESTS
 from table import markdown
 
+from judge import interpret
+from judge.cutting import Cut, EndMill
+from judge.engagement import Block, Material, layers_of
+from judge.feeds import known, runs
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
@@ -32,10 +37,9 @@ from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.timing.cycle_time import cycle_time
 
-TESTS = Path(__file__).resolve().parents[1]
+Vector = npt.NDArray[np.float64]
 FEED = TESTS / "golden" / "feed"
-POINT_MM = 0.02
-SLICE_MM = 0.2
+LAYER_MM = 0.25  # of ramps, for the judge
 SAMPLES = 150
 LEVEL_MM, ROW_MM, BLOCK_MM = 1.0, 3.2, 0.5  # of the long program
 BLOCK_MM_MIN = 0.6
@@ -44,7 +48,6 @@ LARGEST_S = 10.0
 
 def paper_001() -> dict[int, Any]:
     """The corners of docs/evidence/paper001.md, as its page works them out."""
-    sys.path.append(str(TESTS / "tools"))
     from page_code import run_page
 
     found: dict[int, Any] = run_page("evidence/paper001.md")["corners"]
@@ -183,41 +186,39 @@ def _run(path: _core.Path, stations: Vector, part: SurveyedRegion, machine: Mach
 
 
 def _brute_force(written: Program, machine: Machine, tool: Tool, stock: Stock, samples: int) -> dict[str, Any]:
-    """Some stations of the written program: those with the largest peaks, and random ones."""
+    """Some stations of the written program by the judge: those with the largest peaks, and random ones."""
     swept = survey(written, machine, tool, stock)
     block = stock.box
     assert block is not None
-    low, high = zip(block.x_mm, block.y_mm, block.z_mm, strict=True)
-    law = tool.coefficients()
-    cutter = Cutter(
-        tool.radius_mm, tool.tool.flutes, np.radians(tool.tool.helix_deg),
-        (law.specific_n_per_mm2, law.specific_exponent), (law.ratio, law.ratio_exponent),
-    )  # fmt: skip
+    shape = shapely.box(block.x_mm[0], block.y_mm[0], block.x_mm[1], block.y_mm[1])
+    material = Material([Block(shape, *block.z_mm)])
+    read = interpret(written.text.decode())
+    layers = layers_of(known(read), material.blocks, LAYER_MM)
+    of_run = {id(move): (part, number) for part, run in zip(swept.regions, runs(read), strict=True)
+              for number, move in enumerate(run)}  # fmt: skip
     random = np.random.default_rng(1)
-    past = np.empty((0, 3))
     ours: list[float] = []
     theirs: list[float] = []
-    for part in swept.regions:
-        assert part.track is not None
-        path, stations = part.region.path, np.asarray(part.track.s_mm)
-        peaks = _peaks(part, machine)
-        feeds = _run(path, stations, part, machine)
-        points, ends = _points(path)
-        level = np.flatnonzero((np.asarray(part.track.horizontal) == 1.0) & (peaks > 0.0))
-        share = samples // len(swept.regions)
-        chosen = np.concatenate([level[np.argsort(peaks[level])[-share // 2 :]], random.choice(level, share // 2)])
-        for station in np.unique(chosen):
-            at = max(int(np.searchsorted(ends, stations[station] - 1e-9)), 1)
-            forward = points[at] - points[at - 1]
-            here = points[at] - forward * (ends[at] - stations[station]) / (ends[at] - ends[at - 1])
-            mask = engaged(
-                np.concatenate([past, points[:at]]), here, float(np.arctan2(forward[1], forward[0])), Block(low, high),
-                tool.radius_mm, SLICE_MM,
-            )  # fmt: skip
-            per_tooth = float(feeds[station]) / (cutter.flutes * part.spindle_rev_per_min)
-            theirs.append(peak_resultant_n(mask, cutter, SLICE_MM, per_tooth))
-            ours.append(float(peaks[station]))
-        past = np.concatenate([past, points])
+    for move in known(read):
+        if id(move) in of_run:
+            part, number = of_run[id(move)]
+            assert part.track is not None
+            if number == 0:
+                peaks, stations = _peaks(part, machine), np.asarray(part.track.s_mm)
+                feeds = _run(part.region.path, stations, part, machine)
+                level = np.flatnonzero((np.asarray(part.track.horizontal) == 1.0) & (peaks > 0.0))
+                share = samples // len(swept.regions)
+                chosen = np.union1d(level[np.argsort(peaks[level])[-share // 2 :]], random.choice(level, share // 2))
+                begin = 0.0
+            here = chosen[np.asarray(part.track.segment)[chosen] == number]
+            along = np.clip(stations[here] - begin, 0.0, move.length)
+            mill = _mill(tool, part.spindle_rev_per_min)
+            places = material.meet(0, move, tool.radius_mm, along, layers) if len(here) else []
+            for station, met in zip(here, places, strict=True):
+                theirs.append(Cut(mill, met.arcs).figures(float(feeds[station])).peak_n)
+                ours.append(float(peaks[station]))
+            begin += move.length
+        material.sweep(move, tool.radius_mm)
     difference = np.abs(np.array(ours) - np.array(theirs)) / float(tool.limits.resultant_n or 1.0)
     return {
         "brute_force_peak_n": max(theirs),
@@ -226,19 +227,14 @@ def _brute_force(written: Program, machine: Machine, tool: Tool, stock: Stock, s
     }
 
 
-def _points(path: _core.Path) -> tuple[Vector, Vector]:
-    """The path as points not farther apart than `POINT_MM`, and how far along each is."""
-    pieces: list[Vector] = [np.array([path.start_mm])]
-    along: list[Vector] = [np.zeros(1)]
-    begin = 0.0
-    for number in range(len(path)):
-        segment = path[number]
-        count = max(int(np.ceil(segment.length_mm / POINT_MM)), 1)
-        steps = segment.length_mm * np.arange(1, count + 1) / count
-        pieces.append(np.array([segment.point_at(step) for step in steps]))
-        along.append(begin + steps)
-        begin += segment.length_mm
-    return np.concatenate(pieces), np.concatenate(along)
+def _mill(tool: Tool, rev_per_min: float) -> EndMill:
+    """The tool for the judge."""
+    law, of = tool.coefficients(), tool.tool
+    return EndMill(
+        of.diameter_mm, of.flutes, of.helix_deg, law.specific_n_per_mm2, law.specific_exponent, law.ratio,
+        law.ratio_exponent, 0.0, 0.0, False, rev_per_min, of.overhang_mm, of.flute_length_mm, of.diameter_mm,
+        0.8 * of.diameter_mm, 600.0,
+    )  # fmt: skip
 
 
 def long_program(blocks: int) -> str:

@@ -10,15 +10,11 @@ grid 32 times finer, with white noise on response and force. The last rows are o
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
-
+import places  # noqa: F401
 from scipy.signal import freqs
 from table import markdown
 

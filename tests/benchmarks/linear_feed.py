@@ -1,4 +1,4 @@
-"""Figures of docs/howto/control_siemens.md: `PYTHONPATH=tests/oracles python tests/benchmarks/linear_feed.py`.
+"""Figures of docs/howto/control_siemens.md: `python tests/benchmarks/linear_feed.py`.
 
 Converts programs for a Sinumerik with blocks of constant feed and with FLIN, reads both texts with a reader of its own,
 integrates the feeds with SciPy, and prints blocks, bytes, differences of the commands and residual vibration.
@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
+from places import GOLDEN, ROOT
 
 import shapegcode as sg
 from judge import Mode, residual_um
 from linear_feed_reader import FeedBlock, command, cuts_with_flin
 from shapegcode.machine.programs import ANY_PRICE
 
-ROOT = Path(__file__).resolve().parents[2]
-GOLDEN = ROOT / "tests/golden/programs"
 PROGRAMS = {
     "paper's path": (ROOT / "python/shapegcode/data/paper_path.nc").read_text(),
     "CONTOUR_R at F6000": re.sub(r"F\d+\.0", "F6000.", (GOLDEN / "CONTOUR_R.NC").read_text()),

@@ -10,15 +10,11 @@ sdypy-EMA``) on the same records.
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
-
+import places  # noqa: F401
 from table import markdown
 
 from hard_records import RATE_HZ, HardRecord, hard_record, is_meant, to_find

@@ -6,7 +6,7 @@ import os
 import subprocess
 from pathlib import Path
 
-_ROOT = Path(__file__).resolve().parents[2]
+from places import ROOT
 
 
 def built(name: str) -> Path:
@@ -15,10 +15,10 @@ def built(name: str) -> Path:
     Raises:
         RuntimeError: CMake or the compiler failed, with what they said.
     """
-    build = _ROOT / "build" / "bench"
+    build = ROOT / "build" / "bench"
     generator = [] if (build / "CMakeCache.txt").exists() else ["-G", "Ninja"]
     # Where the Makefile keeps CVODE; what is not there is looked for in the system.
-    environment = {"SUNDIALS_ROOT": str(_ROOT / ".cache" / "sundials" / "usr"), **os.environ}
+    environment = {"SUNDIALS_ROOT": str(ROOT / ".cache" / "sundials" / "usr"), **os.environ}
     for command in (
         ["cmake", "-S", Path(__file__).parent, "-B", build, *generator],
         ["cmake", "--build", build, "--target", name],

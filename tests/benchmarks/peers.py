@@ -36,13 +36,13 @@ from motion_figures import (
     read_points,
     read_program,
 )
+from places import GOLDEN, ROOT
 from table import markdown
 
 import shapegcode as sg
+from time_optimal import Limits as OracleLimits, rounded_polyline, time_optimal
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-PROGRAMS = ROOT / "tests" / "golden" / "programs"
 ARCS = HERE / "data" / "linuxcnc_small_arcs.ngc"
 RECORDED = HERE / "data" / "linuxcnc_small_arcs.csv.gz"
 WINDOWS = (10, 20, 50, 100, 170, 200, 500)
@@ -191,7 +191,7 @@ def cutting_paths(folder: Path) -> dict[str, Route]:
     curve = folder / "curve.nc"
     workload.write_program(curve, 3000)
     routes = {}
-    for name, file in (("PARALLEL.NC", PROGRAMS / "PARALLEL.NC"), ("finishing curve, 3 000 lines", curve)):
+    for name, file in (("PARALLEL.NC", GOLDEN / "PARALLEL.NC"), ("finishing curve, 3 000 lines", curve)):
         path = max((region.path for region in sg.Program.read(file, sg.Machine.load("vx500")).regions), key=len)
         start, pieces = tuple(map(float, path[0].start_mm)), []
         for number in range(len(path)):
@@ -307,9 +307,6 @@ def half_widths(route: Route, tolerance_mm: float) -> Array:
 
 def shortest_time(driver: Path, folder: Path, count: int) -> tuple[str, list[float]]:
     """Our time over that of an oracle on the same rounded path."""
-    sys.path.insert(0, str(HERE.parent / "oracles"))
-    from time_optimal import Limits as OracleLimits, rounded_polyline, time_optimal
-
     ratios, kept = [], []
     for seed in range(count):
         route, limits, tolerance_mm = random_route(seed)
@@ -347,14 +344,14 @@ def windows(driver: Path, folder: Path, quick: bool) -> tuple[str, list[float]]:
     """How much longer the path takes when only so many segments are seen; the losses at the window asked for."""
     curve = folder / "long_curve.nc"
     workload.write_program(curve, CURVE_LINES // (4 if quick else 1))
-    golden = [file for file in sorted(PROGRAMS.iterdir()) if file.suffix.upper() == ".NC"]
+    golden = [file for file in sorted(GOLDEN.iterdir()) if file.suffix.upper() == ".NC"]
     fine = folder / "fine.nc"
     fine.write_text(fine_blocks(), encoding="ascii")
     machines = (
         ("as programmed", 0.0, (1000.0, 50_000.0), [*golden, curve]),
         ("as programmed", 0.0, (5000.0, 500_000.0), [*golden, curve]),
-        ("15 m/min", 250.0, (1000.0, 50_000.0), [PROGRAMS / "PARALLEL.NC", curve, fine]),
-        ("15 m/min", 250.0, (5000.0, 500_000.0), [PROGRAMS / "PARALLEL.NC", curve, fine]),
+        ("15 m/min", 250.0, (1000.0, 50_000.0), [GOLDEN / "PARALLEL.NC", curve, fine]),
+        ("15 m/min", 250.0, (5000.0, 500_000.0), [GOLDEN / "PARALLEL.NC", curve, fine]),
     )
     lines, losses = [], []
     for feed, feed_mm_per_s, (acceleration, jerk), files in machines:

@@ -12,10 +12,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-from processes import ROOT, launched
+from places import GOLDEN
+from processes import launched
 from table import Sample
 
-PROGRAM = ROOT / "tests" / "golden" / "programs" / "PARALLEL.NC"
+PROGRAM = GOLDEN / "PARALLEL.NC"
 COMMANDS = (["simulate"], ["convert", "-o", "out.nc"], ["time"])
 
 

@@ -7,19 +7,18 @@ Cuts of the programs of tests/golden/programs at six times their feed, 2 000 mm/
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from pathlib import Path
 
+from places import GOLDEN
 from table import markdown
 
 import shapegcode as sg
+from planner_references import klipper_points
 from shapegcode import _core
 from shapegcode.machine.controller import PLANNER_NAMES
 from shapegcode.model.machine_model import fanuc_model
 
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAMS = ROOT / "tests" / "golden" / "programs"
 NAMES = ("CONTOUR_R.NC", "VINT_360arc.NC", "helical_bore.nc", "TEST_G90.NC", "PROGRAM2.NC", "PARALLEL.NC")
 KLIPPER = {"velocity": 500.0, "acceleration": 2000.0, "square_corner_velocity": 5.0, "arc_mm": 1.0}
 MAX_CUTS, FASTER = 25, 6.0
@@ -57,14 +56,11 @@ def faster(path: _core.Path) -> _core.Path:
 
 def main() -> None:
     """Print the table."""
-    sys.path += [str(ROOT / "tests" / "oracles"), str(ROOT / "tests" / "python")]
-    from planner_references import klipper_points
-
     machines = {kind: machine_of(kind) for kind in PLANNER_NAMES}
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name in NAMES:
-            program = sg.Program.from_text((PROGRAMS / name).read_text(), machines["fanuc"])
+            program = sg.Program.from_text((GOLDEN / name).read_text(), machines["fanuc"])
             paths = [region.path for region in program.regions[:MAX_CUTS]]
             own = sum(klipper_points(faster(path), KLIPPER, Path(folder))[1] for path in paths)
             times = [sum(time_s(path, machine) for path in paths) for machine in machines.values()]

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-ROOT = Path(__file__).resolve().parents[2]
+from places import ROOT
+
 _LAUNCHER = Path(__file__).with_name("launch.py")
 
 

@@ -19,7 +19,11 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
+import places  # noqa: F401
+
 import shapegcode as sg
+from judge.draws import draw
+from random_verdict import complaints, convert
 
 _SUFFIXES = {".nc", ".tap", ".cnc", ".ngc", ".gcode", ".prg", ".min", ".txt", ".eia", ".iso"}
 _HEADS = (
@@ -103,9 +107,6 @@ def row_of(name: str, conversion: sg.Conversion, machine: sg.Machine, settings: 
 
 def drawn(seed: int) -> Row:
     """A drawn program on its own machine, with what the independent judge says of it."""
-    from judge.draws import draw
-    from random_verdict import complaints, convert
-
     case = convert(draw(seed), shape_all=False)
     found = row_of(f"draw {seed}", case.conversion, case.machine, "", None)
     return Row(found.cells, found.size_ratio, (*found.faults, *(f"draw {seed}: {what}" for what in complaints(case))))
@@ -135,7 +136,6 @@ def main() -> int:
     if args.set:
         pairs = (assignment.partition("=") for assignment in args.set)
         machine = machine.with_values({key: tomllib.loads(f"v = {value}")["v"] for key, _, value in pairs})
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
     rows = [row(path, machine) for path in programs_in(args.folders)] + [drawn(seed) for seed in range(args.draws)]
     print(shown(rows, markdown=args.markdown))
     ratios = [each.size_ratio for each in rows if each.size_ratio is not None]

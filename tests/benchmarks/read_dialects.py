@@ -1,6 +1,6 @@
 """How long programs for LinuxCNC and for a Sinumerik take to read, compared with an interpreter of that control.
 
-Run from the root: ``PYTHONPATH=tests/oracles python tests/benchmarks/read_dialects.py``. LinuxCNC's `rs274` prints the
+Run from the root: ``python tests/benchmarks/read_dialects.py``. LinuxCNC's `rs274` prints the
 canonical calls of a program, PyPI's `nc-gcode-interpreter` makes a table of a Sinumerik program. CPU seconds, median of
 the repetitions, each of which runs both.
 """
@@ -14,6 +14,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import places  # noqa: F401
 from nc_gcode_interpreter import nc_to_dataframe
 from table import Sample, markdown
 

@@ -23,13 +23,11 @@ from typing import Any
 
 import numpy as np
 import websocket
+from places import GOLDEN
 
 import shapegcode as sg
+from browser import SEEN, Browser, chromium
 from shapegcode.results.page.html import plotly_name, save
-
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "python"))
-from browser import SEEN, Browser, chromium  # noqa: E402
 
 TURN_S = 5.0
 CATEGORIES = "blink.user_timing,loading,rail,devtools.timeline,disabled-by-default-devtools.timeline.frame"
@@ -110,7 +108,7 @@ def frames_per_s(browser: Browser, trace: Trace, turn: str) -> float:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", type=Path, default=ROOT / "tests" / "golden" / "programs" / "PARALLEL.NC")
+    parser.add_argument("--program", type=Path, default=GOLDEN / "PARALLEL.NC")
     parser.add_argument("--repetitions", type=int, default=3)
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()

@@ -11,12 +11,9 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
-
+import places  # noqa: F401
 from table import markdown
 
 from extra_insensitive import ei_convolved, fine_enough_period_s, random_pairs, worst_over_bands

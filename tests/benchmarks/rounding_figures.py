@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 import os
 import random
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from unittest import mock
 
 import numpy as np
 import numpy.typing as npt
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
+import places  # noqa: F401
 
 import shapegcode as sg
 from acceptance import machine_with

@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 import processes
 import workload
+from places import ROOT
 from table import Row, Sample, comparison_table, markdown
 
 import shapegcode as sg
@@ -35,7 +36,7 @@ _FIR_SAMPLES = 1_000_000
 _FIR_DELAYS, _FIR_TAPS = (0, 7, 11), (0.4, 0.3, 0.3)  # as long as the minimal shaper of 46 and 131 Hz, on 1 ms
 _FIR_REPETITIONS = 21
 _BUSY_CORES = 0.2  # used by others: above it the run says little
-_PAPER_PATH = processes.ROOT / "python" / "shapegcode" / "data" / "paper_path.nc"
+_PAPER_PATH = ROOT / "python" / "shapegcode" / "data" / "paper_path.nc"
 _STEP_NAMES = {
     "clock": "nothing (the clock read twice)",
     "interpolator_paper": "Interpolator, paper path",

@@ -15,6 +15,7 @@ from unittest import mock
 
 import processes
 import workload
+from places import GOLDEN
 
 import shapegcode as sg
 from shapegcode import _core, cli
@@ -25,7 +26,7 @@ from shapegcode.verdict.figures import Case, CaseSimulation
 
 _WITH, _WITHOUT = "with-override-contours", "without-override-contours"
 _TEN_LINES = b"%\nO1\nG21G17G90G94G40G49G80\nG0X0.Y0.Z0.\nG1X50.F3000\nY50.\nX20.\nY20.\nM30\n%\n"
-_PARALLEL = processes.ROOT / "tests" / "golden" / "programs" / "PARALLEL.NC"
+_PARALLEL = GOLDEN / "PARALLEL.NC"
 _HEAD = b"%\nO0001\nG21G17G90G94G40G49G80\nG0X0.Y0.Z0.\n"
 
 

@@ -13,17 +13,15 @@ import time
 from pathlib import Path
 
 import numpy as np
+from places import ROOT, TESTS
 from table import markdown
 
 import shapegcode as sg
+from judge import Mode, contour_error_um, interpret, play, residual_um, response
 from shapegcode.demos.path import path_program
 from shapegcode.studies.replay import DEFAULT_MEASURES, SHARE, Replay
 from shapegcode.studies.study_file import load_study
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
-from judge import Mode, contour_error_um, interpret, play, residual_um, response
-
-ROOT = Path(__file__).resolve().parents[2]
 _PERCENT = (5, 25, 50, 75, 95, 99)
 _FIFTY = 50
 _CONVERTED_ANEW = 50
@@ -35,7 +33,7 @@ def main() -> int:
     parser.add_argument("--draws", type=int, default=10_000, help="of the study (default: %(default)s)")
     arguments = parser.parse_args()
     machine = sg.Machine.load("vx500")
-    options = load_study(ROOT / "tests" / "golden" / "study" / "STUDY.toml").options()
+    options = load_study(TESTS / "golden" / "study" / "STUDY.toml").options()
     rows = [
         ["peer: converted for each draw", *_converted_for_each(machine, options)],
         ["one text", *_timed(path_program(200, machine), machine, options, arguments.draws)],

@@ -18,9 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
-
+import places  # noqa: F401
 from table import markdown
 
 from shaken_axis import Logger, logged, ran, random_modes, shaken

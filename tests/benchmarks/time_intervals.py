@@ -19,12 +19,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import places  # noqa: F401
 from evidence_nist import left_out, nist_runs
 from table import markdown
 
 import shapegcode as sg
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "oracles"))
 from judge.run_simulator import drawn_control, surface_program, written_program
 
 COVERAGE_PERCENT, HALF_WIDTH_PERCENT = 90.0, 3.0
