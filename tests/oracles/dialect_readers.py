@@ -14,6 +14,7 @@ import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,8 @@ Vector = npt.NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[2]
 TOOLS = "".join(f"T{number} P{number} Z0 D0\n" for number in range(1, 100))
 _PLANES = {"G17": (0, 1), "G18": (2, 0), "G19": (1, 2)}
+_SIEMENS_WORDS = ["I", "J", "K", "CR", "IM", "JM", "KM", "TURN"]
+_SIEMENS_UNITS = {"G70": (25.4, 1.0), "G71": (1.0, 1.0), "G700": (25.4, 25.4), "G710": (1.0, 1.0)}  # of lengths, feeds
 
 
 @dataclass(frozen=True)
@@ -87,67 +90,94 @@ def read_linuxcnc(text: str, folder: Path) -> list[ReadMove]:
     return found
 
 
-def read_siemens(text: str, _folder: Path) -> list[ReadMove]:
+def read_siemens(text: str, _folder: Path | None = None) -> list[ReadMove]:
+    """Moves and dwells, in mm, mm/min and s."""
     lines = [line.partition(";")[0].strip() for line in text.splitlines()]
-    lines = [line for line in lines if line]
-    table = nc_to_dataframe("\n".join(lines) + "\n", disable_forward_fill=True)[0].to_dicts()
-    # Its numbers have single precision: what was written is the shortest decimal.
-    rows = [
-        {name: float(str(np.float32(held))) if isinstance(held, float) else held for name, held in row.items()}
-        for row in table
-    ]
-    assert len(rows) == len(lines)
-    at, motion, axes, feed, unit, found = np.zeros(3), "G0", (0, 1), math.nan, 1.0, []
-    distance = "G90"
-    for line, row in zip(lines, rows, strict=True):
-        motion = row.get("gg01_motion") or motion
-        axes = _PLANES[row["gg06_plane_select"]] if row.get("gg06_plane_select") else axes
-        unit = {"G700": 25.4, "G710": 1.0}.get(row.get("gg13_wp_measure") or "", unit)
-        distance = row.get("gg14_wp_measure_mode") or distance
-        from_last = distance == "G91"
-        if row.get("gg02_wait"):
-            found.append(ReadMove(at, at, dwell_s=row["F"]))
+    # It knows no names with digits: I1= is IM= to it.
+    shown = re.sub(r"\b([IJK])1=", r"\1M=", "\n".join(line for line in lines if line and not line.startswith("%")))
+    rows = nc_to_dataframe(shown + "\n", extra_axes=_SIEMENS_WORDS, disable_forward_fill=True)[0].to_dicts()
+    at, motion, axes, distance, feed, found = np.zeros(3), "G0", (0, 1), "G90", math.nan, list[ReadMove]()
+    unit = _SIEMENS_UNITS["G71"]
+    for row in rows:
+        # Its numbers have single precision: what was written is the shortest decimal.
+        values = {name: float(str(np.float32(value))) if isinstance(value, float) else value
+                  for name, value in row.items() if value is not None}  # fmt: skip
+        motion = values.get("gg01_motion", motion)
+        axes = _PLANES.get(values.get("gg06_plane_select", ""), axes)
+        distance = values.get("gg14_wp_measure_mode", distance)
+        unit = _SIEMENS_UNITS.get(values.get("gg13_wp_measure", ""), unit)
+        if "gg02_wait" in values:
+            found.append(ReadMove(at, at, dwell_s=values["F"]))
             continue
-        feed = row["F"] * unit if row.get("F") is not None else feed
-        named = [row.get(axis) for axis in "XYZ"]
-        end = np.array([at[k] if named[k] is None else named[k] * unit + from_last * at[k] for k in range(3)])
-        centre, turn = None, {"G2": -1, "G3": 1}.get(motion, 0)
-        names = nc_to_dataframe(line + "\n")[1]["symbol_table"] if turn else {}
-        if same(end, at) and not names.keys() & {*"IJK"}:
+        feed = values["F"] * unit[1] if "F" in values else feed
+        named = {name: values[name] * unit[0] for name in ("X", "Y", "Z", *_SIEMENS_WORDS) if name in values}
+        base = at if distance == "G91" else np.zeros(3)
+        end = np.array([base[k] + named[axis] if axis in named else at[k] for k, axis in enumerate("XYZ")])
+        if same(end, at) and not named.keys() & {*"IJK"}:
             continue
-        if turn:
-            if "CR" in names:
-                centre = centre_of(at, end, names["CR"] * unit, turn, axes)
-            else:
-                centre = at + unit * np.array([names.get(each, 0.0) for each in "IJK"])
-        found.append(ReadMove(at, end, motion == "G0", math.nan if motion == "G0" else feed, centre=centre, turn=turn))
+        if motion in ("G0", "G1"):
+            found.append(ReadMove(at, end, motion == "G0", math.nan if motion == "G0" else feed))
+        else:
+            centre, turn = _siemens_circle(at, end, motion, axes, named)
+            found.append(ReadMove(at, end, False, feed, centre=centre, turn=turn))
         at = end
     return found
 
 
-def in_klipper(script: str, asked: str, *arguments: str) -> str:
+def _siemens_circle(
+    at: Vector, end: Vector, motion: str, axes: tuple[int, int], words: dict[str, float]
+) -> tuple[Vector, int]:
+    """Centre and sense of an arc by radius, by its centre, or (CIP) through a point."""
+    turn = 1 if motion == "G3" else -1
+    if motion == "CIP":
+        middle = np.array([words.get(name, at[k]) for k, name in enumerate(("IM", "JM", "KM"))])
+        return _through(at, middle, end, axes)
+    if "CR" in words:
+        return centre_of(at, end, words["CR"], turn, axes), turn
+    return at + np.array([words.get(name, 0.0) for name in "IJK"]), turn
+
+
+def _through(start: Vector, middle: Vector, end: Vector, axes: tuple[int, int]) -> tuple[Vector, int]:
+    """Centre of a circle where the bisectors of two chords meet, and its sense."""
+    a, b, c = (complex(each[axes[0]], each[axes[1]]) for each in (start, middle, end))
+    w = (c - a) / (b - a)
+    at = (b - a) * (w - abs(w) ** 2) / (2j * w.imag) + a
+    at = a + b - at if abs(abs(at - a) - abs(at - c)) > 1e-6 else at
+    centre = start.copy()
+    centre[axes[0]], centre[axes[1]] = at.real, at.imag
+    return centre, 1 if ((b - a).conjugate() * (c - b)).imag > 0.0 else -1
+
+
+def in_klipper(script: Path, asked: str, *arguments: str) -> Any:
     """What a script answers in Klipper's environment."""
     fetch = [ROOT / "tests" / "tools" / "fetch_peers.sh"]
     python = subprocess.run(fetch, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()[-1]
-    command = [python, Path(__file__).with_name(script), *arguments]
-    return subprocess.run(command, input=asked, stdout=subprocess.PIPE, text=True, check=True).stdout
+    done = subprocess.run([python, script, *arguments], input=asked, stdout=subprocess.PIPE, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+def klipper_set_points(
+    start: Vector, pieces: list[dict[str, Any]], limits: dict[str, float], folder: Path
+) -> tuple[Vector, float]:
+    """Set-points at 1 ms of pieces from rest to rest as Klipper's look-ahead plans them, and their time."""
+    file = folder / "points"
+    path = {"start": list(start), "pieces": pieces, "file": str(file)}
+    asked = {"paths": [path], "limits": limits, "period_s": 0.001}
+    answer = in_klipper(ROOT / "tests" / "benchmarks" / "peer_klipper.py", json.dumps(asked))
+    return np.fromfile(file).reshape(-1, 3), answer["paths"][0]["duration_s"]
 
 
 def plan_klipper(moves: list[ReadMove], acceleration: float, folder: Path) -> tuple[Vector, float]:
-    """Set-points at 1 ms of moves from rest to rest as Klipper's look-ahead plans them, and their time."""
+    """The same of moves."""
     pieces = [{"kind": "line", "end": list(each.end), "feed": each.feed_mm_per_min / 60.0} for each in moves]
     limits = {"velocity": 500.0, "acceleration": acceleration, "square_corner_velocity": 5.0, "arc_mm": 1.0}
-    asked = {
-        "path": {"start": list(moves[0].start), "pieces": pieces}, "limits": limits, "period_s": 0.001,
-        "file": str(folder / "points.npy"),
-    }  # fmt: skip
-    time_s = float(in_klipper("klipper_plan.py", json.dumps(asked)))
-    return np.load(folder / "points.npy"), time_s
+    return klipper_set_points(moves[0].start, pieces, limits, folder)
 
 
 def read_klipper(text: str, _folder: Path, arc_mm: float | None = None) -> list[ReadMove]:
     """The moves of a program; `arc_mm`: resolution of [gcode_arcs], None: there is no such section."""
-    answer = json.loads(in_klipper("klipper_moves.py", text, *([] if arc_mm is None else [str(arc_mm)])))
+    reader = Path(__file__).with_name("klipper_moves.py")
+    answer = in_klipper(reader, text, *([] if arc_mm is None else [str(arc_mm)]))
     assert answer["unknown"] == []
     at, found = np.zeros(3), []
     for move in answer["moves"]:

@@ -5,7 +5,6 @@ A path is its segments as the core gives them: geometry and feed alone are used.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from itertools import pairwise
@@ -14,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dialect_readers import ReadMove, in_klipper, read_linuxcnc
+from dialect_readers import ReadMove, klipper_set_points, read_linuxcnc
 from judge import response
 from judge.plant import AxisModes
 from shapegcode import _core
@@ -35,12 +34,7 @@ def klipper_points(path: _core.Path, limits: dict[str, float], folder: Path) -> 
         }
         for each in path
     ]  # fmt: skip
-    asked = {
-        "path": {"start": list(path[0].start_mm), "pieces": pieces}, "limits": limits, "period_s": PERIOD_S,
-        "file": str(folder / "points.npy"),
-    }  # fmt: skip
-    time_s = float(in_klipper("klipper_plan.py", json.dumps(asked)))
-    return np.load(folder / "points.npy"), time_s
+    return klipper_set_points(path[0].start_mm, pieces, limits, folder)
 
 
 def grbl_lines(path: _core.Path, tolerance_mm: float) -> list[tuple[Vector, Vector, float]]:

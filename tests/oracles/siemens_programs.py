@@ -1,7 +1,7 @@
-"""Random SINUMERIK programs, and what PyPI's nc-gcode-interpreter and some lines of geometry make of them.
+"""Random SINUMERIK programs that PyPI's nc-gcode-interpreter reads as a control does (dialect_readers.read_siemens).
 
 The interpreter (0.1.9) works out expressions, loops, conditions, IC and TRANS. It counts operators of every kind from
-left to right, so expressions stand in brackets; it takes distances of G91 as they are, which are added up here, and no
+left to right, so expressions stand in brackets; it takes distances of G91 as they are, which the reader adds up, and no
 IC stands behind them; TRANS without values does not clear there, so zeros stand in it.
 """
 
@@ -12,73 +12,10 @@ import re
 from dataclasses import dataclass, field
 
 import numpy as np
-from nc_gcode_interpreter import nc_to_dataframe
 
-from dialect_readers import ReadMove, Vector, centre_of
+from dialect_readers import Vector
 
 PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
-_OTHERS = ["I", "J", "K", "CR", "IM", "JM", "KM", "TURN"]
-_UNITS = {"G70": (25.4, 1.0), "G71": (1.0, 1.0), "G700": (25.4, 25.4), "G710": (1.0, 1.0)}
-
-
-def moves_of_interpreter(text: str) -> list[ReadMove]:
-    """Moves and dwells of a program, in mm, mm/min and s."""
-    lines = [line.partition(";")[0].strip() for line in text.splitlines()]
-    # It knows no names with digits: I1= is IM= to it.
-    shown = re.sub(r"\b([IJK])1=", r"\1M=", "\n".join(line for line in lines if line and not line.startswith("%")))
-    rows = nc_to_dataframe(shown + "\n", extra_axes=_OTHERS, disable_forward_fill=True)[0].to_dicts()
-    at, motion, plane, distance, feed, found = np.zeros(3), "G0", PLANES["G17"], "G90", math.nan, list[ReadMove]()
-    unit = _UNITS["G71"]
-    for row in rows:
-        values = {name: value for name, value in row.items() if value is not None}
-        motion = values.get("gg01_motion", motion)
-        plane = PLANES.get(values.get("gg06_plane_select", ""), plane)
-        distance = values.get("gg14_wp_measure_mode", distance)
-        unit = _UNITS.get(values.get("gg13_wp_measure", ""), unit)
-        if "gg02_wait" in values:
-            found.append(ReadMove(at, at, dwell_s=values["F"]))
-            continue
-        feed = values["F"] * unit[1] if "F" in values else feed
-        named = {axis: values[axis] * unit[0] for axis in "XYZ" if axis in values}
-        if not named and not values.keys() & set("IJK"):
-            continue
-        base = at if distance == "G91" else np.zeros(3)
-        end = np.array([base[k] + named[axis] if axis in named else at[k] for k, axis in enumerate("XYZ")])
-        found += _moves(
-            at, end, motion, plane, feed, {name: values[name] * unit[0] for name in _OTHERS if name in values}
-        )
-        at = end
-    return found
-
-
-def _moves(
-    at: Vector, end: Vector, motion: str, plane: tuple[int, int, int], feed: float, words: dict[str, float]
-) -> list[ReadMove]:
-    first, second, _ = plane
-    if motion in ("G0", "G1"):
-        if np.array_equal(at, end):
-            return []
-        return [ReadMove(at, end, motion == "G0", math.nan if motion == "G0" else feed)]
-    turn = 1 if motion == "G3" else -1
-    if motion == "CIP":
-        middle = np.array([words.get(name, at[k]) for k, name in enumerate(("IM", "JM", "KM"))])
-        centre, turn = _through(at, middle, end, (first, second))
-    elif "CR" in words:
-        centre = centre_of(at, end, words["CR"], turn, (first, second))
-    else:
-        centre = at + np.array([words.get(name, 0.0) for name in "IJK"])
-    return [ReadMove(at, end, False, feed, centre=centre, turn=turn)]
-
-
-def _through(start: Vector, middle: Vector, end: Vector, axes: tuple[int, int]) -> tuple[Vector, int]:
-    """Centre of a circle where the bisectors of two chords meet, and its sense."""
-    a, b, c = (complex(each[axes[0]], each[axes[1]]) for each in (start, middle, end))
-    w = (c - a) / (b - a)
-    at = (b - a) * (w - abs(w) ** 2) / (2j * w.imag) + a
-    at = a + b - at if abs(abs(at - a) - abs(at - c)) > 1e-6 else at
-    centre = start.copy()
-    centre[axes[0]], centre[axes[1]] = at.real, at.imag
-    return centre, 1 if ((b - a).conjugate() * (c - b)).imag > 0.0 else -1
 
 
 @dataclass

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import dialect_readers
 import shapegcode as sg
 from acceptance import machine_with, moves_of
 from dialect_readers import ReadMove
@@ -19,7 +20,7 @@ from shapegcode import _core
 from shapegcode.conversion.translate import translate
 from shapegcode.program.foreign.read import ForeignProgram
 from shapegcode.program.foreign.siemens import read_siemens
-from siemens_programs import moves_of_interpreter, random_siemens
+from siemens_programs import random_siemens
 
 PROGRAMS = Path(__file__).parents[1] / "golden" / "programs"
 KEYS = {"input.tool_change_unknown_axes": ""}
@@ -93,7 +94,7 @@ def compare(text: str, read_moves: list[ReadMove], program: sg.Program) -> float
 def test_random_programs_beside_another_interpreter(seeds: range) -> None:
     for seed in seeds:
         text = random_siemens(seed)
-        assert compare(text, moves_of_interpreter(text), program_of(text)) < 1e-3, seed
+        assert compare(text, dialect_readers.read_siemens(text), program_of(text)) < 1e-3, seed
 
 
 ROUND_TRIP = ["CONTOUR_R.NC", "G17_18_19.NC", "TEST_G90.NC"]
