@@ -25,30 +25,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from places import GOLDEN
-from processes import launched
+from processes import SHAPEGCODE, Run, launched
 from table import Sample
 
 from shapegcode.batching.plan import find_programs, plan
 from shapegcode.batching.process import Base, Hosts, pack
 
-COMMAND = Path(sys.executable).with_name("shapegcode")
 SAMPLES = ("TEST_G90.NC", "G83.NC", "VINT_360arc.NC", "helical_bore.nc")
 SIZES = (5, 10, 20, 40, 80, 150, 300, 600)
-LOOP = """
-import contextlib, os, sys, time
-from shapegcode.cli import main
-names = sorted(os.listdir("parts"))
-os.makedirs("loop")
-with open(os.devnull, "w") as nothing, contextlib.redirect_stdout(nothing):
-    main(["convert", "parts/" + names[0], "-m", "vx500", "-o", "loop/first", "-q"])
-    begin = time.perf_counter()
-    for name in names:
-        main(["convert", "parts/" + name, "-m", "vx500", "-o", "loop/" + name, "--json", f"loop/{name}.json", "-q"])
-    spent = time.perf_counter() - begin
-print(spent)
-"""
-
-
 ASKED = """
 import json, os, sys, time
 from shapegcode.cli import main
@@ -93,31 +77,25 @@ def make(folder: Path, count: int, sizes: tuple[int, ...]) -> None:
 def loop(folder: Path) -> float:
     """The conversions one after the other in one process that has loaded all, with one thread as in a batch."""
     shutil.rmtree(folder / "loop", ignore_errors=True)
-    done = subprocess.run(
-        [sys.executable, "-c", LOOP],
-        cwd=folder,
-        env={**os.environ, "SHAPEGCODE_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return float(done.stdout)
+    (folder / "loop").mkdir()
+    names = sorted(os.listdir(folder / "parts"))
+    within = Asked("within", folder)
 
+    def convert(name: str, output: str) -> float:
+        words = ["-m", "vx500", "-o", f"loop/{output}", "--json", f"loop/{output}.json", "-q"]
+        return within(["convert", f"parts/{name}", *words])
 
-def batch(folder: Path, *words: str) -> float:
-    """The batch as the command says how long it took, its own start and end within."""
-    shutil.rmtree(folder / "out", ignore_errors=True)
-    begin = time.perf_counter()
-    done = subprocess.run(
-        [COMMAND, "batch", "parts", "-m", "vx500", "-o", "out", "-q", *words],
-        cwd=folder,
-        capture_output=True,
-        check=False,
-    )
-    spent = time.perf_counter() - begin
-    if done.returncode not in (0, 1):
-        raise RuntimeError(done.stderr.decode())
+    convert(names[0], "first")
+    spent = sum(convert(name, name) for name in names)
+    within.end()
     return spent
+
+
+def batch(folder: Path, *words: str) -> Run:
+    """The batch as a process, its own start and end within."""
+    shutil.rmtree(folder / "out", ignore_errors=True)
+    command = [SHAPEGCODE, "batch", "parts", "-m", "vx500", "-o", "out", "-q", *words]
+    return launched(command, folder=folder, accepted=(0, 1))
 
 
 def compare(folder: Path, count: int, repeat: int) -> None:
@@ -125,9 +103,9 @@ def compare(folder: Path, count: int, repeat: int) -> None:
     make(folder, count, SIZES)
     ways: dict[str, Callable[[], float]] = {
         "conversions alone": lambda: loop(folder),
-        "one process": lambda: batch(folder, "--jobs", "1"),
-        "two processes": lambda: batch(folder, "--jobs", "2"),
-        "Dask, two workers": lambda: batch(folder, "--jobs", "2", "--scheduler", "local"),
+        "one process": lambda: batch(folder, "--jobs", "1").wall_s,
+        "two processes": lambda: batch(folder, "--jobs", "2").wall_s,
+        "Dask, two workers": lambda: batch(folder, "--jobs", "2", "--scheduler", "local").wall_s,
     }
     found: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(repeat):
@@ -147,9 +125,9 @@ def compare(folder: Path, count: int, repeat: int) -> None:
 class Asked:
     """A process that converts what it is told, with one thread as in a batch: itself, or forked off it."""
 
-    def __init__(self, how: str) -> None:
+    def __init__(self, how: str, folder: Path) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-c", ASKED, how], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+            [sys.executable, "-c", ASKED, how], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=folder,
             env={**os.environ, "SHAPEGCODE_THREADS": "1"},
         )  # fmt: skip
 
@@ -170,7 +148,7 @@ def each(folder: Path, count: int, repeat: int) -> None:
     Path("scratch").mkdir()
     Path("out").mkdir()
     planned = plan(find_programs(["parts"], "out"), ["vx500"], "out", "convert", [], None, Base(str(folder)))
-    within, forked, hosts = Asked("within"), Asked("forked"), Hosts()
+    within, forked, hosts = Asked("within", folder), Asked("forked", folder), Hosts()
     # What is converted first, within the process, sets up what the others find.
     for ask in (within, forked):
         ask(planned.job(0).words)
@@ -203,13 +181,7 @@ def growth(folder: Path) -> None:
     print("\n| programs | time per program | client's largest memory |\n|--:|--:|--:|")
     for count in (100, 1_000, 10_000):
         make(folder, count, (4,))
-        shutil.rmtree(folder / "out", ignore_errors=True)
-        os.chdir(folder)
-        run = launched(
-            [COMMAND, "batch", "parts", "-m", "vx500", "-o", "out", "-q", "--command", "check", "--json", "all.json"],
-            os.environ,
-            accepted=(0, 1),
-        )
+        run = batch(folder, "--command", "check", "--json", "all.json")
         rows = json.loads((folder / "all.json").read_text())["rows"]
         assert len(rows) == count
         print(f"| {count} | {1e3 * run.wall_s / count:.1f} ms | {run.peak_mb:.0f} MB |", flush=True)

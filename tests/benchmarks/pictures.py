@@ -7,13 +7,11 @@ minute of the machine slows both.
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 import tempfile
 from pathlib import Path
 
 from places import GOLDEN
-from processes import launched
+from processes import SHAPEGCODE, launched
 from table import Sample
 
 PROGRAM = GOLDEN / "PARALLEL.NC"
@@ -22,8 +20,8 @@ COMMANDS = (["simulate"], ["convert", "-o", "out.nc"], ["time"])
 
 def seconds(words: list[str], folder: Path) -> float:
     """Processor time of a command on the program."""
-    command = [Path(sys.executable).with_name("shapegcode"), words[0], PROGRAM, "-m", "vx500", *words[1:]]
-    return launched(command, {**os.environ, "PWD": str(folder)}, accepted=(0, 1)).cpu_s
+    command = [SHAPEGCODE, words[0], PROGRAM, "-m", "vx500", *words[1:]]
+    return launched(command, folder=folder, accepted=(0, 1)).cpu_s
 
 
 def main() -> None:
@@ -36,7 +34,6 @@ def main() -> None:
     print("|---|--:|--:|--:|")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        os.chdir(folder)
         for words in COMMANDS:
             alone, drawn = [], []
             for _ in range(repeat):

@@ -26,6 +26,7 @@ from places import ROOT
 from table import Row, Sample, comparison_table, markdown
 
 import shapegcode as sg
+from rs274_tool import rs274_command, run_rs274
 from shapegcode import _core
 from shapegcode.conversion.write import RegionWriter
 from shapegcode.model.machine_model import MachineModel, fanuc_model
@@ -84,10 +85,9 @@ def main() -> int:
 
 def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> list[Row]:
     """Reading, conversion and its parts, each repetition beside one run of rs274."""
-    rs274 = processes.Rs274(folder)
     short = folder / "short.nc"
     workload.write_program(short, 1000)
-    if (found := rs274.count_feed_moves(short)) != 1000:
+    if (found := sum("STRAIGHT_FEED(" in line for line in run_rs274(short.read_text(), folder))) != 1000:
         raise RuntimeError(f"rs274 reads {found} moves of 1000: the comparison would be void")
 
     machine = sg.Machine.load("vx500")
@@ -99,7 +99,7 @@ def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> 
     peers, conversions = [], []
     for repetition in range(repetitions):
         print(f"repetition {repetition + 1} of {repetitions}", file=sys.stderr)
-        peers.append(rs274.read(program))
+        peers.append(processes.launched(*rs274_command(program, folder)))
         conversions.append(processes.convert(program, folder / "shaped.nc"))
         read_s, read = _timed(lambda: sg.Program.read(program, machine))
         reading.append(read_s)

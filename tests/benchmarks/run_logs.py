@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import gzip
-import os
 import shutil
 import sys
 import tempfile
@@ -76,7 +75,7 @@ def main() -> None:
         with day.open("rb") as source, gzip.open(packed, "wb", compresslevel=1) as target:
             shutil.copyfileobj(source, target)
         for path in (day, packed):
-            run = processes.launched([sys.executable, script, path], os.environ)
+            run = processes.launched([sys.executable, script, path])
             print(
                 f"{path.suffix:>4} {path.stat().st_size / 1e6:7.0f} MB  {lines / 1e6:.1f} million lines, {runs} runs: "
                 f"{run.cpu_s:.1f} s CPU, {lines / run.cpu_s / 1e6:.2f} million lines/s, peak {run.peak_mb:.0f} MB"

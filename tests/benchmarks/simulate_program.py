@@ -6,12 +6,11 @@ Each run is a process of its own: processor time of all its threads, and its lar
 from __future__ import annotations
 
 import argparse
-import os
-import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+
+from processes import SHAPEGCODE, launched
 
 SQUARE_S = 24.4  # a square of 20 mm at 200 mm/min, a dwell and two rapids
 SQUARE = "G01 X20. F200.\nY20.\nX0.\nY0.\nG04 P100\nG00 Z1.\nG00 Z0.\n"
@@ -42,15 +41,10 @@ def measured(run: Run, folder: Path) -> tuple[float, float, float]:
     """Seconds of processor time, MB resident, MB of the file."""
     turns = max(round(run.hours * 3600.0 / SQUARE_S), 1)
     (folder / "part.nc").write_text("%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\n" + SQUARE * turns + "M30\n%\n")
-    code = "import sys; from shapegcode.cli import main; sys.exit(main(sys.argv[1:]))"
     words = ["simulate", "part.nc", "-m", "vx500", "--plant", run.plant, *run.words]
-    process = subprocess.Popen([sys.executable, "-c", code, *words], cwd=folder, stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
-    seconds = usage.ru_utime + usage.ru_stime
-    if os.waitstatus_to_exitcode(status) != 0:
-        raise SystemExit(f"simulate {' '.join(words)} failed")
+    done = launched([SHAPEGCODE, *words], folder=folder)
     size = (folder / run.file).stat().st_size if run.file else 0
-    return seconds, usage.ru_maxrss / 1024.0, size / 1e6
+    return done.cpu_s, done.peak_mb * 1e6 / 2**20, size / 1e6
 
 
 def main() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import tempfile
 import time
@@ -95,7 +94,6 @@ def _override_rows(folder: Path, long_file: Path, repetitions: int) -> None:
             without, now = (
                 processes.launched(
                     [sys.executable, __file__, way, "convert", file, "-m", "vx500", "-o", folder / "out.nc", *settings],
-                    os.environ,
                     accepted=(0, 1),
                 )
                 for way in (_WITHOUT, _WITH)

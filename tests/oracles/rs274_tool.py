@@ -28,6 +28,20 @@ def _linuxcnc_folder() -> Path:
     return Path(fetch.stdout.splitlines()[-1])
 
 
+def rs274_command(
+    program: Path, folder: Path, tools: str = "", variables: str = ""
+) -> tuple[list[str | Path], dict[str, str]]:
+    """The command that interprets a program, and its environment."""
+    linuxcnc = _linuxcnc_folder()
+    tool_table, parameters = folder / "tools.tbl", folder / "variables.var"
+    tool_table.write_text(tools)
+    parameters.write_text(variables)  # rs274 rewrites it: every run starts from this one
+    # PYTHON* variables of our own interpreter must not reach the one inside rs274.
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    environment |= {"HOME": str(folder), "LD_LIBRARY_PATH": f"{linuxcnc}/usr/lib:{linuxcnc}/usr/lib/x86_64-linux-gnu"}
+    return [linuxcnc / "usr/bin/rs274", "-g", "-t", tool_table, "-v", parameters, program], environment
+
+
 def run_rs274(program_text: str, tmp_path: Path, *, tools: str = "", variables: str = "") -> list[str]:
     """The canonical lines that rs274 prints for the program, as they come: `1 N..... STRAIGHT_FEED(...)`.
 
@@ -35,26 +49,11 @@ def run_rs274(program_text: str, tmp_path: Path, *, tools: str = "", variables: 
 
     Raises RuntimeError with rs274's message when it rejects the program.
     """
-    linuxcnc = _linuxcnc_folder()
     program = tmp_path / "program.ngc"
     program.write_text(program_text)
-    tool_table, parameters = tmp_path / "tools.tbl", tmp_path / "variables.var"
-    tool_table.write_text(tools)
-    parameters.write_text(variables)  # rs274 rewrites it: every run starts from this one
-    # PYTHON* variables of our own interpreter must not reach the one inside rs274.
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
-    environment |= {
-        "HOME": str(tmp_path),
-        "LD_LIBRARY_PATH": f"{linuxcnc}/usr/lib:{linuxcnc}/usr/lib/x86_64-linux-gnu",
-    }
+    command, environment = rs274_command(program, tmp_path, tools, variables)
     run = subprocess.run(
-        [linuxcnc / "usr/bin/rs274", "-g", "-t", tool_table, "-v", parameters, program],
-        env=environment,
-        cwd=tmp_path,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        check=False,
+        command, env=environment, cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
     )
     if run.returncode != 0:
         raise RuntimeError(f"rs274 rejects the program (exit {run.returncode}): {run.stderr.strip()}")
