@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -13,7 +12,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
+import places  # noqa: F401
+
+from judge import interpret
+from judge.plant import distances_from_polyline
 
 Array = npt.NDArray[np.float64]
 PERIOD_S = 1e-3
@@ -112,20 +114,7 @@ def figures(points: Array, limits: Limits, route: Route | None = None, period_s:
     found = Figures(time_s, *shares)
     if route is None:
         return found
-    return replace(found, off_mm=_distance(points, route.points()))
-
-
-def _distance(points: Array, path: Array) -> float:
-    """Largest distance of any of the points from a path, of which the chords beside its nearest point count."""
-    _, nearest = cKDTree(path).query(points)
-    away = np.full(len(points), np.inf)
-    for first, second in ((nearest - 1, nearest), (nearest, nearest + 1)):
-        begin = path[np.clip(first, 0, len(path) - 1)]
-        chord = path[np.clip(second, 0, len(path) - 1)] - begin
-        square = np.maximum((chord**2).sum(axis=1), 1e-30)
-        share = np.clip(((points - begin) * chord).sum(axis=1) / square, 0.0, 1.0)
-        away = np.minimum(away, np.linalg.norm(points - begin - share[:, None] * chord, axis=1))
-    return float(away.max())
+    return replace(found, off_mm=float(distances_from_polyline(points, route.points()).max()))
 
 
 def ours(
@@ -146,40 +135,19 @@ def ours(
     return points, json.loads(run.stdout)
 
 
-def read_points(file: Path, axes: int = 3) -> Array:
-    """Rows of doubles, as the drivers write them."""
-    return np.fromfile(file).reshape(-1, axes)
+def read_points(file: Path) -> Array:
+    """Rows of three doubles, as the drivers write them."""
+    return np.fromfile(file).reshape(-1, 3)
 
 
 def read_program(text: str, rapid: float) -> Route:
-    """G0 to G3 in X, Y and Z of a plain program, absolute; arcs in XY with I and J, or R up to half a turn."""
-    at, feed, motion, pieces = [0.0, 0.0, 0.0], 0.0, 0, []
-    for line in text.splitlines():
-        words = dict(re.findall(r"([A-Z])\s*(-?[\d.]+)", re.sub(r"\(.*?\)", "", line.upper())))
-        feed = float(words.get("F", 60.0 * feed)) / 60.0
-        if words.get("G") in ("0", "1", "2", "3"):
-            motion = int(words["G"])
-        end = [float(words.get(axis, value)) for axis, value in zip("XYZ", at, strict=True)]
-        if end == at or ("G" in words and words["G"] not in ("0", "1", "2", "3")):
-            continue
-        if motion < 2:
-            pieces.append(Piece((end[0], end[1], end[2]), feed if motion else rapid))
-        else:
-            pieces.append(_arc(at, end, words, feed, 1.0 if motion == 3 else -1.0))
-        at = end
+    """Moves of a plain program from 0 on; G91.1 says what a FANUC control does anyway."""
+    pieces = []
+    for move in interpret(text.replace("G91.1 ", ""), start_state={"position": [0.0, 0.0, 0.0]}).moves:
+        end, feed = (*map(float, move.end),), rapid if move.kind == "rapid" else move.feed / 60.0
+        if move.kind == "arc":
+            assert move.centre is not None and move.sweep is not None and move.normal_axis is not None
+            pieces.append(Piece(end, feed, (*map(float, move.centre),), move.sweep, move.normal_axis))
+        elif move.length > 0.0:
+            pieces.append(Piece(end, feed))
     return Route(pieces)
-
-
-def _arc(at: list[float], end: list[float], words: dict[str, str], feed: float, turn: float) -> Piece:
-    begin, to = complex(at[0], at[1]), complex(end[0], end[1])
-    if "R" in words:
-        half = 0.5 * (to - begin)
-        rise = math.sqrt(max(float(words["R"]) ** 2 - abs(half) ** 2, 0.0))
-        centre = begin + half + turn * rise * 1j * half / abs(half)
-    else:
-        centre = begin + complex(float(words.get("I", 0.0)), float(words.get("J", 0.0)))
-    ratio = (to - centre) / (begin - centre)
-    sweep = math.atan2(ratio.imag, ratio.real)
-    if turn * sweep <= 1e-9:
-        sweep += turn * math.tau
-    return Piece((end[0], end[1], end[2]), feed, (centre.real, centre.imag, at[2]), sweep)

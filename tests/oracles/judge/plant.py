@@ -152,11 +152,11 @@ def contour_error_um(points: Vector, programmed_moves: Sequence[Move]) -> Contou
     points = np.asarray(points, dtype=float)
     if not np.isfinite(points).all():
         raise ValueError("points to measure must be finite")
-    distance = _distance_to_polyline(points, path_polyline(programmed_moves))
+    distance = distances_from_polyline(points, path_polyline(programmed_moves))
     return ContourError(float(1000.0 * distance.max()), float(1000.0 * np.sqrt(np.mean(distance**2))))
 
 
-def _distance_to_polyline(points: Vector, path: Vector) -> Vector:
+def distances_from_polyline(points: Vector, path: Vector) -> Vector:
     """Exact distance of every point to an open polyline."""
     if len(path) == 1:
         path = np.repeat(path, 2, axis=0)
