@@ -45,19 +45,12 @@ _AXES = "xy"
 
 @dataclass(frozen=True)
 class Way:
-    """A row of the tables.
+    """A row of the tables."""
 
-    Attributes:
-        name: how it stands there.
-        family: of `shaping.family`.
-        contour: of `shaping.contour`.
-        band: uncertainty that the machine file states, relative.
-    """
-
-    name: str
-    family: str
-    contour: str = "off"
-    band: float = 0.0
+    name: str  # how it stands there
+    family: str  # of `shaping.family`
+    contour: str = "off"  # of `shaping.contour`
+    band: float = 0.0  # uncertainty that the machine file states, relative
 
 
 WAYS = (
@@ -75,18 +68,13 @@ WAYS = (
 
 @dataclass
 class Outcome:
-    """What became of a program; µm, ms and s.
+    """What became of a program; µm, ms and s."""
 
-    Attributes:
-        way: name of the row.
-        refusal: why there is none; then nothing else is stated.
-        residual_um: per axis the largest after a stop with modes as stated, and anywhere within each of `BANDS`.
-    """
-
-    way: str
-    refusal: str = ""
+    way: str  # name of the row
+    refusal: str = ""  # why there is none; then nothing else is stated
     period_ms: float = 0.0
     shaper_ms: float = 0.0
+    # per axis the largest after a stop with modes as stated, and anywhere within each of `BANDS`
     residual_um: dict[str, list[float]] = field(default_factory=dict)
     peak_um: dict[str, float] = field(default_factory=dict)
     command_um: float = 0.0
@@ -97,13 +85,7 @@ class Outcome:
 
 
 def machine_of(way: Way, contour_um: float, finer: int = 0) -> sg.Machine:
-    """The machine file of a row. That a mode is off costs no feed and no verdict: the tables show what it does.
-
-    Args:
-        way: the row.
-        contour_um: contour tolerance.
-        finer: more decimals of every word, to see what rounding does.
-    """
+    """The machine file of a row, words with `finer` more decimals; that a mode is off costs no feed and no verdict."""
     data = sg.Machine.load("vx500").model_dump(exclude_none=True)
     for unit in ("mm", "inch"):
         data["controller"][f"least_increment_{unit}"] *= 10.0**-finer

@@ -36,24 +36,15 @@ TOLERANCES_UM = (2.0, 5.0, 10.0, 20.0)
 
 @dataclass(frozen=True)
 class Figures:
-    """What an emitted program does; µm, s, mm/s².
+    """What an emitted program does; µm, s, mm/s²."""
 
-    Attributes:
-        command_um: largest distance of the set-points from the programmed path.
-        response_um: of the table.
-        residual_um: X and Y, from the stop on.
-        time_s: from the first block to the last set-point.
-        peak_acceleration: of X and Y; change of the block velocity per block period.
-        orbit_percent: area between the set-points and the arc of paper 000, of the quarter disc (paper only).
-        corner_speed: of the set-points where they are nearest to the corner of `corner`, mm/s (there only).
-    """
-
-    command_um: float
-    response_um: float
-    residual_um: Vector
-    time_s: float
-    peak_acceleration: Vector
-    orbit_percent: float
+    command_um: float  # largest distance of the set-points from the programmed path
+    response_um: float  # of the table
+    residual_um: Vector  # X and Y, from the stop on
+    time_s: float  # from the first block to the last set-point
+    peak_acceleration: Vector  # of X and Y; change of the block velocity per block period
+    orbit_percent: float  # area between the set-points and the arc of paper 000, of the quarter disc (paper only)
+    # of the set-points where they are nearest to the corner of `corner`, mm/s (there only)
     corner_speed: float = math.nan
 
 
@@ -191,9 +182,7 @@ def corner_speed(points: Vector, at: tuple[float, float]) -> float:
 def exact(target: str, smoothness: float, block_period_s: float) -> tuple[float, tuple[Vector, ...]]:
     """Paper 000's path before it is rounded to words, with a weight of the correction.
 
-    Returns:
-        Largest deviation of what the target names, µm; residual of X and Y in µm for modes at 90, 95, 100, 105 and
-        110 % of their frequency.
+    Largest deviation of what the target names, and residual of X and Y for modes at 90, 95, 100, 105 and 110 % (µm).
     """
     machine = machine_with({"shaping.contour": target, "controller.block_time_s": block_period_s})
     grid = choose_grid(machine, block_period_s)

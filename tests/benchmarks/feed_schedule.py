@@ -213,7 +213,7 @@ def _brute_force(written: Program, machine: Machine, tool: Tool, stock: Stock, s
             here = chosen[np.asarray(part.track.segment)[chosen] == number]
             along = np.clip(stations[here] - begin, 0.0, move.length)
             mill = _mill(tool, part.spindle_rev_per_min)
-            places = material.meet(0, move, tool.radius_mm, along, layers) if len(here) else []
+            places = material.meet(move, tool.radius_mm, along, layers) if len(here) else []
             for station, met in zip(here, places, strict=True):
                 theirs.append(Cut(mill, met.arcs).figures(float(feeds[station])).peak_n)
                 ours.append(float(peaks[station]))

@@ -18,29 +18,17 @@ SPANS = (1.0, 1.5, 2.0)
 
 @dataclass(frozen=True)
 class Solved:
-    """What was found for a set of modes.
+    """What was found for a set of modes."""
 
-    Attributes:
-        modes: the set.
-        found: number of shapers in the last region that was searched.
-        shortest_s: duration of the shortest, s; NaN if there is none.
-        shortest_non_negative_s: the same of those without negative taps.
-        convolved_s: duration of the convolved ZV, s.
-        residual: largest residual ratio of any mode after any of the shapers; 0 if there is none.
-        complete: whether no other shaper exists in the region.
-        shortest_proven: whether no shorter one exists.
-        seconds: processor time of the search.
-    """
-
-    modes: tuple[Mode, ...]
-    found: int
-    shortest_s: float
-    shortest_non_negative_s: float
-    convolved_s: float
-    residual: float
-    complete: bool
-    shortest_proven: bool
-    seconds: float
+    modes: tuple[Mode, ...]  # the set
+    found: int  # number of shapers in the last region that was searched
+    shortest_s: float  # duration of the shortest, s; NaN if there is none
+    shortest_non_negative_s: float  # the same of those without negative taps
+    convolved_s: float  # duration of the convolved ZV, s
+    residual: float  # largest residual ratio of any mode after any of the shapers; 0 if there is none
+    complete: bool  # whether no other shaper exists in the region
+    shortest_proven: bool  # whether no shorter one exists
+    seconds: float  # processor time of the search
 
 
 def random_sets(count: int, seed: int) -> list[tuple[Mode, ...]]:

@@ -10,11 +10,7 @@ from places import ROOT
 
 
 def built(name: str) -> Path:
-    """One of them, built again where a source changed.
-
-    Raises:
-        RuntimeError: CMake or the compiler failed, with what they said.
-    """
+    """One of them, built again where a source changed."""
     build = ROOT / "build" / "bench"
     generator = [] if (build / "CMakeCache.txt").exists() else ["-G", "Ninja"]
     # Where the Makefile keeps CVODE; what is not there is looked for in the system.

@@ -72,25 +72,16 @@ def machine(rounding: str, period_s: float, increment_mm: float = 1e-3) -> sg.Ma
 
 @dataclass(frozen=True)
 class Outcome:
-    """One path written with one rounding.
+    """One path written with one rounding."""
 
-    Attributes:
-        residual_um: X and Y behind the last set-point, under the rule of block ends "ceil", by the judge.
-        carry_um: the same under "carry".
-        peak_um: X and Y of the whole motion, by the tool itself.
-        error_increments: largest distance of a block's end from the exact command.
-        blocks: shaped blocks.
-        size: bytes of the text.
-        slowed: blocks that the controller's look-ahead would slow.
-    """
-
+    # X and Y behind the last set-point, under the rule of block ends "ceil", by the judge
     residual_um: npt.NDArray[np.float64]
-    carry_um: npt.NDArray[np.float64]
-    peak_um: tuple[float, float]
-    error_increments: float
-    blocks: int
-    size: int
-    slowed: int
+    carry_um: npt.NDArray[np.float64]  # the same under "carry"
+    peak_um: tuple[float, float]  # X and Y of the whole motion, by the tool itself
+    error_increments: float  # largest distance of a block's end from the exact command
+    blocks: int  # shaped blocks
+    size: int  # bytes of the text
+    slowed: int  # blocks that the controller's look-ahead would slow
 
 
 def convert_path(seed: int, rounding: str, period_s: float, *, inch: bool, increment_mm: float) -> Outcome:

@@ -32,27 +32,16 @@ class Sample:
 
 @dataclass(frozen=True)
 class Row:
-    """One figure beside its peer's.
+    """One figure beside its peer's."""
 
-    Attributes:
-        key: stable name in the JSON output.
-        what: what was measured.
-        unit: of `ours` and `theirs`.
-        ours: this project's figure.
-        peer: what it is held against; empty: nothing.
-        theirs: the peer's figure, repetition by repetition.
-        at_least: smallest ratio ours / theirs that meets the target; None: no target.
-        at_most: largest such ratio, or largest `ours` where there is no peer.
-    """
-
-    key: str
-    what: str
-    unit: str
-    ours: Sample
-    peer: str = ""
-    theirs: Sample | None = None
-    at_least: float | None = None
-    at_most: float | None = None
+    key: str  # stable name in the JSON output
+    what: str  # what was measured
+    unit: str  # of `ours` and `theirs`
+    ours: Sample  # this project's figure
+    peer: str = ""  # what it is held against; empty: nothing
+    theirs: Sample | None = None  # the peer's figure, repetition by repetition
+    at_least: float | None = None  # smallest ratio ours / theirs that meets the target; None: no target
+    at_most: float | None = None  # largest such ratio, or largest `ours` where there is no peer
 
     @property
     def ratio(self) -> Sample | None:

@@ -58,19 +58,20 @@ def vibration(command: Array, frequency_hz: float, damping: float) -> Array:
     return np.asarray(lfilter(numerator[0], denominator, command - command[0]))
 
 
-def swing_when_steady(command: Array, deflection: Array) -> float:
-    """Largest deflection while the command rests or keeps its speed: what swings there was excited before."""
+def swing_when_steady(command: Array, frequency_hz: float, damping: float) -> float:
+    """Largest deflection of a mode while the command rests or keeps its speed: what swings there was excited before."""
     steady = np.concatenate([[True], np.abs(acceleration(command)) < STEADY, [True]])
+    deflection = vibration(command, frequency_hz, damping)
     return float(np.abs(deflection[np.convolve(steady, np.ones(5), "same") > 4.5]).max())
 
 
-def deviation(points: Array, path: Array, reach: int = 60) -> Array:
-    """Distance of each point from the path that is sampled at the same times, in the last `reach` samples."""
+def deviation(points: Array, path: Array) -> Array:
+    """Distance of each point from the path that is sampled at the same times, in the last 60 samples."""
     moved = np.concatenate([[True], np.any(np.diff(path, axis=0) != 0.0, axis=1)])
     corners = path[moved]
     place = np.cumsum(moved) - 1
     nearest = np.full(len(points), np.inf)
-    for back in range(-reach // 4, reach):
+    for back in range(-15, 60):
         first = np.clip(place - back - 1, 0, len(corners) - 2)
         start, way = corners[first], corners[first + 1] - corners[first]
         along = np.einsum("ij,ij->i", points - start, way) / np.maximum(np.einsum("ij,ij->i", way, way), 1e-300)

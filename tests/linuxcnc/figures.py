@@ -23,10 +23,7 @@ def main() -> None:
     for axis, (frequency_hz, damping) in enumerate(machine.MODES):
         for off in (1.0, 0.95, 1.05):
             mode = (off * frequency_hz, damping)
-            pair = [
-                1e3 * analysis.swing_when_steady(signal, analysis.vibration(signal, *mode))
-                for signal in (command[:, axis], shaped[:, axis])
-            ]
+            pair = [1e3 * analysis.swing_when_steady(signal[:, axis], *mode) for signal in (command, shaped)]
             print(f"{'XY'[axis]}, {mode[0]:g} Hz: largest swing at rest and steady speed {pair[0]:.2f} um, "
                   f"shaped {pair[1]:.2g} um")  # fmt: skip
     cutting = np.abs(command[:, 2] - machine.DEPTH_MM) < 1e-6

@@ -23,25 +23,15 @@ MILLIONFOLD = 1e-6  # record.hal
 
 @dataclass(frozen=True)
 class Recording:
-    """One row per millisecond.
+    """One row per millisecond."""
 
-    Attributes:
-        command: what LinuxCNC gave each joint, in mm.
-        shaped: what came out of the component in the same millisecond.
-        following_error: of each joint, as LinuxCNC sees it.
-        pending: the pin of the component.
-        ok: the pin of the component.
-        cycles: that the component took the millisecond before, of the processor's counter.
-        said: errors that an operator saw; what `halcmd show` said at the end of thread and parameters.
-    """
-
-    command: NDArray[np.float64]
-    shaped: NDArray[np.float64]
-    following_error: NDArray[np.float64]
-    pending: NDArray[np.bool_]
-    ok: NDArray[np.bool_]
-    cycles: NDArray[np.float64]
-    said: dict[str, Any]
+    command: NDArray[np.float64]  # what LinuxCNC gave each joint, in mm
+    shaped: NDArray[np.float64]  # what came out of the component in the same millisecond
+    following_error: NDArray[np.float64]  # of each joint, as LinuxCNC sees it
+    pending: NDArray[np.bool_]  # the pin of the component
+    ok: NDArray[np.bool_]  # the pin of the component
+    cycles: NDArray[np.float64]  # that the component took the millisecond before, of the processor's counter
+    said: dict[str, Any]  # errors that an operator saw; what `halcmd show` said at the end of thread and parameters
 
 
 def as_user() -> list[str]:
@@ -58,20 +48,9 @@ def run(
     hal: dict[str, str] | None = None,
     **job: Any,
 ) -> Recording:
-    """The example of the component, run with a program by operate.py.
+    """The example of the component, run with a program by operate.py, which says what else is in a job.
 
-    Args:
-        user: of `as_user`.
-        program: to run.
-        ini: words to replace in the INI file.
-        hal: words to replace in the HAL file.
-        job: see operate.py.
-
-    Returns:
-        What was recorded.
-
-    Raises:
-        RuntimeError: LinuxCNC did not do it, with what it said.
+    `ini`, `hal`: words to replace in these files.
     """
     with tempfile.TemporaryDirectory(prefix="linuxcnc-", ignore_cleanup_errors=True) as place:
         folder = Path(place)
@@ -132,11 +111,7 @@ def _read(file: Path, said: dict[str, Any]) -> Recording:
 
 
 def longest_cycles(said: dict[str, Any]) -> tuple[int, int]:
-    """Longest time of the servo thread and of the component in cycles of the processor's counter, by `halcmd show`.
-
-    Raises:
-        RuntimeError: halcmd did not show them.
-    """
+    """Longest time of the servo thread and of the component in cycles of the processor's counter, by `halcmd show`."""
     thread = re.search(r"servo-thread\s*\(\s*\d+,\s*(\d+)", said["thread"])
     component = re.search(r"(\d+)\s+shapegcode-shaper\.0\.tmax\b", said["parameters"])
     if thread is None or component is None:

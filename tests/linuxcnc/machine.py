@@ -24,9 +24,9 @@ def contour_program(place: Path) -> Path:
     return file
 
 
-def both_modes(zeros: int = 1) -> analysis.Array:
-    """Taps of ZV (two: ZVD) for both modes in series."""
-    return np.convolve(*(analysis.zv_taps(*mode, zeros=zeros) for mode in MODES))
+def both_modes() -> analysis.Array:
+    """Taps of ZV for both modes in series."""
+    return np.convolve(*(analysis.zv_taps(*mode) for mode in MODES))
 
 
 def table(command: analysis.Array) -> analysis.Array:

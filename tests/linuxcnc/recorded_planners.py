@@ -110,9 +110,13 @@ def machine_of(setup: Setup) -> sg.Machine:
 @cache
 def converted(setup: Setup) -> tuple[sg.Program, sg.Conversion]:
     """The original as FANUC's program, and its conversion."""
-    machine = machine_of(setup)
-    start, stop = STARTS.get(setup.path, "G00X0.Y0.Z0.\n"), recordings.STOP
-    program = sg.Program.from_text(f"G21G90\n{start}{stop}{PATHS[setup.path]}{stop}M30\n", machine)
+    return shaped_on(setup.path, machine_of(setup))
+
+
+def shaped_on(path: str, machine: sg.Machine) -> tuple[sg.Program, sg.Conversion]:
+    """One of the paths, and its conversion on a machine."""
+    start, stop = STARTS.get(path, "G00X0.Y0.Z0.\n"), recordings.STOP
+    program = sg.Program.from_text(f"G21G90\n{start}{stop}{PATHS[path]}{stop}M30\n", machine)
     return program, sg.convert(program, machine, shape_all=True)
 
 
@@ -143,8 +147,9 @@ def last_cut(moves: Sequence[ReadMove]) -> list[ReadMove]:
     return list(moves[dwells[-2] + 1 : dwells[-1]])
 
 
-def figures(cut: Array, path: Array) -> Figures:
+def figures(cut: Array, program: sg.Program) -> Figures:
     """By the tests' own plant."""
+    path = np.asarray(program.regions[0].path.polyline(0.002))
     contour_um, both_ways_um = table_off_path_um(cut, path, MODES)
     x, y, _ = residual_um(cut, MODES, PERIOD_S, still_mm=1e-7)
     moved = np.flatnonzero(np.any(np.diff(cut, axis=0) != 0.0, axis=1))
@@ -163,9 +168,8 @@ def said_of(conversion: sg.Conversion, *, shaped: bool) -> Figures:
 def outcome_of(setup: Setup, cut: Array, *, shaped: bool) -> Outcome:
     """A recording beside what was said."""
     program, conversion = converted(setup)
-    path = np.asarray(program.regions[0].path.polyline(0.002))
     said = said_of(conversion, shaped=shaped)
-    return Outcome(setup, shaped, figures(cut, path), said, conversion.recommendation)
+    return Outcome(setup, shaped, figures(cut, program), said, conversion.recommendation)
 
 
 def missed(original: Outcome, shaped: Outcome) -> list[str]:

@@ -20,21 +20,13 @@ PRIORITY = 80
 
 @dataclass(frozen=True)
 class Unloads:
-    """What was seen of rtapi_app, in the order of the looks.
+    """What was seen of rtapi_app, in the order of the looks."""
 
-    Attributes:
-        processes: its process.
-        resident_kib: its memory.
-        threads: how many it had.
-        said: all that HAL printed.
-        exit_code: of halrun.
-    """
-
-    processes: list[int]
-    resident_kib: list[int]
-    threads: list[int]
-    said: str
-    exit_code: int
+    processes: list[int]  # its process
+    resident_kib: list[int]  # its memory
+    threads: list[int]  # how many it had
+    said: str  # all that HAL printed
+    exit_code: int  # of halrun
 
 
 def session(cycles: int, look: Path) -> str:
@@ -63,11 +55,7 @@ def session(cycles: int, look: Path) -> str:
 
 
 def run(user: list[str], cycles: int) -> Unloads:
-    """So many cycles by halrun, as that user.
-
-    Raises:
-        RuntimeError: the thread could not be given its priority.
-    """
+    """So many cycles by halrun, as that user."""
     with tempfile.TemporaryDirectory(prefix="unload-", ignore_cleanup_errors=True) as place:
         folder = Path(place)
         look = folder / "look.sh"

@@ -10,7 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
+import shapely
 
+from judge.engagement import Stretch
 from shapegcode._core import EngagementTrack, Path, Segment, SegmentKind
 
 Array = npt.NDArray[np.float64]
@@ -44,26 +46,10 @@ def random_program(rng: np.random.Generator, levels: list[float], moves: int) ->
     return Path(segments)
 
 
-def _from_line(places: Array, start: Array, end: Array) -> Array:
-    """Distances of places (n, 2) from a line."""
-    along = end - start
-    squared = float(along @ along)
-    share = np.clip((places - start) @ along / squared, 0.0, 1.0) if squared > 0 else np.zeros(len(places))
-    result: Array = np.linalg.norm(places - start - share[:, None] * along, axis=1)
-    return result
-
-
-def _from_arc(places: Array, segment: Segment, share: float) -> Array:
-    """Distances of places (n, 2) from the first part of an arc, by the angle about its centre."""
-    centre = segment.centre_mm[:2]
-    arm = segment.start_mm[:2] - centre
-    sweep = segment.sweep_rad * share
-    sense = np.sign(segment.sweep_rad)
-    turned = np.mod(sense * (np.arctan2(*(places - centre).T[::-1]) - np.arctan2(arm[1], arm[0])), 2 * np.pi)
-    ends = [segment.start_mm[:2], segment.point_at(share * segment.length_mm)[:2]]
-    distance = np.min([np.linalg.norm(places - end, axis=1) for end in ends], axis=0)
-    beside = np.abs(np.linalg.norm(places - centre, axis=1) - segment.radius_mm)
-    return np.where(turned <= abs(sweep), np.minimum(beside, distance), distance)
+def _stretch(segment: Segment, tool_radius_mm: float) -> Stretch:
+    start, end = segment.start_mm, segment.end_mm
+    centre = segment.centre_mm[:2] if segment.kind == SegmentKind.arc else None
+    return Stretch(start[:2], end[:2], start[2], end[2], tool_radius_mm, centre, segment.sweep_rad)
 
 
 def section_mm2(path: Path, track: EngagementTrack, sample: int, rings: list[Array], borders: list[float],
@@ -80,11 +66,7 @@ def section_mm2(path: Path, track: EngagementTrack, sample: int, rings: list[Arr
     tip = path[last].point_at(track.s_mm[sample] - begin)[2]
     inside = np.zeros(places, dtype=bool)
     for ring in rings:
-        for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-            spans = (a[1] > rim[:, 1]) != (b[1] > rim[:, 1])
-            with np.errstate(divide="ignore", invalid="ignore"):
-                crossing = a[0] + (rim[:, 1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
-            inside ^= spans & (rim[:, 0] < crossing)
+        inside ^= shapely.contains_xy(shapely.Polygon(ring), rim[:, 0], rim[:, 1])
     area = 0.0
     for bottom, top in pairwise(borders):
         middle = 0.5 * (bottom + top)
@@ -92,15 +74,9 @@ def section_mm2(path: Path, track: EngagementTrack, sample: int, rings: list[Arr
             continue
         left = inside.copy()
         for i in range(last + 1):
-            share = 1.0 if i < last else (track.s_mm[sample] - begin) / path[i].length_mm
-            segment = path[i]
-            from_z, to_z = segment.start_mm[2], segment.point_at(share * segment.length_mm)[2]
-            if min(from_z, to_z) >= middle:
-                continue
-            if segment.kind == SegmentKind.arc:
-                distance = _from_arc(rim, segment, share)
-            else:
-                distance = _from_line(rim, segment.start_mm[:2], segment.point_at(share * segment.length_mm)[:2])
-            left &= distance > tool_radius_mm - 1e-9
+            way = _stretch(path[i], tool_radius_mm)
+            part = way if i < last else way.part(0.0, (track.s_mm[sample] - begin) / path[i].length_mm)
+            if min(part.from_z, part.to_z) < middle:
+                left &= part.distance(rim) > tool_radius_mm - 1e-9
         area += (top - max(bottom, tip)) * tool_radius_mm * np.sum(np.cos(azimuth[left])) * np.pi / places
     return area

@@ -157,13 +157,7 @@ def klipper_text(path: _core.Path) -> str:
 
 
 def table_off_path_um(cut: Vector, path: Vector, modes: Sequence[AxisModes]) -> tuple[float, float]:
-    """Largest distance of the table from the path, and the larger of it and that of the path from where the table was.
-
-    Args:
-        cut: set-points at 1 ms, shape (n, 3), mm.
-        path: points of the programmed path, shape (m, 3), mm.
-        modes: of each axis, behind the set-points.
-    """
+    """Largest distance of the table behind set-points from the path, and the larger of it and that the other way."""
     _, command, table = response(cut, modes, PERIOD_S, rest_s=0.2)
     along_path, along = _travel(path), _travel(command)[::5]
     along *= along_path[-1] / along[-1]
@@ -179,13 +173,9 @@ def _travel(points: Vector) -> Vector:
 
 
 def distance_to_polyline(points: Vector, at: Vector, line: Vector, along: Vector) -> float:
-    """Largest distance of points from the stretch of a polyline about them: a path may cross itself elsewhere.
+    """Largest distance of points, by the travel at which each stands, from the stretch of a polyline about them.
 
-    Args:
-        points: shape (n, 3), mm.
-        at: travel at which each stands, mm.
-        line: vertices, shape (m, 3), mm.
-        along: travel at each vertex, mm.
+    `along`: travel at each vertex. A path may cross itself elsewhere.
     """
     step = np.diff(line, axis=0)
     length = (step**2).sum(axis=1)

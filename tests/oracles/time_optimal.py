@@ -29,7 +29,6 @@ Vector = npt.NDArray[np.float64]
 Function = Callable[[Vector], Vector]
 
 _INSIDE = 1e-7  # share of a piece by which its ends are moved inwards: q''' may jump at a node
-_CONTROL = np.array([_INSIDE, 0.5, 1.0 - _INSIDE])  # of the jerk
 _DENSE = np.array([_INSIDE, 0.25, 0.5, 0.75, 1.0 - _INSIDE])  # of speed and acceleration
 # Lobatto's quadrature: it sees the ends of a piece too, at which b would fall to 0 unseen.
 _QUADRATURE = 0.5 + 0.5 * np.array([-1.0, -math.sqrt(3 / 7), 0.0, math.sqrt(3 / 7), 1.0])

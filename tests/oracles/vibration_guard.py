@@ -26,21 +26,13 @@ LIMIT = 0.05
 
 @dataclass(frozen=True)
 class GuardMode:
-    """A mode of the Vibration Guard.
+    """A mode of the Vibration Guard."""
 
-    Attributes:
-        number: 1 to 4.
-        below: largest negative deviation, a share.
-        above: largest positive deviation.
-        kernel: what it was derived to be.
-        symmetric: whether contours are alike forwards and backwards.
-    """
-
-    number: int
-    below: float
-    above: float
-    kernel: str
-    symmetric: bool = False
+    number: int  # 1 to 4
+    below: float  # largest negative deviation, a share
+    above: float  # largest positive deviation
+    kernel: str  # what it was derived to be
+    symmetric: bool = False  # whether contours are alike forwards and backwards
 
     @property
     def band(self) -> tuple[float, float]:

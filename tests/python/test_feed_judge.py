@@ -166,7 +166,7 @@ def test_the_judge_meets_a_slot_a_half_and_a_wall() -> None:
     for move in moves:
         if move.is_cut:
             layers = layers_of(moves, blocks, 0.5)
-            found.append(material.meet(0, move, 4.0, stations(move, 1.0, 4.0), layers))
+            found.append(material.meet(move, 4.0, stations(move, 1.0, 4.0), layers))
         material.sweep(move, 4.0)
     middle = [next(met for met in run if abs(abs(met.s_mm) - 20.0) < 0.6) for run in found]
     (slot,) = middle[0].arcs

@@ -39,19 +39,12 @@ FILES = {
 
 @dataclass(frozen=True)
 class Entry:
-    """A command and its pictures.
+    """A command and its pictures."""
 
-    Attributes:
-        title: heading.
-        command: as one types it, without the folder of the pictures.
-        shown: what each picture answers, by the name of its file.
-        folder: of the pictures.
-    """
-
-    title: str
-    command: str
-    shown: dict[str, str]
-    folder: str
+    title: str  # heading
+    command: str  # as one types it, without the folder of the pictures
+    shown: dict[str, str]  # what each picture answers, by the name of its file
+    folder: str  # of the pictures
 
 
 ENTRIES = (

@@ -73,28 +73,18 @@ class Stretch:
         share = (height - self.from_z) / (self.to_z - self.from_z)
         return self.part(0.0, share) if self.from_z < height else self.part(share, 1.0)
 
-    def distance(self, places: Array) -> Array:
-        """Of places (n, 2) from the way."""
+    def distance(self, places: Array, share: Array | float = 1.0) -> Array:
+        """Of places (n, 2) from the way; of an arc from its first share (of each place its own)."""
         if self.centre is None:
             along = self.end - self.start
             squared = float(along @ along)
-            share = np.clip((places - self.start) @ along / squared, 0.0, 1.0) if squared > 0 else np.zeros(len(places))
-            return np.asarray(np.linalg.norm(places - self.start - share[:, None] * along, axis=1))
-        arm, off = self.start - self.centre, places - self.centre
-        sense = math.copysign(1.0, self.sweep)
-        turned = np.mod(sense * (np.arctan2(off[:, 1], off[:, 0]) - math.atan2(arm[1], arm[0])), 2.0 * math.pi)
-        ends = np.minimum(np.linalg.norm(places - self.start, axis=1), np.linalg.norm(places - self.end, axis=1))
-        beside = np.abs(np.linalg.norm(off, axis=1) - math.hypot(*arm))
-        return np.where(turned <= abs(self.sweep), np.minimum(beside, ends), ends)
-
-    def distance_of_part(self, places: Array, share: Array) -> Array:
-        """Of places (n, 2), each from its own first share (n,) of an arc."""
-        assert self.centre is not None
+            part = np.clip((places - self.start) @ along / squared, 0.0, 1.0) if squared > 0 else np.zeros(len(places))
+            return np.asarray(np.linalg.norm(places - self.start - part[:, None] * along, axis=1))
         arm, off = self.start - self.centre, places - self.centre
         sense, begin = math.copysign(1.0, self.sweep), math.atan2(arm[1], arm[0])
         turned = np.mod(sense * (np.arctan2(off[:, 1], off[:, 0]) - begin), 2.0 * math.pi)
         angle = begin + share * self.sweep
-        end = self.centre + math.hypot(*arm) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        end = self.centre + math.hypot(*arm) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         ends = np.minimum(np.linalg.norm(places - self.start, axis=1), np.linalg.norm(places - end, axis=1))
         beside = np.abs(np.linalg.norm(off, axis=1) - math.hypot(*arm))
         return np.where(turned <= share * abs(self.sweep), np.minimum(beside, ends), ends)
@@ -124,7 +114,6 @@ class Block:
 class Met:
     """What is met at one place of a move: arcs of (from, to, bottom, top) in rad and mm above the tip."""
 
-    move: int
     s_mm: float  # along the move
     arcs: tuple[tuple[float, float, float, float], ...]
 
@@ -154,12 +143,12 @@ class Material:
                 inside[which] = stretch.distance(places[which]) > reach + TOUCH_MM
         return inside
 
-    def meet(self, index: int, move: Move, tool_radius: float, s_mm: Array, layers: Array) -> list[Met]:
+    def meet(self, move: Move, tool_radius: float, s_mm: Array, layers: Array) -> list[Met]:
         """What the tool meets at distances along a move, which is not yet swept."""
         way = stretch_of(move, tool_radius)
         level = math.hypot(*(way.end - way.start)) if way.centre is None else 1.0
         if level == 0.0:
-            return [Met(index, float(s), ()) for s in s_mm]
+            return [Met(float(s), ()) for s in s_mm]
         length = move.length
         found: list[list[tuple[float, float, float, float]]] = [[] for _ in s_mm]
         shares = s_mm / length
@@ -200,7 +189,7 @@ class Material:
                 if way.centre is not None:  # a straight way never comes back to its front
                     which = np.flatnonzero(inside & (s_mm[of] > TRAIL_MM))
                     share = (s_mm[of[which]] - TRAIL_MM) / move.length
-                    inside[which] = way.distance_of_part(rim[which], share) > tool_radius + TOUCH_MM
+                    inside[which] = way.distance(rim[which], share) > tool_radius + TOUCH_MM
                 return inside
 
             of = np.repeat(here, PLACES)
@@ -222,7 +211,7 @@ class Material:
                 found[station].append(
                     (float(border[k]), float(border[k + 1]), floor - tips[station], float(top - tips[station]))
                 )
-        return [Met(index, float(s), tuple(arcs)) for s, arcs in zip(s_mm, found, strict=True)]
+        return [Met(float(s), tuple(arcs)) for s, arcs in zip(s_mm, found, strict=True)]
 
     def sweep(self, move: Move, tool_radius: float) -> None:
         """Take away what a move passes."""

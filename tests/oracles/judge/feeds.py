@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ import numpy.typing as npt
 
 from .cutting import Arcs, Cut, EndMill, Figures
 from .engagement import Block, Material, Met, layers_of, stations
+from .plant import distances_from_polyline, path_polyline
 from .player import BlockEnd, play, starts
 from .records import Interpretation, Move
 
@@ -71,7 +71,7 @@ def engagements(
     by_id: dict[int, list[Met]] = {}
     for move in known(program):
         if move.is_cut and move.length > 0.0:
-            by_id[id(move)] = material.meet(0, move, radius, stations(move, step_mm, radius), layers)
+            by_id[id(move)] = material.meet(move, radius, stations(move, step_mm, radius), layers)
         material.sweep(move, radius)
     out = []
     for moves in runs(program):
@@ -170,26 +170,9 @@ def beside_mm(original: list[Move], emitted: list[Move], per_block: int = 9) -> 
         points = move.points(np.linspace(0.0, 1.0, per_block))
         low = max(int(np.searchsorted(ends, at - 0.5)), 0)
         high = min(int(np.searchsorted(ends, at + move.length + 0.5)), len(original) - 1)
-        nearest = np.min([_from(original[k], points) for k in range(low, high + 1)], axis=0)
-        worst = max(worst, float(nearest.max()))
+        worst = max(worst, float(distances_from_polyline(points, path_polyline(original[low : high + 1])).max()))
         at += move.length
     return worst
-
-
-def _from(move: Move, points: Array) -> Array:
-    """Distance of points from a move."""
-    if move.kind != "arc":
-        squared = float(move.delta @ move.delta)
-        share = np.clip((points - move.start) @ move.delta / squared, 0.0, 1.0)
-        return np.asarray(np.linalg.norm(points - move.start - share[:, None] * move.delta, axis=1))
-    share = np.linspace(0.0, 1.0, max(400, math.ceil(move.length / 0.01)))
-    on = move.points(share)
-    best = np.array([int(np.argmin(np.linalg.norm(on - p, axis=1))) for p in points])
-    out = np.empty(len(points))
-    for i, (p, k) in enumerate(zip(points, best, strict=True)):
-        near = np.linspace(share[max(k - 1, 0)], share[min(k + 1, len(share) - 1)], 201)
-        out[i] = np.linalg.norm(move.points(near) - p, axis=1).min()
-    return out
 
 
 _MOVED = re.compile(r"(?:G0?[123](?![0-9.])|[XYZIJKRF][+-]?[0-9.]+|\s)")

@@ -29,6 +29,7 @@ from .records import (
     MODAL_GROUPS,
     PLANES,
     SCALED_ADDRESSES,
+    WAKE_UP,
     Interpretation,
     JudgeError,
     Kind,
@@ -43,17 +44,7 @@ from .records import (
 def initial_state() -> dict[str, Any]:
     """The modal state a control wakes up in. `drift` is the travel since an axis became unknown."""
     return {
-        "motion": "G00",
-        "plane": "G17",
-        "distance": "G90",
-        "feed_mode": "G94",
-        "units": "G21",
-        "comp": "G40",
-        "length_offset": "G49",
-        "cycle": "G80",
-        "return_level": "G98",
-        "wcs": "G54",
-        "exact_stop": "G64",
+        **WAKE_UP,
         "F": math.nan,
         "position": np.full(3, np.nan),
         "drift": np.zeros(3),
@@ -106,9 +97,9 @@ class _Interpreter:
             self.state["position"][k] = math.nan
             self.state["drift"][k] = 0.0
 
-    def target(self, words: Mapping[str, float], base: Vector | None = None) -> tuple[Vector, Vector]:
+    def target(self, words: Mapping[str, float]) -> tuple[Vector, Vector]:
         """End position and displacement for the axis words given, under G90 or G91."""
-        start = self.state["position"] if base is None else base
+        start = self.state["position"]
         end, delta = start.copy(), np.zeros(3)
         for k, axis in enumerate(AXES):
             if axis in words:

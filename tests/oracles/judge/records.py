@@ -38,13 +38,17 @@ MODAL_GROUPS: dict[str, str] = {
     **dict.fromkeys(("G54", "G55", "G56", "G57", "G58", "G59", "G54.1"), "wcs"),
     **dict.fromkeys(("G61", "G62", "G63", "G64"), "exact_stop"),
 }
+#: The modal state a control wakes up in.
+WAKE_UP = {
+    "motion": "G00", "plane": "G17", "distance": "G90", "feed_mode": "G94", "units": "G21", "comp": "G40",
+    "length_offset": "G49", "cycle": "G80", "return_level": "G98", "wcs": "G54", "exact_stop": "G64",
+}  # fmt: skip
 #: One-shot codes that take the axis words of their block for themselves.
 AXIS_TAKERS = frozenset({"G04", "G10", "G28", "G30", "G52", "G53", "G92", "G92.1"})
 #: Codes that are accepted and change nothing this judge follows.
 INERT = frozenset({"G05", "G05.1", "G08", "G09", "G11", "G15", "G23", "G50", "G50.1", "G64.1", "G69", "G96", "G97"})
 INTEGER_ADDRESSES = frozenset("MSTNODHL")
 SCALED_ADDRESSES = frozenset("XYZIJKRQABCUVW")
-ROTARY_ADDRESSES = "ABCUVW"
 
 _WORD = re.compile(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))")
 _COMMENT = re.compile(r"\(([^()]*)\)")

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ..records import MODAL_GROUPS, canonical_g
+from ..records import MODAL_GROUPS, PLANES, WAKE_UP, canonical_g
 from .items import Item
 from .motion import Motion
 from .offsets import Offsets
@@ -17,14 +17,9 @@ from .transforms import Transform
 from .words import INTEGERS, BlockWords, Word
 
 Vector = npt.NDArray[np.float64]
-PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
 INERT = {"G05", "G05.1", "G08", "G09", "G11", "G22", "G23", "G64.1", "G96", "G97"}
 ONE_SHOT = {"G04", "G10", "G28", "G30", "G52", "G53", "G92", "G27", "G29", "G31"}
 MODES = {"G15", "G16", "G50", "G51", "G50.1", "G51.1", "G68", "G69"}
-WAKE_UP = {
-    "motion": "G00", "plane": "G17", "distance": "G90", "feed_mode": "G94", "units": "G21", "comp": "G40",
-    "length_offset": "G49", "cycle": "G80", "return_level": "G98", "wcs": "G54", "exact_stop": "G64",
-}  # fmt: skip
 
 
 class Controller(Motion, Offsets):

@@ -108,7 +108,7 @@ class Flow:
         elif text.startswith("IF"):
             self.conditional(frame, text)
         elif text.startswith("GOTO"):
-            self.go_to(frame, text, 4)
+            self.go_to(frame, text)
         elif text.startswith(("WHILE", "DO")):
             self.loop(frame, text)
         elif text.startswith("END"):
@@ -142,12 +142,12 @@ class Flow:
                 self.assign(rest[4:])
         elif rest.startswith("GOTO"):
             if holds:
-                self.go_to(frame, rest, 4)
+                self.go_to(frame, rest)
         else:
             raise Alarm(self.line, f"neither THEN nor GOTO in {text!r}", 114)
 
-    def go_to(self, frame: Frame, text: str, at: int) -> None:
-        target = self.expression(text, at)
+    def go_to(self, frame: Frame, text: str) -> None:
+        target = self.expression(text, len("GOTO"))
         n = int(half_away(number(target.expression())))
         if not 1 <= n <= 99999999:
             raise Alarm(self.line, f"GOTO {n}", 128)

@@ -47,10 +47,6 @@ class Transform:
             total = step @ total
         return total
 
-    @property
-    def active(self) -> bool:
-        return bool(self.mirror) or self.scale_centre is not None or self.turn_centre is not None
-
     def forward(self, point: Vector) -> Vector:
         """Programmed → work coordinates; an axis that nothing touches may be unknown (NaN)."""
         return self._apply(self.matrix(), point)
