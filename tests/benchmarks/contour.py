@@ -10,8 +10,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,7 +17,7 @@ import numpy.typing as npt
 import places  # noqa: F401
 from contour_figures import arcs_and_corners
 from scipy.linalg import solveh_banded
-from table import Row, Sample, comparison_table, markdown
+from table import Row, Sample, comparison_table, markdown, timed
 
 import shapegcode as sg
 from acceptance import machine_with
@@ -58,12 +56,6 @@ def _banded(kernel: Vector, rows: int) -> Vector:
     return np.ascontiguousarray(np.repeat(column[:, None], rows, axis=1))
 
 
-def _seconds(task: Callable[[], Any]) -> tuple[float, Any]:
-    start = time.perf_counter()
-    result = task()
-    return time.perf_counter() - start, result
-
-
 def _solver_row(period_s: float, target: str, samples: int, repetitions: int) -> Row:
     taps = _kernel(period_s, target)
     kernel = np.array(taps)
@@ -84,7 +76,7 @@ def _solver_row(period_s: float, target: str, samples: int, repetitions: int) ->
     rates: tuple[list[float], list[float]] = ([], [])
     for _ in range(repetitions):
         for rate, task in zip(rates, (ours, theirs), strict=True):
-            rate.append(samples / _seconds(task)[0] / _MEGA)
+            rate.append(samples / timed(task)[0] / _MEGA)
     what = f"ContourSolver, {period_s * 1e3:g} ms blocks, {target}, {len(kernel)} taps"
     return Row(
         f"contour_{period_s * 1e3:g}_{target}", what, "M samples × axis/s", Sample.of(rates[0]),
@@ -108,7 +100,7 @@ def _region_rows(repetitions: int) -> list[list[str]]:
                 assert piece is not None
                 return len(piece.middle_mm)
 
-            found = [_seconds(shape) for _ in range(repetitions)]
+            found = [timed(shape) for _ in range(repetitions)]
             times = Sample.of([seconds * 1e3 for seconds, _ in found])
             periods = found[0][1]
             per_second = Sample.of([2 * 2 * periods / seconds / _MEGA for seconds, _ in found])

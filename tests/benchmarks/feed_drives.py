@@ -9,12 +9,11 @@ from __future__ import annotations
 import argparse
 import copy
 import time
-from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 import places  # noqa: F401
-from table import Row, Sample, comparison_table, markdown
+from table import Row, Sample, comparison_table, markdown, timed
 
 import feed_drive_reference as reference
 from shapegcode import _core
@@ -45,12 +44,6 @@ def _drive(forward: float = 0.0) -> _core.FeedDriveParameters:
         motor_friction=_core.FrictionParameters(viscous_n_s_per_m=500), modes=[_core.Mode(46, 0.02)],
         velocity_feed_forward_ratio=forward, acceleration_feed_forward_ratio=forward,
     )  # fmt: skip
-
-
-def _timed(task: Callable[[], Sequence[Vector]]) -> tuple[float, Sequence[Vector]]:
-    start = time.process_time()  # one thread each; other processes then count less
-    result = task()
-    return time.process_time() - start, result
 
 
 def feed_drive_tables(samples: int, repetitions: int) -> tuple[list[Row], list[list[str]]]:
@@ -87,7 +80,8 @@ def feed_drive_tables(samples: int, repetitions: int) -> tuple[list[Row], list[l
     errors: dict[str, float] = {}
     for _ in range(repetitions):
         for name, task in tasks.items():
-            seconds, found = _timed(task)
+            # One thread each; other processes then count less.
+            seconds, found = timed(task, time.process_time)
             rates[name].append(samples / seconds * _KILO)
             errors[name] = max(float(np.abs(a - b).max()) for a, b in zip(found, exact, strict=True))
     cvode, fixed, stepwise, whole = (Sample.of(rates[name]) for name in tasks)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 from scipy.linalg import block_diag
-from table import Sample, markdown
+from table import Sample, markdown, timed
 
 import shapegcode as sg
 
@@ -104,9 +103,7 @@ def _beside(runs: dict[str, tuple[Callable[[], Any], int]], repetitions: int) ->
     rates: dict[str, list[float]] = {what: [] for what in runs}
     for _ in range(repetitions):
         for what, (run, rows) in runs.items():
-            started = time.perf_counter()
-            run()
-            rates[what].append(rows / (time.perf_counter() - started) / _MEGA)
+            rates[what].append(rows / timed(run)[0] / _MEGA)
     first = next(iter(runs))
     ours = results[first]
     return [

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from math import radians
 
 import numpy as np
-from table import Sample, markdown
+from table import Sample, markdown, timed
 
 from shapegcode._core import (
     ChipThickness,
@@ -57,12 +57,7 @@ def main() -> None:
 
 
 def _microseconds(work: Callable[[], object], samples: int, repetitions: int) -> Sample:
-    values = []
-    for _ in range(repetitions):
-        start = time.process_time()
-        work()
-        values.append(1e6 * (time.process_time() - start) / samples)
-    return Sample.of(values)
+    return Sample.of([1e6 * timed(work, time.process_time)[0] / samples for _ in range(repetitions)])
 
 
 if __name__ == "__main__":

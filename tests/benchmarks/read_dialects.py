@@ -16,7 +16,7 @@ from pathlib import Path
 
 import places  # noqa: F401
 from nc_gcode_interpreter import nc_to_dataframe
-from table import Sample, markdown
+from table import Sample, markdown, timed
 
 import shapegcode as sg
 from rs274_tool import run_rs274
@@ -55,13 +55,6 @@ def cpu_s() -> float:
     return time.process_time() + sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
 
 
-def taken_s(work: Callable[[], object]) -> float:
-    """CPU time of one run."""
-    begin = cpu_s()
-    work()
-    return cpu_s() - begin
-
-
 def main() -> None:
     """Print the table."""
     machine = sg.Machine.of("vx500")
@@ -76,7 +69,7 @@ def main() -> None:
             ours = partial(read_siemens, text, file="a.mpf", machine=machine)
             cases.append(("Sinumerik", case, ours, partial(nc_to_dataframe, text, iteration_limit=10 * PASSES)))
         for control, case, own_reader, other_reader in cases:
-            pairs = [(taken_s(own_reader), taken_s(other_reader)) for _ in range(REPETITIONS)]
+            pairs = [(timed(own_reader, cpu_s)[0], timed(other_reader, cpu_s)[0]) for _ in range(REPETITIONS)]
             own, other = (Sample.of(column) for column in zip(*pairs, strict=True))
             rows.append([control, case, f"{own.median:.3f}", f"{other.median:.3f}", str(own / other)])
     print(markdown(["control", "program", "read, s", "its interpreter, s", "ratio"], rows))

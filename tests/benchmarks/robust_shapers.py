@@ -10,22 +10,17 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import places  # noqa: F401
-from table import markdown
+from table import markdown, timed
 
 from extra_insensitive import ei_convolved, fine_enough_period_s, random_pairs, worst_over_bands
 from shapegcode.shaping import ModeBand, choose_block_period, least_worst, minimax_robust
 
 _PERIODS_MS = (1, 2, 3, 4, 5)
-
-
-def _seconds(task: Callable[[], object]) -> float:
-    start = time.process_time()
-    task()
-    return time.process_time() - start
 
 
 def _times(name: str, seconds: Sequence[float]) -> list[str]:
@@ -55,17 +50,16 @@ def main() -> int:
         fine_s = fine_enough_period_s(bands)
         for name, values in ratios.items():
             period_s = fine_s if name == "fine enough" else 1e-3 * int(name.split()[0])
-            start = time.process_time()
-            found = least_worst(bands, period_s, float(times_s.max()))
-            min_s.append(time.process_time() - start)
+            spent_s, found = timed(partial(least_worst, bands, period_s, float(times_s.max())), time.process_time)
+            min_s.append(spent_s)
             ours = worst_over_bands(found.shaper.times_s, found.shaper.amplitudes, bands, 2001)
             values.append(ours / theirs)
             if ours > theirs:
                 worse.append(_worse(bands, name, period_s, ours, theirs))
         shortest = minimax_robust(bands, fine_s, vibration_limit=theirs)
         shares.append(shortest.shaper.duration_s / float(times_s.max()))
-        minimax_s.append(_seconds(lambda bands=bands, fine_s=fine_s: minimax_robust(bands, fine_s)))
-        choice_s.append(_seconds(lambda bands=bands: choose_block_period(bands, 0.001, 0.002)))
+        minimax_s.append(timed(partial(minimax_robust, bands, fine_s), time.process_time)[0])
+        choice_s.append(timed(partial(choose_block_period, bands, 0.001, 0.002), time.process_time)[0])
 
     rows = [
         [name, f"{sum(r <= 1.0 for r in values)} of {len(values)}", f"{np.median(values):.2f}", f"{max(values):.2f}"]

@@ -23,7 +23,7 @@ import numpy.typing as npt
 import processes
 import workload
 from places import ROOT
-from table import Row, Sample, comparison_table, markdown
+from table import Row, Sample, comparison_table, markdown, timed
 
 import shapegcode as sg
 from rs274_tool import rs274_command, run_rs274
@@ -101,13 +101,13 @@ def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> 
         print(f"repetition {repetition + 1} of {repetitions}", file=sys.stderr)
         peers.append(processes.launched(*rs274_command(program, folder)))
         conversions.append(processes.convert(program, folder / "shaped.nc"))
-        read_s, read = _timed(lambda: sg.Program.read(program, machine))
+        read_s, read = timed(lambda: sg.Program.read(program, machine))
         reading.append(read_s)
         (region,) = read.regions
         path = region.path
-        look_ahead.append(_timed(lambda path=path: _core.plan_speed(path, limits, tolerance))[0])
+        look_ahead.append(timed(lambda path=path: _core.plan_speed(path, limits, tolerance))[0])
         with _time_inside(_core, "fit_blocks", "write_blocks") as inside:
-            shaping.append(_timed(lambda read=read, region=region: writer.write(read, region, limits, tolerance))[0])
+            shaping.append(timed(lambda read=read, region=region: writer.write(read, region, limits, tolerance))[0])
         emission.append(sum(inside))
         del read, region, path
 
@@ -141,8 +141,8 @@ def _timing_rows(program: Path, repetitions: int) -> list[Row]:
         model.motion = motion
         closed, full = [], []
         for _ in range(repetitions):
-            closed_s, cycle = _timed(lambda model=model: _core.time_program(read, model))
-            full_s, interpolated = _timed(lambda model=model: _core.interpolate_program(read, model))
+            closed_s, cycle = timed(lambda model=model: _core.time_program(read, model))
+            full_s, interpolated = timed(lambda model=model: _core.interpolate_program(read, model))
             np.testing.assert_allclose(cycle.total_s, interpolated.total_s, rtol=0.005)
             closed.append(closed_s)
             full.append(full_s)
@@ -180,9 +180,9 @@ def _filter_rows() -> list[Row]:
 
         seconds: dict[str, list[float]] = {"fir": [], "convolve": [], "copy": []}
         for _ in range(_FIR_REPETITIONS):
-            seconds["fir"].append(_timed(lambda samples=samples: fir.apply(samples))[0])
-            seconds["convolve"].append(_timed(convolve)[0])
-            seconds["copy"].append(_timed(copy)[0])
+            seconds["fir"].append(timed(lambda samples=samples: fir.apply(samples))[0])
+            seconds["convolve"].append(timed(convolve)[0])
+            seconds["copy"].append(timed(copy)[0])
         rates = {
             name: Sample.of([_FIR_SAMPLES / s / _MEGA for s in values[1:]]) for name, values in seconds.items()
         }  # the first call pays for fresh memory
@@ -216,12 +216,6 @@ def _step_table(steps: dict[str, dict[str, int]]) -> str:
     return markdown(["one step(), ns", "steps × passes", *columns], rows)
 
 
-def _timed(action: Callable[[], Any]) -> tuple[float, Any]:
-    begin = time.perf_counter()
-    result = action()
-    return time.perf_counter() - begin, result
-
-
 @contextmanager
 def _time_inside(module: Any, *names: str) -> Iterator[list[float]]:
     """Collect the seconds spent in functions of a module while something else calls them."""
@@ -229,7 +223,7 @@ def _time_inside(module: Any, *names: str) -> Iterator[list[float]]:
 
     def watched(function: Callable[..., Any]) -> Callable[..., Any]:
         def call(*args: Any, **kwargs: Any) -> Any:
-            seconds, result = _timed(lambda: function(*args, **kwargs))
+            seconds, result = timed(lambda: function(*args, **kwargs))
             spent.append(seconds)
             return result
 

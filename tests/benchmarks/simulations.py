@@ -15,6 +15,7 @@ from unittest import mock
 import processes
 import workload
 from places import GOLDEN
+from table import timed
 
 import shapegcode as sg
 from shapegcode import _core, cli
@@ -53,9 +54,8 @@ def main() -> int:
     def least(what: str, action: Callable[[], Any]) -> Any:
         spent = []
         for _ in range(arguments.repetitions):
-            begin = time.thread_time()
-            result = action()
-            spent.append(time.thread_time() - begin)
+            seconds, result = timed(action, time.thread_time)
+            spent.append(seconds)
         print(f"{what:<42} {min(spent) * 1e3:8.1f} ms", flush=True)
         return result
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -75,6 +76,13 @@ class Row:
             "at_most": self.at_most,
             "met": self.met,
         }
+
+
+def timed(action: Callable[[], Any], clock: Callable[[], float] = time.perf_counter) -> tuple[float, Any]:
+    """How long it takes, and its result."""
+    begin = clock()
+    result = action()
+    return clock() - begin, result
 
 
 def comparison_table(rows: Sequence[Row]) -> str:
