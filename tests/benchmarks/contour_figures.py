@@ -85,9 +85,9 @@ def paper_text() -> str:
 
 
 @functools.cache
-def paper(target: str, block_period_s: float = 0.005, rule: str = "ceil", tolerance_um: float = 50.0) -> Figures:
+def paper(target: str, block_period_s: float = 0.005, rule: str = "ceil") -> Figures:
     """Paper 000's path at 200 mm/s with 99 % on the arc, emitted with a target."""
-    keys = {"shaping.contour": target, "controller.block_time_s": block_period_s, "tolerance.contour_um": tolerance_um}
+    keys = {"shaping.contour": target, "controller.block_time_s": block_period_s, "tolerance.contour_um": 50.0}
     judged = convert(paper_text(), machine_with(keys), arc_feed_ratio=ARC_FEED_RATIO, block_period_s=block_period_s)
     *_, (programmed, blocks, _) = judged.regions()
     return judge(judged, blocks, programmed, block_period_s, rule)
@@ -137,20 +137,13 @@ def arcs_and_corners(feed_mm_per_min: float = 9000.0) -> str:
         x, y = round(x, 3), round(y, 3)
 
     line(40.0)
-    arc(1.5, 90.0)
-    line(40.0)
-    arc(4.0, -90.0)
-    line(40.0)
-    heading += math.radians(90.0)
-    line(40.0)
-    arc(10.0, 90.0)
-    line(40.0)
-    heading -= math.radians(45.0)
-    line(40.0)
-    arc(25.0, -90.0)
-    line(40.0)
-    heading += math.radians(20.0)
-    line(40.0)
+    turns = ((1.5, 90.0), (4.0, -90.0), (0.0, 90.0), (10.0, 90.0), (0.0, -45.0), (25.0, -90.0), (0.0, 20.0))
+    for radius, degrees in turns:
+        if radius > 0.0:
+            arc(radius, degrees)
+        else:
+            heading += math.radians(degrees)
+        line(40.0)
     heading += math.radians(135.0)
     line(60.0)
     return "\n".join([*lines, "M30", "%", ""])

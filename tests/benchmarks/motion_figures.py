@@ -101,6 +101,11 @@ class Figures:
     jerk: float
     off_mm: float = math.nan
 
+    @property
+    def shares(self) -> list[float]:
+        """Of the limits."""
+        return [self.speed, self.acceleration, self.jerk]
+
 
 def figures(points: Array, limits: Limits, route: Route | None = None, period_s: float = PERIOD_S) -> Figures:
     """Finite differences of set-points that begin and end at rest; how far they leave the path."""

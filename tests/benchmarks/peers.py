@@ -92,9 +92,7 @@ class Peers:
 def row(what: str, who: str, found: Figures, *more: str) -> list[str]:
     """A line of a table about a motion."""
     off = "" if np.isnan(found.off_mm) else f"{1e3 * found.off_mm:.1f}"
-    shares = [
-        f"{share:.3f}" if share < 10.0 else f"{share:.0f}" for share in (found.speed, found.acceleration, found.jerk)
-    ]
+    shares = [f"{share:.3f}" if share < 10.0 else f"{share:.0f}" for share in found.shares]
     return [what, who, f"{found.time_s:.3f}", *shares, off, *more]
 
 
@@ -123,12 +121,12 @@ def single_moves(driver: Path, peers: Peers, folder: Path, passes: int) -> tuple
                 lines.append(row(name, who, found, *times))
         points, told = ours(driver, route, limits, folder / "ours", tolerance=0.05, passes=passes)
         found = figures(points, limits, route)
-        kept += [found.speed, found.acceleration, found.jerk]
+        kept += found.shares
         times = (f"{told['push_us']:.1f}", f"{told['step_us']:.2f}", f"{told['longest_step_us']:.1f}")
         lines.append(row(name, "shapegcode online", found, *times))
         points, told = ours(driver, route, limits, folder / "ours", "plan", tolerance=0.05, passes=passes)
         found = figures(points, limits, route)
-        kept += [found.speed, found.acceleration, found.jerk]
+        kept += found.shares
         lines.append(row(name, "shapegcode, time-optimal", found, f"{told['plan_us']:.0f}", "", ""))
     return markdown([*HEAD, "calculation or push, us", "set-point, us", "longest, us"], lines), kept
 
@@ -174,15 +172,11 @@ def small_arcs(driver: Path, peers: Peers, folder: Path) -> tuple[str, list[floa
     for points, _ in klipper(peers, folder, {"arcs": route}, settings).values():
         lines.append(row("small arcs", "Klipper's host, chords of 0.1 mm", figures(points, LINUXCNC, route)))
     for tolerance_mm, limits in ((0.1, LINUXCNC), (0.01, LINUXCNC), (0.1, JERKY)):
-        points, _ = ours(driver, route, limits, folder / "ours", tolerance=tolerance_mm)
-        own = figures(points, limits)
-        kept += [own.speed, own.acceleration, own.jerk]
         more = f", tolerance {tolerance_mm} mm" + (", as much jerk as LinuxCNC" if limits is JERKY else "")
-        lines.append(row("small arcs", f"shapegcode online{more}", figures(points, LINUXCNC, route)))
-        points, _ = ours(driver, route, limits, folder / "ours", "plan", tolerance=tolerance_mm)
-        own = figures(points, limits)
-        kept += [own.speed, own.acceleration, own.jerk]
-        lines.append(row("small arcs", f"shapegcode, time-optimal{more}", figures(points, LINUXCNC, route)))
+        for who, how in (("shapegcode online", "play"), ("shapegcode, time-optimal", "plan")):
+            points, _ = ours(driver, route, limits, folder / "ours", how, tolerance=tolerance_mm)
+            kept += figures(points, limits).shares
+            lines.append(row("small arcs", f"{who}{more}", figures(points, LINUXCNC, route)))
     return markdown(HEAD, lines), kept
 
 
@@ -217,12 +211,12 @@ def programs(driver: Path, peers: Peers, folder: Path) -> tuple[str, list[float]
             lines.append([name, "Klipper's host: not available as a package", *[""] * 6])
         points, told = ours(driver, route, MILL, folder / "ours", tolerance=0.05)
         found = figures(points, MILL, route)
-        kept += [found.speed, found.acceleration, found.jerk]
+        kept += found.shares
         spent_us = told["step_us"] * told["steps"] / len(route.pieces)
         lines.append(row(name, "shapegcode online", found, f"{spent_us:.1f}"))
         points, told = ours(driver, route, MILL, folder / "ours", "plan", tolerance=0.05)
         found = figures(points, MILL, route)
-        kept += [found.speed, found.acceleration, found.jerk]
+        kept += found.shares
         lines.append(row(name, "shapegcode, time-optimal", found, f"{told['plan_us']:.1f}"))
     return markdown([*HEAD, "us per move"], lines), kept
 
@@ -253,7 +247,7 @@ def throughput(driver: Path, folder: Path) -> tuple[str, list[float]]:
             ):
                 points, told = ours(driver, route, limits, folder / "ours", tolerance=0.05, window=window)
                 found = figures(points, limits, route)
-                kept += [found.speed, found.acceleration, found.jerk]
+                kept += found.shares
                 step_us, longest_us = told["step_us"], told["longest_step_us"]
                 spent_us = step_us * told["steps"] / len(route.pieces)
                 lines.append(
@@ -312,7 +306,7 @@ def shortest_time(driver: Path, folder: Path, count: int) -> tuple[str, list[flo
         route, limits, tolerance_mm = random_route(seed)
         points, _ = ours(driver, route, limits, folder / "ours", "plan", tolerance=tolerance_mm)
         found = figures(points, limits, route)
-        kept += [found.speed, found.acceleration, found.jerk, found.off_mm / tolerance_mm]
+        kept += [*found.shares, found.off_mm / tolerance_mm]
         corners = np.vstack([route.start, [piece.end for piece in route.pieces]])
         oracle = time_optimal(
             rounded_polyline(corners, half_widths(route, tolerance_mm)),

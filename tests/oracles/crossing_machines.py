@@ -1,4 +1,4 @@
-"""Machines whose modes move other axes than those which excite them, and what their tools then do, by SciPy."""
+"""Machines whose modes move other axes than those which excite them, and their tools by the judge's plant."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lsim, lti
 
 import shapegcode as sg
+from judge import Mode
 from judge.draws import Draw, draw
+from judge.plant import relative_motion
 
 Vector = npt.NDArray[np.float64]
 PERIOD_S = 1e-3
@@ -23,14 +24,12 @@ ZIGZAG = f"%\nO1\nG90 G21 G17 G40 G54\nG0 X0 Y0 Z5\nG1 Z-1 F500\n{_STEPS}G3 X16 
 
 
 def deflection(command: Vector, frequency_hz: float, damping_ratio: float) -> Vector:
-    """Of a mode that is excited by the acceleration of a command which is linear between samples, by SciPy."""
-    omega = 2.0 * np.pi * frequency_hz
-    system = lti([-1.0, 0.0, 0.0], [1.0, 2.0 * damping_ratio * omega, omega**2])
-    return np.asarray(lsim(system, command - command[0], np.arange(len(command)) * PERIOD_S)[1])
+    """Of a mode that is excited by the acceleration of a command which is linear between samples."""
+    return relative_motion(command, Mode(frequency_hz, damping_ratio), PERIOD_S)
 
 
 def largest_z_um(text: str, machine: sg.Machine) -> float:
-    """Largest distance of the tool from its depth in the cut at Z -1, by SciPy behind the command."""
+    """Largest distance of the tool from its depth in the cut at Z -1, by that plant behind the command."""
     run = max(sg.simulate(sg.Program.from_text(text, machine), machine).regions, key=lambda region: region.time_s)
     command = run.command_mm
     mode = machine.axes.y.modes[0]

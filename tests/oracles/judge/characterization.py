@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -70,25 +70,19 @@ def fill_in_times(
 ) -> None:
     """Play what is asked for in RESULTS.toml and put the times in."""
 
-    def value(text: str, override: float) -> str:
-        time = stopwatch_s(text, hidden, rng, override=override, resolution_s=resolution_s, jitter_s=jitter_s)
-        return f"times_s = [{time:.6g}]"
-
-    new = {"reaction_s = 0.1": f"reaction_s = {jitter_s}", "resolution_s = 0.1": f"resolution_s = {resolution_s}"}
-    _edit(folder, "times_s = []", value, new)
-
-
-def _edit(folder: Path, marker: str, value: Callable[[str, float], str], also: dict[str, str]) -> None:
-    program, override, out = "", 1.0, []
     results = (folder / "RESULTS.toml").read_text()
-    for old, new in also.items():
-        results = results.replace(old, new)
-    for line in results.splitlines():
+    results = results.replace("reaction_s = 0.1", f"reaction_s = {jitter_s}")
+    program, override, out = "", 1.0, []
+    for line in results.replace("resolution_s = 0.1", f"resolution_s = {resolution_s}").splitlines():
         if line.startswith("program = "):
             program = (folder / line.split('"')[1]).read_text()
         if line.startswith("override_percent = "):
             override = int(line.split("=")[1]) / 100.0
-        out.append(line.replace(marker, value(program, override)) if marker in line else line)
+        if "times_s = []" in line:
+            time = stopwatch_s(program, hidden, rng, override=override, resolution_s=resolution_s, jitter_s=jitter_s)
+            out.append(line.replace("times_s = []", f"times_s = [{time:.6g}]"))
+        else:
+            out.append(line)
     (folder / "RESULTS.toml").write_text("\n".join(out) + "\n")
 
 
@@ -106,9 +100,7 @@ def fill_in_logs(
             write_csv(folder / f"{name}.csv", servo_log(program, hidden, rng, hold=hold, actual=actual))
 
 
-def controllers(seeds: Sequence[int]) -> list[tuple[int, Hidden, np.random.Generator]]:
-    out = []
+def controllers(seeds: Sequence[int]) -> Iterator[tuple[int, Hidden, np.random.Generator]]:
     for seed in seeds:
         rng = np.random.default_rng(seed)
-        out.append((seed, draw(rng), rng))
-    return out
+        yield seed, draw(rng), rng

@@ -1,8 +1,9 @@
 """A controller with hidden facts that plays test programs: servo logs and stopwatch times to hold a fit against.
 
-NumPy only; shares no code with the package. It reads the written text, plays it as paper 004 describes (blocks of whole
-interpolation periods or with the rest carried on, velocity profiles smoothed after interpolation, rapids with constant
-acceleration, in-position waits), samples the command at its interpolation ticks and holds it between them.
+NumPy and SciPy only; shares no code with the package. It reads the written text, plays it as paper 004 describes
+(blocks of whole interpolation periods or with the rest carried on, velocity profiles smoothed after interpolation,
+rapids with constant acceleration, in-position waits), samples the command at its interpolation ticks and holds it
+between them.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import PPoly
 
 Array = npt.NDArray[np.float64]
 _DUST = 1e-6
@@ -92,34 +94,22 @@ class _Curve:
     """A piecewise linear function with its first two antiderivatives."""
 
     def __init__(self, times: Array, values: Array) -> None:
-        far = times[-1] + 1e3
-        self.t = np.concatenate([[times[0] - 1e3], times, [far]])
-        self.q = np.concatenate([[values[0]], values, [values[-1]]])
+        self.t = np.concatenate([[times[0] - 1e3], times, [times[-1] + 1e3]])
+        q = np.concatenate([[values[0]], values, [values[-1]]])
         step = np.diff(self.t)
-        self.slope = np.diff(self.q) / np.where(step > 0, step, 1.0)
-        one = np.cumsum(step * (self.q[1:] + self.q[:-1]) / 2)
-        self.one = np.concatenate([[0.0], one])
-        two = np.cumsum(self.one[:-1] * step + self.q[:-1] * step**2 / 2 + self.slope * step**3 / 6)
-        self.two = np.concatenate([[0.0], two])
-
-    def integral(self, times: Array, order: int) -> Array:
-        i = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.slope) - 1)
-        d, q, s = times - self.t[i], self.q[i], self.slope[i]
-        if order == 0:
-            return np.asarray(q + s * d)
-        if order == 1:
-            return np.asarray(self.one[i] + q * d + s * d**2 / 2)
-        return np.asarray(self.two[i] + self.one[i] * d + q * d**2 / 2 + s * d**3 / 6)
+        self.slope = np.diff(q) / np.where(step > 0, step, 1.0)
+        self.value = PPoly(np.array([self.slope, q[:-1]]), self.t)
+        self.one, self.two = self.value.antiderivative(), self.value.antiderivative(2)
 
     def averaged(self, times: Array, a: float, b: float) -> Array:
         """Moving averages of length a and b in series."""
         if a == 0.0 and b == 0.0:
-            return self.integral(times, 0)
+            return np.asarray(self.value(times))
         if a == 0.0 or b == 0.0:
             c = a + b
-            return (self.integral(times, 1) - self.integral(times - c, 1)) / c
-        second = [self.integral(times - lag, 2) for lag in (0.0, a, b, a + b)]
-        return (second[0] - second[1] - second[2] + second[3]) / (a * b)
+            return np.asarray((self.one(times) - self.one(times - c)) / c)
+        second = [self.two(times - lag) for lag in (0.0, a, b, a + b)]
+        return np.asarray((second[0] - second[1] - second[2] + second[3]) / (a * b))
 
     def lagged(self, times: Array, tau: float) -> Array:
         """First-order lag."""
@@ -128,7 +118,7 @@ class _Curve:
             gap[k + 1] = -slope * tau + (gap[k] + slope * tau) * math.exp(-step / tau)
         i = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.slope) - 1)
         s, d = self.slope[i], times - self.t[i]
-        return np.asarray(self.integral(times, 0) - s * tau + (gap[i] + s * tau) * np.exp(-d / tau))
+        return np.asarray(self.value(times) - s * tau + (gap[i] + s * tau) * np.exp(-d / tau))
 
 
 def _run_knots(run: list[Block], hidden: Hidden, override: float) -> tuple[Array, Array, int]:

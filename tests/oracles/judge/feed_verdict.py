@@ -55,11 +55,6 @@ class Verdict:
     gain: float = math.nan  # time of the constant feed over that of the schedule, both in material
 
 
-def read(case: Case, text: str) -> Interpretation:
-    """A program of a case."""
-    return interpret(text)
-
-
 def real(run: Run, emitted: list[Move], case: Case, control: Control) -> Travel:
     """How the control runs the blocks."""
     if not control.after_interpolation:
@@ -82,7 +77,7 @@ def judge(
     """Everything of one emitted program."""
     verdict = Verdict()
     say = verdict.findings.append
-    emitted = read(case, text)
+    emitted = interpret(text)
     new = runs(emitted)
     if len(new) != len(met):
         say(f"{len(met)} runs before, {len(new)} after")
@@ -169,7 +164,7 @@ def _sums(parts: list[tuple[Array, dict[str, Array], Array]]) -> dict[str, float
 
 def _modal(case: Case, emitted: Interpretation, say: Any) -> None:
     """Modal state at the end, and position at each stop."""
-    old, new = read(case, case.program), emitted
+    old, new = interpret(case.program), emitted
     for name, value in old.modal.items():
         if not np.array_equal(np.asarray(value), np.asarray(new.modal[name])) and not (
             isinstance(value, np.ndarray) and np.allclose(value, new.modal[name], atol=1e-9, equal_nan=True)

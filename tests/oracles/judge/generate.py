@@ -12,26 +12,11 @@ from dataclasses import dataclass, field
 
 from hypothesis import strategies as st
 
-from .interpreter import INCH_MM, PLANES
+from .records import AXES, CENTRE_WORDS, INCH_MM, PLANES
 
-AXES = "XYZ"
-CENTRES = "IJK"
 #: Directions (a, b) with small whole numbers: a line along one has an exact normal, so tangent arcs are
 #: exact.
-DIRECTIONS = (
-    (1, 0),
-    (0, 1),
-    (-1, 0),
-    (0, -1),
-    (3, 4),
-    (-4, 3),
-    (4, -3),
-    (5, 12),
-    (-12, -5),
-    (1, 1),
-    (2, -1),
-    (-1, 2),
-)
+DIRECTIONS = ((1, 0), (0, 1), (-1, 0), (0, -1), (3, 4), (-4, 3), (4, -3), (5, 12), (-12, -5), (1, 1), (2, -1), (-1, 2))
 LARGEST_END_ERROR_MM = 0.95e-3
 REACH_MM = 200.0
 COMMENTS = ("FINISH WALL", "ROUGH 2", "TOOL D10 R1.5", "POCKET-3", "PASS 1", "N10 X5. NOT A WORD")
@@ -127,22 +112,17 @@ def _elements(draw: st.DrawFn, writer: _Writer, size: int) -> None:
         if draw(st.integers(0, 15)) == 0:
             w.put(f"({draw(st.sampled_from(COMMENTS))})")
         to = list(w.at)
-        if kind == "line":
-            heading = draw(st.sampled_from(DIRECTIONS))
-            length = draw(st.integers(1, round(4.0 / w.increment_mm)))
-            to[a] += heading[0] * length
-            to[b] += heading[1] * length
-            if max(abs(v) for v in to) < limit:
-                w.put(w.motion_word("G01"), *w.axis_words(to), *tail)
+        if kind in ("line", "free"):
+            heading = draw(st.sampled_from(DIRECTIONS)) if kind == "line" else None
+            if heading:
+                length = draw(st.integers(1, round(4.0 / w.increment_mm)))
+                to[a] += heading[0] * length
+                to[b] += heading[1] * length
             else:
-                w.feed = math.nan if tail else w.feed
-            continue
-        if kind == "free":
-            heading = None
-            for k in range(3):
-                to[k] += draw(st.integers(-20000, 20000)) * draw(st.sampled_from((0, 1)))
-            if to == w.at:
-                to[a] += 1
+                for k in range(3):
+                    to[k] += draw(st.integers(-20000, 20000)) * draw(st.sampled_from((0, 1)))
+                if to == w.at:
+                    to[a] += 1
             if max(abs(v) for v in to) < limit:
                 w.put(w.motion_word("G01"), *w.axis_words(to), *tail)
             else:
@@ -191,7 +171,7 @@ def _arc_words(
         to[a], to[b] = end
     if kind == "helix":
         to[normal] += draw(st.integers(-5000, 5000))
-    words = [CENTRES[a] + w.number(ca), CENTRES[b] + w.number(cb)]
+    words = [CENTRE_WORDS[a] + w.number(ca), CENTRE_WORDS[b] + w.number(cb)]
     if ca == 0 or cb == 0:
         words = [t for t, v in zip(words, (ca, cb), strict=True) if v or draw(st.booleans())]
     return sorted(words)
