@@ -10,7 +10,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,6 @@ from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping import design, machine_bands
 from shapegcode.shaping.grid import Grid, choose_grid, make_grid
-from shapegcode.verdict.figures import Placed
 
 PROGRAMS = {
     "the path of paper 000, 200 mm/s": ROOT / "python" / "shapegcode" / "data" / "paper_path.nc",
@@ -118,29 +117,26 @@ def rounded_minimal(machine: sg.Machine) -> Grid:
     return make_grid(period_s, _core.Shaper(times_s, ideal.amplitudes.tolist()), family="minimal")
 
 
-def _with_grid(way: Way, machine: sg.Machine) -> AbstractContextManager[Any]:
-    if way.family != "minimal":
-        return nullcontext()
-    # The conversion has no design that ignores its grid; here it is given one.
-    grid = rounded_minimal(machine)
-    return mock.patch.object(converter, "choose_grid", lambda *_, **__: grid)
-
-
 def convert(program: Path, way: Way, contour_um: float, finer: int = 0) -> Outcome:
     """Convert a program one way, and measure the emitted text."""
     machine = machine_of(way, contour_um, finer)
     try:
-        with _with_grid(way, machine):
+        # The conversion has no design that ignores its grid; here it is given one.
+        grid = rounded_minimal(machine) if way.family == "minimal" else None
+        with mock.patch.object(converter, "choose_grid", lambda *_, **__: grid) if grid else nullcontext():
             conversion = sg.convert(program, machine, shape_all=True)
     except _core.DesignError as error:
         return Outcome(way.name, refusal=str(error))
     report = conversion.to_dict()
     emitted = conversion.emitted.core
-    places = [(emitted.cutting_path(place.first_line, place.last_line), place) for place in conversion.placed]
+    places = [
+        (emitted.cutting_path(place.first_line, place.last_line), place.region.path) for place in conversion.placed
+    ]
 
     def play(other: sg.Machine) -> Iterator[_core.SimulationFigures]:
-        for blocks, place in places:
-            yield _residual_of(blocks, place, other)
+        model = MachineModel(other)
+        for blocks, path in places:
+            yield model.simulate_emitted(blocks, path, contour=False, last_seconds=model.vibration_memory_s)
 
     return Outcome(
         way.name,
@@ -171,11 +167,6 @@ def as_programmed(program: Path) -> Outcome:
         cutting_s=sum(run.duration_s for run in runs),
         size_bytes=read.core.size,
     )
-
-
-def _residual_of(blocks: _core.Path, place: Placed, machine: sg.Machine) -> _core.SimulationFigures:
-    model = MachineModel(machine)
-    return model.simulate_emitted(blocks, place.region.path, contour=False, last_seconds=model.vibration_memory_s)
 
 
 def _over_bands(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapegcode._core import MinimalShapers, Mode, convolved_zv, minimal_shapers
+from shapegcode._core import Mode, convolved_zv, minimal_shapers
 
 SPANS = (1.0, 1.5, 2.0)
 """Durations of the convolved ZV that are searched, one after the other until one holds a shaper."""
@@ -60,17 +60,13 @@ def solve(modes: Sequence[Mode], max_boxes: int = 400_000, max_abs_sum: float = 
         tuple(modes),
         len(result.shapers),
         shortest_s,
-        _first_non_negative_s(result),
+        next((shaper.duration_s for shaper in result.shapers if not shaper.has_negative), float("nan")),
         convolved_s,
         max((shaper.residual_ratio(mode) for shaper in result.shapers for mode in modes), default=0.0),
         result.complete,
         bool(result.shapers) and result.complete_up_to_s >= shortest_s,
         seconds,
     )
-
-
-def _first_non_negative_s(result: MinimalShapers) -> float:
-    return next((shaper.duration_s for shaper in result.shapers if not shaper.has_negative), float("nan"))
 
 
 def _print_figures(results: Sequence[Solved]) -> None:

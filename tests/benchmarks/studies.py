@@ -17,7 +17,8 @@ from places import ROOT, TESTS
 from table import markdown
 
 import shapegcode as sg
-from judge import Mode, contour_error_um, interpret, play, residual_um, response
+from acceptance import under_modes
+from judge import Mode
 from shapegcode.demos.path import path_program
 from shapegcode.studies.replay import DEFAULT_MEASURES, SHARE, Replay
 from shapegcode.studies.study_file import load_study
@@ -91,22 +92,13 @@ def _fifty(machine: sg.Machine, options: dict[str, object]) -> list[list[str]]:
     program = path_program(200, machine)
     found = sg.study(program, machine, **{**options, "n": _FIFTY, "indices": False})  # type: ignore[arg-type]
     conversion = sg.convert(program, machine)
-    (place,) = conversion.placed
-    emitted = interpret(conversion.text.decode()).lines[place.first_line - 1 : place.last_line]
-    first, last = place.original_lines
-    path = [move for line in interpret(program.text.decode()).lines[first - 1 : last] for move in line.moves]
-    tick = machine.controller.interpolation_period_s
-    command = play([move for line in emitted for move in line.moves if move.length > 0.0], period_s=tick)
     columns = [
         found.draws[f"axes.{axis}.modes.1.{name}"] for axis in "xy" for name in ("frequency_hz", "damping_ratio")
     ]
-    brute: dict[str, list[float]] = {"residual_um": [], "contour_um": []}
-    for x_hz, x_damping, y_hz, y_damping in zip(*columns, strict=True):
-        modes = [[Mode(x_hz, x_damping)], [Mode(y_hz, y_damping)], []]
-        brute["residual_um"].append(residual_um(command, modes, tick, still_mm=1e-9).max())
-        brute["contour_um"].append(contour_error_um(response(command, modes, tick)[2][::10], path).max_um)
+    machines = [[[Mode(*draw[:2])], [Mode(*draw[2:])], []] for draw in zip(*columns, strict=True)]
+    brute = under_modes(conversion, program, machine.controller.interpolation_period_s, machines)
     rows = []
-    for name, values in brute.items():
+    for name, values in zip(("residual_um", "contour_um"), brute, strict=True):
         ours, theirs = np.percentile(found.draws[name], _PERCENT), np.percentile(values, _PERCENT)
         rows.append([f"{name}, study", *(f"{each:.3f}" for each in ours)])
         rows.append([f"{name}, one by one", *(f"{each:.3f}" for each in theirs)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -253,3 +253,19 @@ def played_s(judged: Judged, blocks: list[Move], rule: BlockEnd) -> float:
     cuts = [m for m in blocks if m.length > 0.0]
     ticks = max(0, round(judged.machine.controller.shaped_time_constant_s / tick) - 1)
     return float(durations(cuts, period_s=tick, block_end=rule).sum()) + ticks * tick if cuts else 0.0
+
+
+def under_modes(
+    conversion: sg.Conversion, program: sg.Program, tick_s: float, machines: Iterable[list[list[Mode]]]
+) -> tuple[list[float], list[float]]:
+    """Residual vibration and contour error, µm, of the only cut of a conversion under each of several sets of modes."""
+    (place,) = conversion.placed
+    first, last = place.original_lines
+    emitted = interpret(conversion.text.decode()).lines[place.first_line - 1 : place.last_line]
+    path = [move for line in interpret(program.text.decode()).lines[first - 1 : last] for move in line.moves]
+    command = play([move for line in emitted for move in line.moves if move.length > 0.0], period_s=tick_s)
+    residuals, contours = [], []
+    for modes in machines:
+        residuals.append(residual_um(command, modes, tick_s, still_mm=1e-9).max())
+        contours.append(contour_error_um(response(command, modes, tick_s)[2][::10], path).max_um)
+    return residuals, contours

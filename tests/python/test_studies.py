@@ -17,8 +17,9 @@ from scipy import stats
 from scipy.stats import qmc
 
 import shapegcode as sg
+from acceptance import under_modes
 from command import run
-from judge import Mode, contour_error_um, interpret, play, residual_um, response
+from judge import Mode, interpret, play, residual_um
 from shapegcode.cli.machine import file_schema
 from shapegcode.demos.path import path_program
 from shapegcode.errors import ArgumentError, MachineError
@@ -45,21 +46,11 @@ def paper_study() -> sg.MachineStudy:
 
 def test_quantiles_are_those_of_fifty_machines_played_one_by_one() -> None:
     """The text is read, simulated and shaken by code that shares nothing with the package."""
-    conversion = sg.convert(path_program(200, VX500), VX500)
-    (place,) = conversion.placed
-    emitted = interpret(conversion.text.decode()).lines[place.first_line - 1 : place.last_line]
-    written = interpret(path_program(200, VX500).text.decode()).lines
-    cuts = [move for line in emitted for move in line.moves if move.length > 0.0]
-    first, last = place.original_lines
-    path = [move for line in written[first - 1 : last] for move in line.moves]
-    tick = VX500.controller.interpolation_period_s
-    command = play(cuts, period_s=tick)
-    draws = paper_study().draws
-    residuals, contours = [], []
-    for x_hz, y_hz, x_damping in zip(draws[X_HZ], draws[Y_HZ], draws[X_DAMPING], strict=True):
-        modes = [[Mode(x_hz, x_damping)], [Mode(y_hz, 0.02)], []]
-        residuals.append(residual_um(command, modes, tick, still_mm=1e-9).max())
-        contours.append(contour_error_um(response(command, modes, tick)[2][::10], path).max_um)
+    program, draws = path_program(200, VX500), paper_study().draws
+    columns = zip(draws[X_HZ], draws[Y_HZ], draws[X_DAMPING], strict=True)
+    machines = [[[Mode(x_hz, x_damping)], [Mode(y_hz, 0.02)], []] for x_hz, y_hz, x_damping in columns]
+    tick_s = VX500.controller.interpolation_period_s
+    residuals, contours = under_modes(sg.convert(program, VX500), program, tick_s, machines)
     for name, brute in (("residual_um", residuals), ("contour_um", contours)):
         found = paper_study().quantity(name)
         expected = np.percentile(brute, (5, 25, 50, 75, 95, 99))

@@ -327,7 +327,7 @@ class _Interpreter:
             sweep = FULL_TURN
         offset = np.zeros(3)
         offset[a], offset[b] = ca, cb
-        move = Move(
+        return Move(
             "arc",
             self.line,
             start,
@@ -339,9 +339,8 @@ class _Interpreter:
             end_radius=end_radius,
             sweep=-sweep if clockwise else sweep,
             normal_axis=normal,
+            feed=self.block_feed(radius),  # in G93 the F of an arc counts its radius
         )
-        # In G93 the F of an arc counts its radius.
-        return Move(**{**move.__dict__, "feed": self.block_feed(radius)})
 
     def centre_from_words(self, values: Mapping[str, float], a: int, b: int, start: Vector) -> tuple[float, float]:
         given = [CENTRE_WORDS[k] for k in (a, b) if CENTRE_WORDS[k] in values]
