@@ -4,7 +4,7 @@ Run from the root of the repository: ``python tests/benchmarks/identification.py
 4 modes (20 to 400 Hz, at least 10 % apart, damping .5 to 5 %, stiffnesses within a decade), simulated by SciPy on a
 grid 32 times finer, with white noise on response and force. The last rows are of the same structures, one second at
 51.2 kHz with pulses of .8 to 5 ms, all of it and a band of 20 to 450 Hz: what thinning out costs and gains.
-``--responses``: the same structures as frequency responses without time record, by SciPy's closed form.
+``--responses``: the same structures as frequency responses without time record, in closed form.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import places  # noqa: F401
-from scipy.signal import freqs
 from table import markdown
 
+from hard_records import accelerance
 from shapegcode.identification.identify import identify
 from shapegcode.identification.result import Estimate, IdentifiedMode
 from shapegcode.io.record import FrequencyResponse, Quantity
@@ -95,10 +95,7 @@ def response(truth: list[TrueMode], rng: np.random.Generator, quantity: Quantity
     """1199 lines to 600 Hz, or 900 uneven ones, with white noise of an accelerometer, 3 % of the median accelerance."""
     hertz = np.sort(np.exp(rng.uniform(np.log(5.0), np.log(700.0), 900))) if uneven else np.arange(1, 1200) * 0.5
     power = {"displacement": 0, "velocity": 1, "acceleration": 2}[quantity]
-    clean = np.zeros(len(hertz), dtype=np.complex128)
-    for mode in truth:
-        numerator = [1.0 / mode.mass_kg, 0.0, 0.0]
-        clean += freqs(numerator, [1.0, 2.0 * mode.damping_ratio * mode.omega, mode.omega**2], 2.0 * np.pi * hertz)[1]
+    clean = accelerance(tuple(truth), None, 2j * np.pi * hertz)
     level = 0.03 * np.median(np.abs(clean)) / np.sqrt(2.0)
     noisy = clean + level * (rng.standard_normal(len(hertz)) + 1j * rng.standard_normal(len(hertz)))
     return FrequencyResponse("closed form", hertz, noisy * (2j * np.pi * hertz) ** (power - 2), quantity)

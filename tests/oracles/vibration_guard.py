@@ -7,7 +7,7 @@ before, and that mode 4 is symmetrical. No kernel, no duration. The kernels here
 its mirror image are those of whole half periods that have these properties, and the published bands lie within theirs
 if "deviation" is that of the frequency set from the machine's.
 
-The residual is a formula of its own; nothing here comes from the package.
+The residual is the formula of the judge; nothing here comes from the package.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from judge.plant import residual_ratio
 
 FloatArray = NDArray[np.float64]
 
@@ -64,22 +66,13 @@ MODES = (
 )
 
 
-def residual(times: FloatArray, amplitudes: FloatArray, frequency: FloatArray) -> FloatArray:
-    """Vibration after the last impulse over that of one impulse; times in periods of frequency 1."""
-    omega = 2.0 * np.pi * np.atleast_1d(frequency)[:, None]
-    left = np.asarray(times)[-1] - np.asarray(times)
-    turn = omega * math.sqrt(1.0 - DAMPING**2) * left
-    decay = np.asarray(amplitudes) * np.exp(-DAMPING * omega * left)
-    return np.hypot((decay * np.cos(turn)).sum(axis=1), (decay * np.sin(turn)).sum(axis=1))
-
-
 def five_percent_band(times: FloatArray, amplitudes: FloatArray, around: float = 1.0) -> tuple[float, float]:
     """Where the residual stays at most 5 %, from `around` to both sides; up to 4 times the mode."""
     ends = []
     for limit in (0.2, 4.0):
         # a thousandth more than 5 %: a design is proven to a thousandth of its limit
         grid = np.linspace(around, limit, 20_001)
-        over = np.flatnonzero(residual(times, amplitudes, grid) > LIMIT * (1.0 + 1e-6))
+        over = np.flatnonzero(residual_ratio(times, amplitudes, grid, DAMPING) > LIMIT * (1.0 + 1e-6))
         ends.append(float(grid[max(over[0] - 1, 0)]) if len(over) else limit)
     return ends[0], ends[1]
 

@@ -98,6 +98,13 @@ def response(
     return fine * period_s, command, moved
 
 
+def residual_ratio(times: Vector, amplitudes: Vector, frequency: npt.ArrayLike, damping_ratio: float) -> Vector:
+    """Vibration of modes after the last of some impulses over that of one impulse then."""
+    omega = 2.0 * math.pi * np.atleast_1d(frequency)[:, None]
+    turn = (-damping_ratio + 1j * math.sqrt(1.0 - damping_ratio**2)) * omega * (np.max(times) - times)
+    return np.asarray(np.abs((amplitudes * np.exp(turn)).sum(axis=1)))
+
+
 def rest_index(setpoints: Vector, *, still_mm: float = 0.0) -> int:
     """Index of the first set-point after which no axis changes by more than `still_mm` per period."""
     changes = np.flatnonzero((np.abs(np.diff(setpoints, axis=0)) > still_mm).any(axis=1))
