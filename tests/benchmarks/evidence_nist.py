@@ -60,16 +60,13 @@ SUBSETS: dict[str, tuple[dict[str, tuple[int, ...]], ...]] = {
 
 @dataclass(frozen=True)
 class Point:
-    """One step of the curve: runs and blocks learned from, errors of what was left out in %."""
+    """One step of the curve: runs and blocks learned from, error of a whole run of what was left out in %."""
 
     title: str
     learned: str
     runs: int
     blocks: int
     error_percent: float
-    tool_percent: float
-    cuts_percent: float
-    family: str
 
 
 def nist_runs(learned: Mapping[str, Sequence[int]], left_out: str) -> sg.RunsFile:
@@ -186,12 +183,6 @@ def judge_all_runs(title: str, found: sg.CycleTimeCalibration) -> None:
         )
 
 
-def point_cells(point: Point) -> tuple[object, ...]:
-    """A row of the table of the curve."""
-    errors = f"{point.error_percent:.2f}", f"{point.cuts_percent:.2f}", f"{point.tool_percent:.1f}"
-    return point.title, point.learned, point.runs, point.blocks, *errors, point.family
-
-
 def curve() -> list[Point]:
     """Learn from fewer runs, and predict the program that is left out."""
     machine, points = sg.Machine.load("vx500"), []
@@ -205,8 +196,9 @@ def curve() -> list[Point]:
             cuts = [abs(share.error_percent) for run in runs for share in run.kinds if share.name == "cuts"]
             learned = ", ".join(f"{name} {'+'.join(map(str, numbers))}" for name, numbers in subset.items())
             fitted = sum(run.use == "fit" for run in found.runs)
-            points.append(Point(title, learned, fitted, blocks, max(whole), max(tools), max(cuts), found.family))
-            print("|", " | ".join(map(str, point_cells(points[-1]))), "|", flush=True)
+            points.append(Point(title, learned, fitted, blocks, max(whole)))
+            errors = f"{max(whole):.2f} | {max(cuts):.2f} | {max(tools):.1f}"
+            print(f"| {title} | {learned} | {fitted} | {blocks} | {errors} | {found.family} |", flush=True)
     return points
 
 
