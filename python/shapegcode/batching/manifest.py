@@ -5,14 +5,12 @@ The first line identifies the file; of rows with the same key the last counts; t
 
 from __future__ import annotations
 
-import bisect
 import contextlib
 import hashlib
 import json
 import os
 import sys
-from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -47,7 +45,7 @@ class Manifest:
         self.path = folder / MANIFEST
         self._before: BinaryIO | None = None
         self._known: dict[bytes, int] = {}
-        self._old, self._new = array("q"), array("q")
+        self._moved: dict[int, int] = {}  # position of a kept row in the present file, by that in the former one
         self._lock = _locked(folder)
         try:
             # The former file stays open, so that its rows can be read after a new one has its name.
@@ -56,8 +54,7 @@ class Manifest:
                 _base_of(self._before, folder)
                 self._known = {short(row["key"]): at for at, row in self._rows()}
             head = json.dumps(_HEAD | {_FOLDER: os.path.relpath(base or ".", folder)}) + "\n"
-            self._old = array("q", sorted(self._known.values() if resume else ()))
-            write_lines(self.path, self._kept(head))
+            write_lines(self.path, self._kept(head, sorted(self._known.values()) if resume else []))
             self._stream = self.path.open("ab")
         except BaseException:
             self.close()
@@ -74,7 +71,7 @@ class Manifest:
 
     def kept_at(self, key: str) -> int:
         """Position in the present file of a row that was kept from an earlier batch."""
-        return self._new[bisect.bisect_left(self._old, self._known[short(key)])]
+        return self._moved[self._known[short(key)]]
 
     def add(self, row: Mapping[str, Any]) -> int:
         """Write a row, flush it to the disk, and return its position in the file."""
@@ -109,14 +106,14 @@ class Manifest:
                     yield at, row
             at += len(line)
 
-    def _kept(self, head: str) -> Iterator[str]:
+    def _kept(self, head: str, places: Iterable[int]) -> Iterator[str]:
         yield head
         end = len(head)
-        for at in self._old:
+        for at in places:
             assert self._before is not None
             self._before.seek(at)
             line = self._before.readline()
-            self._new.append(end)
+            self._moved[at] = end
             end += len(line)
             yield line.decode()
 

@@ -4,6 +4,7 @@ Sources of the formats: MTConnect Institute, MTConnect Standard, Part 1 and Part
 C++ Agent, "Adapter Agent Protocol Version 2.0": ``time|item|value``, also several ``|item|value`` in a line.
 """
 
+import operator
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,62 +30,43 @@ _Observation = tuple[int, int, float, bytes, Item, bytes]  # sequence, line, tim
 
 
 def mtconnect_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Event]:
-    """Yield the values of the used items."""
-    reader = _Documents(path, table, notes)
+    """Yield the values of the used items: those of each document of the file at its end."""
     notes.feed_unit = _FEED_UNIT  # unit of PathFeedrate by the standard, whatever the control's unit
+    document: _Document | None = None
+    rest, line = b"", 1
+    last_sent: dict[str, int] = {}  # last sequence number by instance of the agent
     for piece in chunks(path):
-        yield from reader.feed(piece)
-    yield from reader.close()
-
-
-class _Documents:
-    """Splits a file into documents, and yields the observations of each at its end."""
-
-    def __init__(self, path: Path, table: ItemTable, notes: FileNotes) -> None:
-        self._path, self._table, self._notes = path, table, notes
-        self._document: _Document | None = None
-        self._rest, self._line, self._count = b"", 1, 0
-        self._sent: dict[str, int] = {}  # last sequence number by instance of the agent
-
-    def feed(self, piece: bytes) -> Iterator[Event]:
-        """Parse a piece; yield the events of completed documents."""
-        data = self._rest + piece
-        self._rest = b""
+        data, rest = rest + piece, b""
         while data:
-            if self._document is None:
+            if document is None:
                 found = _BEGIN.search(data)
                 if found is None:
                     keep = max(0, len(data) - _OVERLAP)
-                    self._line += data.count(b"\n", 0, keep)
-                    self._rest = data[keep:]
-                    return
-                self._line += data.count(b"\n", 0, found.start())
+                    line += data.count(b"\n", 0, keep)
+                    rest = data[keep:]
+                    break
+                line += data.count(b"\n", 0, found.start())
                 data = data[found.start() :]
-                utf_16 = b"utf-16" in data[:_OVERLAP].lower()
-                self._document = _Document(self._path, self._line, self._table, self._notes, utf_16)
-                self._count += 1
-            used = self._document.feed(data)
-            self._line += data.count(b"\n", 0, used)
+                document = _Document(path, line, table, notes, b"utf-16" in data[:_OVERLAP].lower())
+            used = document.feed(data)
+            line += data.count(b"\n", 0, used)
             data = data[used:]
-            if self._document.ended:
-                observations = self._document.observations
-                sent = self._sent.get(self._document.instance, -1)
-                self._sent[self._document.instance] = max([sent, *(each[0] for each in observations)])
-                fresh = [each for each in observations if each[0] < 0 or each[0] > sent]
+            if document.ended:
+                sent = last_sent.get(document.instance, -1)
+                last_sent[document.instance] = max([sent, *(each[0] for each in document.observations)])
+                fresh = [each for each in document.observations if each[0] < 0 or each[0] > sent]
                 numbered = all(each[0] >= 0 for each in fresh)
-                yield from (each[1:] for each in sorted(fresh, key=lambda each: each[0] if numbered else each[2]))
-                self._document = None
-
-    def close(self) -> Iterator[Event]:
-        if self._document is not None:
-            raise RecordError(
-                f"{self._path}:{self._line}: the document begun in line {self._document.line} is truncated within "
-                f"<{self._document.open_element}>: its observations are sorted by component, so some are missing "
-                "over its whole time; save it again"
-            )
-        if not self._count:
-            raise RecordError(f"{self._path}:1: no MTConnectStreams document in the file")
-        yield from ()
+                order = operator.itemgetter(0 if numbered else 2)
+                yield from (each[1:] for each in sorted(fresh, key=order))
+                document = None
+    if document is not None:
+        raise RecordError(
+            f"{path}:{line}: the document begun in line {document.line} is truncated within "
+            f"<{document.open_element}>: its observations are sorted by component, so some are missing over its whole "
+            "time; save it again"
+        )
+    if not last_sent:
+        raise RecordError(f"{path}:1: no MTConnectStreams document in the file")
 
 
 class _Document:

@@ -20,7 +20,7 @@ from shapegcode.io.edge_json import edge_runs
 from shapegcode.io.mtconnect import mtconnect_events, shdr_events
 from shapegcode.io.run_items import Event, FileNotes, Item, ItemTable, Stamps, stated_feed_unit
 from shapegcode.io.runs import RunCutter, RunLog
-from shapegcode.io.table import cells_of, head_of, is_number, line_chunks, without_thousands
+from shapegcode.io.table import cells_of, head_of, is_number, line_chunks, with_point
 from shapegcode.io.units import Label, Meaning, Measured, factor_between, read_label
 
 LogFormat = Literal["shdr", "mtconnect", "edge", "csv"]
@@ -217,7 +217,7 @@ def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Eve
                 if column.index < len(cells):
                     cell = cells[column.index]
                     if column.item.role not in _TEXTS:
-                        cell = _point(cell)
+                        cell = with_point(cell)
                         if column.factor != 1.0 and is_number(cell, False):
                             cell = repr(float(cell) * column.factor)
                     yield number, time, stamp, column.item, cell.encode()
@@ -226,18 +226,13 @@ def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Eve
 def _time(cells: list[str], header: _Header, stamps: Stamps) -> tuple[bytes, float]:
     cell = cells[header.time.index]
     if is_number(cell, True) or is_number(cell, False):
-        time = float(_point(cell)) * header.time.factor
+        time = float(with_point(cell)) * header.time.factor
         if header.time_unit is None:
-            return cell.encode(), stamps.seconds(_point(cell).encode())
+            return cell.encode(), stamps.seconds(with_point(cell).encode())
         if not abs(time) < _LATEST_S:
             raise ValueError(f"{time:g} s")
         return cell.encode(), time
     return cell.encode(), stamps.seconds(cell.encode())
-
-
-def _point(cell: str) -> str:
-    """Replace a decimal comma by a point; thousands points before it are removed."""
-    return without_thousands(cell.encode()).decode().replace(",", ".") if "," in cell else cell
 
 
 def _header(path: Path, table: ItemTable) -> _Header:

@@ -117,6 +117,11 @@ def has_thousands(cell: str) -> bool:
     return "." in cell and is_number(cell, True)
 
 
+def with_point(cell: str) -> str:
+    """Replace a decimal comma by a point; thousands points before it are removed."""
+    return without_thousands(cell.encode()).decode().replace(",", ".") if "," in cell else cell
+
+
 def without_thousands(data: bytes) -> bytes:
     """Remove thousands points from numbers with decimal commas."""
     if b"." not in data:
@@ -434,8 +439,7 @@ class TextTable:
                         f"must have it; the line is {text.strip()[:80]!r}"
                     )
                 cell = cells[index]
-                plain = without_thousands(cell.encode()).decode().replace(",", ".") if comma else cell
-                finite = is_number(cell, comma) and math.isfinite(float(plain))
+                finite = is_number(cell, comma) and math.isfinite(float(with_point(cell)))
                 if is_clock_time(cell):
                     raise RecordError(
                         f"{self.path}:{number}: column {index + 1}{name} {cell!r} is a time of day, which is not "

@@ -11,7 +11,6 @@ from shapegcode.program.program import (
     least_increment_mm,
     written_increment_mm,
 )
-from shapegcode.program.reading import program_loader, reader_options
 
 __all__ = [
     "MM_PER_INCH",
@@ -22,7 +21,5 @@ __all__ = [
     "given_program",
     "least_increment_mm",
     "located_error",
-    "program_loader",
-    "reader_options",
     "written_increment_mm",
 ]

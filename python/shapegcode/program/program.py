@@ -26,7 +26,7 @@ from shapegcode.program.reading import (
     programs_of,
     signs_of_turning,
 )
-from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, write_verdict
+from shapegcode.program.stamp import STAMP_BEGIN, Stamp, mark_of, stamp_of, text_with_verdict, verdict_changes
 
 _KEPT_CALL = re.compile(r"program O(\d+) .*: the call is kept")
 _ARC_OFF_RADIUS = "off its radius"
@@ -265,7 +265,8 @@ class Program:
         """
         if self.unexpanded is not None:
             return replace(self, unexpanded=text_with_verdict(self.unexpanded, good=good, better=better))
-        write_verdict(self.core, self.mark, good=good, better=better)
+        for begin, after in verdict_changes(self.core.find, self.mark, good=good, better=better):
+            self.core.overwrite(begin, after)
         return replace(self)  # without cached values of the former text
 
     @cached_property

@@ -234,9 +234,9 @@ def _one_end(text: bytes) -> bytes:
     return text
 
 
-def text_with_verdict(text: bytes, *, good: bool, better: bool = False) -> bytes:
+def text_with_verdict(text: bytes, *, good: bool, better: bool) -> bytes:
     """Write verdict and checksum into the header of an emitted program."""
-    changes = _changes(text.find, text_mark(text), good=good, better=better)
+    changes = verdict_changes(text.find, text_mark(text), good=good, better=better)
     if not changes:
         return text
     changed = bytearray(text)
@@ -250,14 +250,8 @@ def mark_of(program: _core.ProgramText) -> str:
     return _mark_of(whole_lines(program))
 
 
-def write_verdict(program: _core.ProgramText, mark: str, *, good: bool, better: bool = False) -> None:
-    """Write verdict and checksum into the text of a program that was read, in place."""
-    for begin, after in _changes(program.find, mark, good=good, better=better):
-        program.overwrite(begin, after)
-
-
-def _changes(find: Callable[[bytes], int], mark: str, *, good: bool, better: bool) -> list[tuple[int, bytes]]:
-    """Changes in the header: position and new bytes of each, which overwrite the same number of bytes."""
+def verdict_changes(find: Callable[[bytes], int], mark: str, *, good: bool, better: bool) -> list[tuple[int, bytes]]:
+    """Verdict and checksum in the header: position and new bytes of each, which overwrite the same number of bytes."""
     open_ones = (_PENDING,) if good else (_PENDING, _GOOD, _BETTER)
     verdicts = [(before, _BAD if not good else _BETTER if better else _GOOD) for before in open_ones]
     wanted = [*verdicts, (MARK_PENDING, f"(CHECKSUM {mark})".encode())]

@@ -235,15 +235,12 @@ class Outcome(OldNames):
         return f"<{type(self).__name__}: {self.answer}>"
 
     def _drawn_beside(self) -> Mapping[str, Plot]:
-        """Pictures from `plots_of(result)` of the module `plots` in the result's folder."""
-        return self._drawable(lambda: self._beside("plots").plots_of(self))
-
-    def _drawable(self, plots_of: Callable[[], Mapping[str, Plot]]) -> Mapping[str, Plot]:
-        """Pictures, without those that need data missing in a result read back from JSON."""
+        """Pictures by the module `plots` of the result's folder, without those that need data not in the JSON."""
+        plots_of: Callable[[Outcome], Mapping[str, Plot]] = self._beside("plots").plots_of
         if not self.is_read_back:
-            return plots_of()
+            return plots_of(self)
         try:
-            return {name: plot for name, plot in plots_of().items() if _draws(plot)}
+            return {name: plot for name, plot in plots_of(self).items() if _draws(plot)}
         except NotKeptError:
             return {}
 
