@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pydantic.fields import FieldInfo
+
 from shapegcode.machine import Machine
-from shapegcode.settings.keys import InlineTable, KeyInfo, TomlTable, item_type, key_info, table_type
+from shapegcode.settings.keys import InlineTable, TomlTable, facts, item_type, table_type, toml
 
 _EXAMPLE = """\
 name = "VMC-3"
@@ -91,33 +93,34 @@ def key_tables(model: type[TomlTable], *, fanuc: bool = True, heading: str = "##
     """The keys of a file as Markdown: a heading and a table for each of its tables, a line each."""
     lines: list[str] = []
     columns = ("key", "unit", "default", "FANUC", "meaning") if fanuc else ("key", "unit", "default", "meaning")
-    for table, meaning, infos in _documented(model, ""):
+    for table, meaning, fields in _documented(model, ""):
         lines += ["", f"{heading} {_heading(table)}", ""]
         if meaning:
             lines += [f"{meaning[:1].upper()}{meaning[1:]}.", ""]
         lines += [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
-        for info in infos:
-            name = info.key.removeprefix(f"{table}.")
-            default = info.default if info.default in ("required", "not set") else f"`{info.default}`"
+        for name, field in fields:
+            noted = facts(field)
+            default = "not set" if field.default is None else f"`{toml(field.default)}`"
+            default = "required" if field.is_required() else default
             cells = {
                 "key": f"`{name}`",
-                "unit": info.unit or "–",
-                "default": default + (" **assumed**" if info.assumed else ""),
-                "FANUC": info.fanuc or "–",
-                "meaning": info.meaning,
+                "unit": noted["unit"] or "–",
+                "default": default + (" **assumed**" if noted["assumed"] else ""),
+                "FANUC": noted["fanuc"] or "–",
+                "meaning": field.description or "",
             }
             lines.append("| " + " | ".join(cells[column].replace("|", "\\|") for column in columns) + " |")
     return lines
 
 
-def _documented(model: type[TomlTable], prefix: str) -> Iterator[tuple[str, str, list[KeyInfo]]]:
+def _documented(model: type[TomlTable], prefix: str) -> Iterator[tuple[str, str, list[tuple[str, FieldInfo]]]]:
     """Per table of the file: its name, its meaning, its keys."""
-    keys: list[KeyInfo] = []
+    keys: list[tuple[str, FieldInfo]] = []
     below: list[tuple[str, str, type[TomlTable]]] = []
     for name, field in model.model_fields.items():
         sub, key = table_type(field), f"{prefix}{name}"
         if sub is None or issubclass(sub, InlineTable):
-            keys.append(key_info(field, key))
+            keys.append((name, field))
             continue
         alike = [other for other, inner in model.model_fields.items() if table_type(inner) is sub]
         if item_type(field):
@@ -130,8 +133,8 @@ def _documented(model: type[TomlTable], prefix: str) -> Iterator[tuple[str, str,
     if keys:
         yield prefix.rstrip("."), "", keys
     for sub_prefix, meaning, sub in below:
-        for table, text, infos in _documented(sub, sub_prefix):
-            yield table, text or meaning, infos
+        for table, text, fields in _documented(sub, sub_prefix):
+            yield table, text or meaning, fields
 
 
 def _heading(table: str) -> str:

@@ -67,10 +67,8 @@ class _TomlWriter:
                 below.append((key, field, value))
             elif not self._short or self._is_kept(key, table, name, field):
                 if self._explains:
-                    info = keys.key_info(field, key)
-                    unit = f" [{info.unit}]" if info.unit and info.unit != "1" else ""
-                    fanuc = f" (FANUC parameter {info.fanuc})" if info.fanuc else ""
-                    self.comment(f"{info.meaning[:1].upper()}{info.meaning[1:]}{unit}{fanuc}.")
+                    meaning = _with_facts(field.description or "", keys.facts(field))
+                    self.comment(f"{meaning[:1].upper()}{meaning[1:]}.")
                 self._add(f"# {name} = ..." if value is None else f"{name} = {keys.toml(value)}", key)
         for key, field, value in below:
             if item := keys.item_type(field):
@@ -181,9 +179,14 @@ def _table(patterns: dict[str, Any]) -> dict[str, Any]:
 
 
 def _describe(entry: dict[str, Any]) -> None:
-    unit, fanuc, assumed = (entry.pop(name, "") for name in ("unit", "fanuc", "assumed"))
-    text = entry.get("description", "")
-    text += f" [{unit}]" if unit and unit != "1" else ""
-    text += f" (FANUC parameter {fanuc})" if fanuc else ""
-    entry["description"] = text + (" The default is assumed." if assumed else "")
-    entry.pop("title", None)
+    text = _with_facts(entry.get("description", ""), entry)
+    entry["description"] = text + (" The default is assumed." if entry.get("assumed") else "")
+    for name in ("title", "unit", "fanuc", "assumed"):
+        entry.pop(name, None)
+
+
+def _with_facts(meaning: str, facts: Mapping[str, Any]) -> str:
+    """Meaning of a key with its unit and FANUC parameters."""
+    unit, fanuc = facts.get("unit"), facts.get("fanuc")
+    meaning += f" [{unit}]" if unit and unit != "1" else ""
+    return meaning + (f" (FANUC parameter {fanuc})" if fanuc else "")

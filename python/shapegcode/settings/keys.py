@@ -329,20 +329,6 @@ AxisRatios = Annotated[RatioPerAxis, BeforeValidator(_spread, json_schema_input_
 
 
 @dataclass(frozen=True)
-class KeyInfo:
-    """Documentation of one key of the machine file."""
-
-    # dotted name; ``axes.x.modes.1.frequency_hz`` for values, ``axes.<x|y|z>`` and ``modes[]`` in the documentation of
-    # the format
-    key: str
-    unit: str  # unit, "1" for a ratio, empty if there is none
-    default: str  # default as written in TOML, or "required", or "not set"
-    meaning: str  # its meaning
-    fanuc: str  # numbers of the FANUC parameters that correspond to it, or empty
-    assumed: bool  # True if the default is an assumption
-
-
-@dataclass(frozen=True)
 class KeyValue:
     """One value of loaded settings, with the documentation of its key."""
 
@@ -389,14 +375,6 @@ def _as_table(annotation: Any) -> type[TomlTable] | None:
     return annotation if isinstance(annotation, type) and issubclass(annotation, TomlTable) else None
 
 
-def key_info(field: FieldInfo, key: str) -> KeyInfo:
-    """Documentation of a field; *key* is its dotted name."""
-    noted = facts(field)
-    default = "required" if field.is_required() else "not set" if field.default is None else toml(field.default)
-    unit, fanuc = noted.get("unit", ""), noted.get("fanuc", "")
-    return KeyInfo(key, unit, default, field.description or "", fanuc, bool(noted.get("assumed")))
-
-
 def values_of(
     table: TomlTable, prefix: str = "", given: bool = True, remarks: Mapping[str, str] | None = None
 ) -> Iterator[KeyValue]:
@@ -410,14 +388,14 @@ def values_of(
             for number, item in enumerate(value, start=1):
                 yield from values_of(item, f"{key}.{number}.", from_file, remarks)
         else:
-            info = key_info(field, key)
+            noted = facts(field)
             remark = (remarks or {}).get(key, "")
             # A key without a value can have a remark with the reason: "assumed: not limited", "not measured: rigid".
             says_why = not value and (value is not None or remark.startswith("assumed"))
             origin = origin_of(remark) if from_file or (remark and says_why) else "default"
-            assumed = origin == "assumed" or (info.assumed and origin == "default")
+            assumed = origin == "assumed" or (noted["assumed"] and origin == "default")
             shown = "not set" if value is None else toml(value)
-            yield KeyValue(key, shown, info.unit, origin, assumed, info.meaning, info.fanuc, remark)
+            yield KeyValue(key, shown, noted["unit"], origin, assumed, field.description or "", noted["fanuc"], remark)
 
 
 def toml(value: object) -> str:
