@@ -196,9 +196,7 @@ class Runs:
                 try:
                     packed = prepare(job, self._planned.files(rank))
                 except OSError as error:
-                    self._keep(
-                        rank, "", process.JobOutcome("crashed", 0, "", f"{error.filename}: {error.strerror}", {})
-                    )
+                    self._keep(rank, "", process.JobOutcome("crashed", f"{error.filename}: {error.strerror}"))
                     continue
                 if self._is_done(rank, job.output, packed.fingerprint):
                     continue
@@ -232,9 +230,9 @@ class Runs:
             except OSError as error:
                 if error.errno in _FULL:
                     raise
-                outcome = process.JobOutcome("crashed", 0, "", str(error), {})
+                outcome = process.JobOutcome("crashed", str(error))
             except Exception as error:
-                outcome = process.JobOutcome("killed", 0, "", f"{type(error).__name__}: {error}".splitlines()[0], {})
+                outcome = process.JobOutcome("killed", f"{type(error).__name__}: {error}".splitlines()[0])
             self._keep(rank, fingerprint, outcome)
 
     def _is_done(self, rank: int, key: str, fingerprint: str) -> bool:
@@ -265,7 +263,7 @@ class Runs:
             except OSError as error:
                 if error.errno in _FULL:
                     raise
-                crashed = process.JobOutcome("crashed", 0, "", f"{error.filename}: {error.strerror}", {})
+                crashed = process.JobOutcome("crashed", f"{error.filename}: {error.strerror}")
                 row, hashes = row_of(job, crashed)[0], {}
                 self._remove(written)
                 self._write(job, {}, hashes)

@@ -122,11 +122,7 @@ def _only_returns(path: str) -> bool:
 
 
 def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterator[tuple[str, str]]:
-    """Names and paths of the files a program may call, recursively.
-
-    These are the programs of bound codes and of tool changes, and in a program with calls any number after P; if one is
-    computed, all programs in the folders.
-    """
+    """Names and paths of the files a program may call, also by bound codes and tool changes, recursively."""
     beside = Path(path).parent
     folders = [beside, *(Path(base, Path(name).expanduser()) for name in machine.input.program_folders)]
     load = program_loader(folders, machine.controller.max_program_bytes)
@@ -147,7 +143,7 @@ def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterato
 
 
 def _mentioned(text: bytes, folders: Sequence[Path]) -> list[int]:
-    """Numbers of programs that a program may call."""
+    """Numbers of programs that a program may call: in one with calls any number after P."""
     if not _CALL.search(text):
         return []
     if _COMPUTED.search(text):

@@ -15,7 +15,7 @@ import tempfile
 import threading
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Literal, cast
 
@@ -81,10 +81,10 @@ class JobOutcome:
     """Outcome of a run."""
 
     ending: Ending  # end of the run
-    code: int  # exit code of the command; 0 if it did not end by itself
-    said: str  # its standard output
     complained: str  # its standard error, or why it did not end by itself
-    files: Mapping[str, bytes]  # content of the files it wrote, by name in its folder
+    code: int = 0  # exit code of the command; 0 if it did not end by itself
+    said: str = ""  # its standard output
+    files: Mapping[str, bytes] = field(default_factory=dict)  # content of the files it wrote, by name in its folder
     wall_s: float = 0.0  # elapsed time
     cpu_s: float = 0.0  # processor time
     peak_bytes: int = 0  # peak memory
@@ -157,7 +157,7 @@ class Hosts:
     def run(self, packed: Packed) -> JobOutcome:
         """Run a job in a separate process, in a temporary folder."""
         if packed.version != (mine := this_version()):
-            return JobOutcome("other version", 0, "", f"this worker has {mine}, the batch needs {packed.version}", {})
+            return JobOutcome("other version", f"this worker has {mine}, the batch needs {packed.version}")
         where = packed.scratch or None
         with tempfile.TemporaryDirectory(prefix="job-", dir=where, ignore_cleanup_errors=True) as folder:
             return self._run_in(Path(folder), packed)
@@ -205,12 +205,12 @@ class Hosts:
             with self._lock:
                 self._all.discard(host)
         if answer is None:
-            return JobOutcome("killed", 0, "", "the process that ran it was killed", {})
+            return JobOutcome("killed", "the process that ran it was killed")
         said, complained = (_text(folder / name) for name in ("out", "err"))
         ending, why = _ending(answer, packed, complained)
         files = dict(_written(folder / "files", cwd, names)) if ending == "ended" else {}
         return JobOutcome(
-            ending, answer["code"] if ending == "ended" else 0, said, why, files, answer["wall_s"], answer["cpu_s"],
+            ending, why, answer["code"] if ending == "ended" else 0, said, files, answer["wall_s"], answer["cpu_s"],
             answer["peak_bytes"],
         )  # fmt: skip
 

@@ -193,16 +193,17 @@ def toml_tables(text: str) -> dict[str, Any]:
     if found := _LONG_KEY.search(text):
         line = text.count("\n", 0, found.start()) + 1
         raise ValueError(f"a key of more than {MAX_DEPTH} parts (at line {line}, column 1)")
+    too_deep = f"nested too deeply: at most {MAX_DEPTH} lists and tables within each other"
     try:
         tables = tomllib.loads(text)
     except RecursionError:
-        raise ValueError(f"nested too deeply: at most {MAX_DEPTH} lists and tables within each other") from None
+        raise ValueError(too_deep) from None
     waiting: list[tuple[Any, int]] = [(tables, 1)]
     while waiting:
         value, depth = waiting.pop()
         if isinstance(value, dict | list):
             if depth > MAX_DEPTH:
-                raise ValueError(f"nested too deeply: at most {MAX_DEPTH} lists and tables within each other")
+                raise ValueError(too_deep)
             waiting += [(each, depth + 1) for each in (value.values() if isinstance(value, dict) else value)]
             if isinstance(value, dict) and any(len(key) > MAX_TEXT_BYTES for key in value):
                 raise ValueError(f"a key of more than {MAX_TEXT_BYTES} characters")
@@ -243,10 +244,7 @@ def named_errors(path: str | Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
-    """A stream whose content replaces a file when the block ends without an error; otherwise the file is unchanged.
-
-    A symbolic link is followed, except in a loop; a device or pipe is written directly.
-    """
+    """A stream whose content replaces a file when the block ends without an error; a device is written directly."""
     target = _target_of(path)
     if target.exists() and not stat.S_ISREG(target.stat().st_mode):
         with open(target, "wb") as stream:

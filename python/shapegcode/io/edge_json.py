@@ -433,11 +433,7 @@ def _axes(signals: tuple[tuple[str, str], ...]) -> tuple[EdgeAxis, ...]:
 
 
 def edge_runs(path: Path) -> Iterator[RunLog]:
-    """Yield the run of a capture.
-
-    `block` has line numbers of one program only, the one with most blocks in the capture: those of cycles and
-    subprograms count lines of other files. `block_texts` has the blocks of all programs.
-    """
+    """Yield the run of a capture: `block` has lines of the program with most blocks, `block_texts` all blocks."""
     capture = read_edge_json(path)
     count = Counter(block.path for block in capture.blocks if block.line is not None)
     if not count:

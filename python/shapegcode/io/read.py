@@ -411,11 +411,7 @@ def _channels(path: Path) -> tuple[int, FloatArray, bool]:
 
 
 def read_wav(path: Path, options: ReadOptions) -> list[Record]:
-    """Read a WAV file.
-
-    Float samples are multiplied by the scales; without scales they are in N and in SI units of the quantity. Integers
-    are ratios of full scale, which the scales convert to these units.
-    """
+    """Read a WAV file: float samples are SI values unless a scale is given, integers are ratios of full scale."""
     rate, data, shares = _channels(path)
     count, channels = data.shape
     if channels > 2:

@@ -54,9 +54,10 @@ class Record:
         if not (np.isfinite(self.period_s) and self.period_s > 0.0):
             raise RecordError(f"{self.source}: period of {self.period_s:g} s: must be finite and above 0")
         _check_samples(self.source, "response", self.response)
-        if self.force_n is not None:
-            _check_samples(self.source, "force", self.force_n)
-        if self.force_n is not None and len(self.force_n) != len(self.response):
+        if self.force_n is None:
+            return
+        _check_samples(self.source, "force", self.force_n)
+        if len(self.force_n) != len(self.response):
             raise RecordError(
                 f"{self.source}: {len(self.force_n)} samples of force and {len(self.response)} of response: "
                 "both must be sampled together"

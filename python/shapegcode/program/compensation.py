@@ -101,18 +101,14 @@ def header_lines(radii_mm: Mapping[int, float]) -> list[str]:
 
 
 def guard_lines(radii_mm: Mapping[int, float], machine: Machine) -> list[str]:
-    """Program lines that stop the control if its offset differs from the expanded radius.
-
-    Offsets set by the program (G10) need no check. Where IF cannot run (drip feed, no macros, another dialect), or
-    with emission.compensation_guard = "stop", the program stops with M00, and the operator compares.
-    """
+    """Lines that stop the control if its offset differs from the expanded radius: M00 where IF cannot run."""
     lines = []
     for number, radius in radii_mm.items():
         own = machine.input
         name = str(number)
         known = [table[name] for table in (own.tool_radius_mm, own.tool_radius_wear_mm) if name in table]
         if number == 0 or not known or abs(sum(known) - radius) > 1e-9:
-            continue
+            continue  # set by the program itself (G10)
         stops = machine.emission.compensation_guard == "stop" or machine.emission.dialect != "fanuc"
         if stops or not machine.controller.holds_macros:
             lines.append(f"M00(CHECK D{number} RADIUS {radius:.4g} WITH WEAR)")
@@ -146,7 +142,8 @@ def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.R
     candidates = iter(program.regions)
     for region in nominal.regions:
         for candidate in candidates:
-            if _same_ends(candidate.path, region.path):
+            ours, theirs = ([path.start_mm, path.end_mm] for path in (candidate.path, region.path))
+            if np.allclose(ours, theirs, rtol=0.0, atol=_SAME_PLACE_MM):
                 yield candidate, region
                 break
         else:
@@ -155,11 +152,6 @@ def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.R
                 f"{nominal.source} has in {nominal.lines(region)}: it was not made from that program; omit "
                 "--against"
             )
-
-
-def _same_ends(one: _core.Path, other: _core.Path) -> bool:
-    ends = ((one.start_mm, other.start_mm), (one.end_mm, other.end_mm))
-    return all(float(np.abs(a - b).max()) <= _SAME_PLACE_MM for a, b in ends)
 
 
 def _place(position_mm: npt.ArrayLike) -> str:

@@ -74,9 +74,17 @@ def programs_of(text: bytes) -> tuple[ProgramPlace, ...]:
     return tuple(places)
 
 
-def place_of(text: bytes, wanted: str, source: str) -> int:
-    """Index of the wanted program of a text."""
-    entries, places = _core.list_programs(text), programs_of(text)
+def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
+    """Index of a program in a multi-program file, to read it alone; None: read the whole file."""
+    try:
+        entries, places = _core.list_programs(text), programs_of(text)
+    except _core.ProgramError:
+        if isinstance(wanted, str):
+            raise
+        return None  # the reader reports it with its location
+    if isinstance(wanted, int) and wanted not in [entry.number for entry in entries]:
+        return None  # likewise
+    wanted = wanted if isinstance(wanted, str) else f"O{wanted}"
     if match := _ADDRESS.fullmatch(wanted):
         found = [index for index in range(len(places)) if index == int(match[1]) - 1]
     else:
@@ -88,27 +96,13 @@ def place_of(text: bytes, wanted: str, source: str) -> int:
             if _own_name(entry) == own and (not folder or entry.folder.strip("/") == folder.strip("/"))
         ]
     if len(found) == 1:
-        return found[0]
+        return found[0] if len(entries) > 1 else None
     if found:
         known = ", ".join(places[index].address for index in found)
         raise _core.ProgramError(f"{source}:1:1: the file contains several programs {wanted}: specify one, {known}")
     known = ", ".join(place.address for place in places[:_LISTED])
     more = f" and {len(places) - _LISTED} more" if len(places) > _LISTED else ""
     raise _core.ProgramError(f"{source}:1:1: the file contains no program {wanted} (but {known}{more})")
-
-
-def index_of(text: bytes, wanted: int | str, source: str) -> int | None:
-    """Index of a program in a multi-program file, to read it alone; None: read the whole file."""
-    try:
-        entries = _core.list_programs(text)
-    except _core.ProgramError:
-        if isinstance(wanted, str):
-            raise
-        return None  # the reader reports it with its location
-    if isinstance(wanted, int) and wanted not in [entry.number for entry in entries]:
-        return None  # likewise
-    index = place_of(text, wanted if isinstance(wanted, str) else f"O{wanted}", source)
-    return index if len(entries) > 1 else None
 
 
 def called_from(text: bytes, index: int, kept: Iterable[int]) -> tuple[ProgramPlace, ...]:

@@ -132,12 +132,9 @@ def _checked_polyline(name: str, points: npt.ArrayLike) -> FloatArray:
 
 
 def _at_corners(along: FloatArray, polyline: FloatArray, curve: FloatArray, apart_mm: float) -> npt.NDArray[np.intp]:
-    """Samples before which the nearest point, and the plotted curve with it, changes from one side of a corner to the
-    other.
+    """Samples before which the nearest point jumps from one side of a corner to the other.
 
-    If the machine table rounds a corner on the inside, the nearest point jumps from one side of the corner to the
-    other. The two samples are far apart when magnified, and a line between them would draw a loop that was not
-    traversed.
+    Magnified, a line between the two samples would draw a loop that was not traversed.
     """
     steps = np.diff(polyline, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
@@ -226,11 +223,7 @@ COARSE_STEP_RAD = 0.05  # angle of an arc between two points of a coarse polylin
 def follow(
     command_mm: FloatArray, points: FloatArray, polyline_mm: FloatArray, *, complete: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """For each sample of a motion along a polyline, the nearest point of the polyline: distance along it, position.
-
-    Where the polyline passes a point twice, the distance travelled decides.
-    `complete`: the command covers the whole polyline.
-    """
+    """For each sample of a motion along a polyline (all of it, if *complete*) the nearest point: distance, position."""
     from scipy.spatial import KDTree
 
     vertices = _refine(polyline_mm)
@@ -244,7 +237,8 @@ def follow(
     nearest = tree.query(np.column_stack([points, _PROGRESS_WEIGHT * gone]), workers=-1)[1]
     feet, best = np.empty_like(points), np.full(len(points), np.inf)
     progress = np.zeros(len(points))
-    # The nearest point is on a segment near the nearest vertex.
+    # The nearest point is on a segment near the nearest vertex; where the polyline passes a point twice, the distance
+    # travelled has decided.
     for shift in range(-_SEGMENTS_ASKED, _SEGMENTS_ASKED):
         first = np.clip(nearest + shift, 0, len(vertices) - 2)
         start, chord = vertices[first], vertices[first + 1] - vertices[first]

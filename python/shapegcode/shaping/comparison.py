@@ -237,10 +237,7 @@ def _least_worst(
     options: DesignOptions,
     found: Sequence[Design],
 ) -> list[Design]:
-    """The design with the smallest worst residual on each grid, within `max_duration_s`.
-
-    Empty if a non-negative design keeps the limit, no mode is uncertain, or robust designs are not to be compared.
-    """
+    """The design with the smallest worst residual on each grid; none if not wanted, or if another keeps the limit."""
     wanted = any(row.name == _ROBUST for row in rows) and any(band.uncertainty for band in bands)
     if not wanted or any(not each.negative and is_within(each, options.vibration_limit) for each in found):
         return []

@@ -98,7 +98,18 @@ def choose_block_period(
     Source: this project.
     """
     bands = [each if isinstance(each, ModeBand) else ModeBand(each) for each in modes]
-    periods_s = _periods(bands, interpolation_period_s, block_time_s, max_block_period_s, max_duration_s)
+    times_s = {"max_block_period_s": max_block_period_s, "max_duration_s": max_duration_s}
+    check_modes_and_times(bands, interpolation_period_s=interpolation_period_s, **times_s)
+    if not (math.isfinite(block_time_s) and block_time_s >= 0.0):
+        raise ArgumentError(f"block_time_s is {block_time_s} s: it must be finite and at least 0")
+    fewest = max(1, math.ceil(block_time_s / interpolation_period_s - ON_GRID))
+    most = whole_periods(max_block_period_s, interpolation_period_s)
+    if fewest > most:
+        raise ArgumentError(
+            f"no block period between the block time of {ms(block_time_s)} and the limit of "
+            f"{ms(max_block_period_s)} is a multiple of the interpolation period of {ms(interpolation_period_s)}"
+        )
+    periods_s = [multiple * interpolation_period_s for multiple in range(fewest, most + 1)]
     candidates = tuple(_candidate(bands, each, max_duration_s, vibration_limit) for each in periods_s)
     wide = any(band.uncertainty for band in bands)
     if any(each.shaper is not None for each in candidates):
@@ -132,27 +143,6 @@ def robust_candidate(
     if candidate.shaper is None:
         raise DesignError(candidate.refusal)
     return candidate
-
-
-def _periods(
-    bands: Sequence[ModeBand],
-    interpolation_period_s: float,
-    block_time_s: float,
-    max_block_period_s: float,
-    max_duration_s: float,
-) -> list[float]:
-    times_s = {"max_block_period_s": max_block_period_s, "max_duration_s": max_duration_s}
-    check_modes_and_times(bands, interpolation_period_s=interpolation_period_s, **times_s)
-    if not (math.isfinite(block_time_s) and block_time_s >= 0.0):
-        raise ArgumentError(f"block_time_s is {block_time_s} s: it must be finite and at least 0")
-    fewest = max(1, math.ceil(block_time_s / interpolation_period_s - ON_GRID))
-    most = whole_periods(max_block_period_s, interpolation_period_s)
-    if fewest > most:
-        raise ArgumentError(
-            f"no block period between the block time of {ms(block_time_s)} and the limit of "
-            f"{ms(max_block_period_s)} is a multiple of the interpolation period of {ms(interpolation_period_s)}"
-        )
-    return [multiple * interpolation_period_s for multiple in range(fewest, most + 1)]
 
 
 def _shortest(candidates: tuple[BlockPeriodCandidate, ...]) -> BlockPeriodChoice:

@@ -69,9 +69,17 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
     check_modes_and_times(modes, period_s=period_s, max_duration_s=max_duration_s)
     search = _GridSearch(Conditions(zeros=tuple(map(Zero, modes))), period_s)
     shaper = search.shortest(whole_periods(max_duration_s, period_s))
-    if shaper is None:
-        raise DesignError(_none_exists(modes, period_s, max_duration_s))
-    return shaper
+    if shaper is not None:
+        return shaper
+    try:
+        polynomial = grid_polynomial(modes, period_s)
+        what_exists = f"the shortest polynomial takes {ms(polynomial.duration_s)} with sum|a| {polynomial.abs_sum:.4g}"
+    except ShapegcodeError as error:
+        what_exists = f"nor is there a polynomial design: {error}"
+    raise DesignError(
+        f"no non-negative design within {ms(max_duration_s)} on a {ms(period_s)} grid for modes "
+        f"{mode_names(modes)}; {what_exists}; try another period"
+    )
 
 
 def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: float, *, title: str) -> Shaper:
@@ -79,8 +87,6 @@ def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: fl
 
     Of the shapers of the shortest duration the one with the least second central moment is chosen (the contour cost; to
     0.1 % if the residual is limited over bands); if taps may be negative, the one with the least sum of magnitudes.
-
-    Source: this project.
     """
     check_times(period_s=period_s, max_duration_s=max_duration_s)
     search = _GridSearch(conditions, period_s)
@@ -335,15 +341,3 @@ def polished(
     if off > RESIDUAL_LIMIT or (largest is None and not np.all(amplitudes > 0.0)):
         return None
     return Shaper(((support - support[0]) * period_s).tolist(), (amplitudes / amplitudes.sum()).tolist())
-
-
-def _none_exists(modes: Sequence[Mode], period_s: float, max_duration_s: float) -> str:
-    try:
-        polynomial = grid_polynomial(modes, period_s)
-        what_exists = f"the shortest polynomial takes {ms(polynomial.duration_s)} with sum|a| {polynomial.abs_sum:.4g}"
-    except ShapegcodeError as error:
-        what_exists = f"nor is there a polynomial design: {error}"
-    return (
-        f"no non-negative design within {ms(max_duration_s)} on a {ms(period_s)} grid for modes "
-        f"{mode_names(modes)}; {what_exists}; try another period"
-    )

@@ -225,8 +225,6 @@ def design_per_axis(axis_modes: Sequence[Sequence[Mode]], period_s: float, max_d
     The longest filter is as short as the grid permits. Nine mean delays that are possible for all axes are compared;
     the one with the smallest sum of the filters' second central moments is chosen. An axis without modes is only
     delayed. None: no such filters exist within `max_duration_s`.
-
-    Source: this project.
     """
     if not any(axis_modes):
         raise ArgumentError("shapers for each axis need at least one mode: 0 given")

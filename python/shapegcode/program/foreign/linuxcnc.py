@@ -32,8 +32,8 @@ def read_linuxcnc(source: str, *, file: str, machine: Machine, folder: Path | No
         program = _core.read_linuxcnc(source.encode("latin-1", "replace"), options)
     tools = {} if table is None else table.tools
     settings = read.ForeignSettings(
-        tool_length_mm={number: tool.offset_mm[2] for number, tool in tools.items()},
-        tool_radius_mm={number: tool.diameter_mm / 2.0 for number, tool in tools.items()},
+        tool_length_mm={number: offset_mm[2] for number, (offset_mm, _) in tools.items()},
+        tool_radius_mm={number: diameter_mm / 2.0 for number, (_, diameter_mm) in tools.items()},
         peck_clearance_mm=_core.linuxcnc_peck_clearance_mm,
         path_tolerance_mm=program.path_tolerance_mm,
     )
@@ -54,10 +54,7 @@ def _options(machine: Machine, table: ToolTable | None) -> _core.LinuxcncOptions
     options.machine_unit_mm = UNITS_MM[given.machine_unit]
     if table is not None:
         options.tool_table = _core.LinuxcncToolTable(
-            read.shown_name(table.file),
-            table.units,
-            UNITS_MM[table.units],
-            {number: (tool.offset_mm, tool.diameter_mm) for number, tool in table.tools.items()},
+            read.shown_name(table.file), table.units, UNITS_MM[table.units], dict(table.tools.items())
         )
     options.tool_length_mm = {int(number): length for number, length in given.tool_length_mm.items()}
     # The emitted program will be read with the machine's own setting.
@@ -78,19 +75,14 @@ def _subroutine(name: str, folders: list[Path], machine: Machine) -> tuple[str, 
     return None
 
 
-@dataclass(frozen=True)
-class ToolRow:
-    """A row of the tool table."""
-
-    offset_mm: tuple[float, float, float]  # X, Y, Z
-    diameter_mm: float  # 0: none is given
+Tool = tuple[tuple[float, float, float], float]  # offsets of X, Y, Z and diameter (0: not stated), mm
 
 
 @dataclass(frozen=True)
 class ToolTable:
     """The tools by number, and the file from which they come."""
 
-    tools: dict[int, ToolRow]
+    tools: dict[int, Tool]
     file: str
     units: str
 
@@ -117,7 +109,7 @@ def find_tool_table(stated: str, unit: str, folder: Path | None) -> ToolTable | 
 def read_tool_table(path: Path, unit: str) -> ToolTable:
     """Read a tool table: lines `T1 P1 X0 Y0 Z12.5 D6 ;comment`."""
     factor = UNITS_MM[unit]
-    tools: dict[int, ToolRow] = {}
+    tools: dict[int, Tool] = {}
     text = read_file(path, _MAX_BYTES).decode("utf-8", "replace")
     for number, line in enumerate(text.splitlines(), start=1):
         code = line.split(";")[0].strip()
@@ -127,5 +119,5 @@ def read_tool_table(path: Path, unit: str) -> ToolTable:
         if words.get("T", _LAST_TOOL + 1.0) > _LAST_TOOL or _WORD.sub("", code).strip():
             raise read.refusal(str(path), number, f"{code[:40]!r} is not a row of a tool table (T1 P1 Z12.5 D6)")
         x, y, z = (words.get(axis, 0.0) * factor for axis in "XYZ")
-        tools[int(words["T"])] = ToolRow((x, y, z), words.get("D", 0.0) * factor)
+        tools[int(words["T"])] = (x, y, z), words.get("D", 0.0) * factor
     return ToolTable(tools, str(path), unit)

@@ -218,10 +218,7 @@ def _first_signs(code: bytes, signs: Iterable[_Sign]) -> dict[InputDialect, Reco
 
 
 def doubtful_word(text: bytes) -> tuple[int, str] | None:
-    """Find the first dwell or arc whose P means something else on LinuxCNC: its line, and a warning; None without one.
-
-    A dwell of P1 to P9 is very short in milliseconds; P of an arc is the number of turns on LinuxCNC.
-    """
+    """Line of the first dwell or arc whose P means something else on LinuxCNC, and a warning; None without one."""
     capitals = text[:LOOKED_AT_BYTES].upper()
     if b"P" not in capitals:
         return None
@@ -240,11 +237,7 @@ def doubtful_word(text: bytes) -> tuple[int, str] | None:
 
 
 def foreign_program(data: bytes, machine: Machine, source: str, folder: Path | None) -> ForeignProgram | None:
-    """Translate a program for another control into one for FANUC; None: the program is for FANUC already.
-
-    `controller.dialect` states the dialect. If it is "auto", words that only one control knows decide; a program
-    without such words is taken as LinuxCNC's if `controller.kind` is "linuxcnc".
-    """
+    """Translate a program for another control into one for FANUC; None: the program is for FANUC already."""
     dialect, reason = input_dialect(data, machine, source)
     if dialect == "fanuc":
         refuse_words_behind_semicolon(data, source)
@@ -270,7 +263,7 @@ def refuse_words_behind_semicolon(data: bytes, source: str) -> None:
 
 
 def input_dialect(data: bytes, machine: Machine, source: str) -> tuple[str, str]:
-    """The dialect of a program, and the reason."""
+    """The dialect of a program, and the reason: `controller.dialect`, else words of one control, else its kind."""
     if written := _WRITTEN_FOR.search(data[:LOOKED_AT_BYTES]):
         control = {b"KLIPPER": "Klipper", b"ISG": "the ISG kernel"}[written[1]]
         message = f"emitted for {control}, whose programs are written and not read: keep the original"

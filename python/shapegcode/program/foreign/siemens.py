@@ -18,11 +18,7 @@ from shapegcode.program.foreign import read
 
 
 def read_siemens(source: str, *, file: str, machine: Machine, folder: Path | None = None) -> read.ForeignProgram:
-    """Read a SINUMERIK program (DIN mode).
-
-    Subprograms are looked for in the text, in `folder` and in `input.program_folders`: NAME.SPF, NAME.MPF, then
-    _N_NAME_SPF, _N_NAME_MPF.
-    """
+    """Read a SINUMERIK program (DIN mode) as an expanded program."""
     controller, settings, options = machine.controller, machine.input, _core.SiemensOptions()
     options.file = read.shown_name(file)
     options.name = re.sub(r"(?i)^_N_|_(MPF|SPF)$|\.[A-Z0-9]+$", "", re.split(r"[/\\]", options.file)[-1]).upper()

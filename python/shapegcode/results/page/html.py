@@ -250,7 +250,10 @@ def _heat_row(row: model.HeatRow, heat: model.HeatMap, has_remarks: bool) -> str
     keys = row.keys or ("",) * len(row.values)
     factors = heat.factors or (1.0,) * len(row.values)
     for value, share, key, factor in zip(row.values, row.shares, keys, factors, strict=True):
-        kind, title = _heat(share)
+        kind, title = "heat-none", ""
+        if share is not None:
+            step = "over" if share > 1.0 else min(int(max(share, 0.0) * _STEPS), _STEPS - 1)
+            kind, title = f"heat-{step}", f' title="{share * 100.0:.0f} % of the limit"'
         word = "–" if value is None else number(value, heat.digits, key=key, factor=factor)
         mark = '<span class="mark">▲</span>' if kind == "heat-over" else ""
         cells.append(f'<td class="{kind}"{title}>{mark}{word}</td>')
@@ -259,13 +262,6 @@ def _heat_row(row: model.HeatRow, heat: model.HeatMap, has_remarks: bool) -> str
     name = escape(row.name) if row.counts else f"({escape(row.name)})"
     kind = "" if row.counts else ' class="shown-only"'
     return f'<tr{kind}><th scope="row">{name}</th>{"".join(cells)}</tr>'
-
-
-def _heat(share: float | None) -> tuple[str, str]:
-    if share is None:
-        return "heat-none", ""
-    step = "over" if share > 1.0 else min(int(max(share, 0.0) * _STEPS), _STEPS - 1)
-    return f"heat-{step}", f' title="{share * 100.0:.0f} % of the limit"'
 
 
 _SWATCHES = (
