@@ -75,8 +75,8 @@ def import_parameters(
     take_tables(draft, read)
     take_modes(draft, base, keep_modes, rigid)
     _list_missing(draft)
-    if draft.values.problems:
-        raise MachineError(file, tuple(draft.values.problems))
+    if draft.problems:
+        raise MachineError(file, tuple(draft.problems))
     if draft.read or draft.tables:
         _require_limits(draft, file)
         machine = Machine.from_data(draft.data, file)
@@ -84,7 +84,7 @@ def import_parameters(
     else:  # the machine contains nothing of the dump, so no remark applies
         machine = base or Machine.load("vx500")
         draft.remarks.clear()
-    for number, largest in dict(draft.values.differing).items():
+    for number, largest in dict(draft.differing).items():
         draft.assume(f"parameter {number}", largest, "differs between the axes; the largest counts")
     return ParameterImport(
         file,

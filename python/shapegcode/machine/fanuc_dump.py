@@ -194,60 +194,6 @@ class Dump:
         return next((self.entries[number, name] for name in targets if (number, name) in self.entries), None)
 
 
-class DumpValues:
-    """Reads values of a dump and checks them."""
-
-    def __init__(self, dump: Dump) -> None:
-        self.dump = dump  # the records
-        self.axes = (1, 2, 3)  # numbers of the axes X, Y, Z in the dump
-        self.problems: list[Problem] = []  # implausible values; the caller checks them at the end
-        self.differing: list[tuple[int, float]] = []
-
-    def scalar(self, number: int, high: float = _MAX_VALUE, unit: str = "", low: float = 0.0) -> float | None:
-        """A parameter without axes; if the dump has it per axis, the largest of X, Y, Z."""
-        entry = self.dump.get(number)
-        if entry is not None:
-            return self._number(entry, low, high, unit)
-        values = [self._number(each, low, high, unit) for each in self.entries(number)]
-        if values and min(values) != max(values):
-            self.differing.append((number, max(values)))
-        return max(values, default=None)
-
-    def per_axis(self, number: int, high: float = _MAX_VALUE, unit: str = "", low: float = 0.0) -> list[float] | None:
-        """The values of X, Y, Z; or, for all three, the one value without an axis; None if the dump has neither."""
-        entries = self.entries(number)
-        if len(entries) < 3:
-            one = self.dump.get(number)
-            return [self._number(one, low, high, unit)] * 3 if one else None
-        return [self._number(entry, low, high, unit) for entry in entries]
-
-    def entries(self, number: int) -> list[Entry]:
-        """Entries of a parameter for X, Y and Z, in this order, as far as the dump has them."""
-        found = (self.dump.get(number, axis) for axis in self.axes)
-        return [entry for entry in found if entry is not None]
-
-    def bit(self, number: int, bit: int) -> bool | None:
-        """A bit of a parameter, counted from the right, from 0; that of X if per axis; None: missing or malformed."""
-        entry = self.dump.get(number) or next(iter(self.entries(number)), None)
-        return None if entry is None else self.bit_of(entry, bit)
-
-    def bit_of(self, entry: Entry, bit: int) -> bool | None:
-        """A bit of a value of eight bits, from the right, from 0; for another value note a problem and return None."""
-        if len(entry.text) != 8 or set(entry.text) - {"0", "1"}:
-            name = f"parameter {entry.number} {entry.target}".rstrip()
-            self.problems.append(Problem(name, entry.text, "must be eight bits, 0 or 1", entry.line))
-            return None
-        return entry.text[7 - bit] == "1"
-
-    def _number(self, entry: Entry, low: float, high: float, unit: str) -> float:
-        value = float(entry.text) * (MM_PER_INCH if entry.letter == "I" and unit.startswith("mm") else 1.0)
-        if not low <= value <= high:
-            name = f"parameter {entry.number} {entry.target}".rstrip()
-            limit = f"must be {low:g} to {high:g} (unit: {unit})"
-            self.problems.append(Problem(name, entry.text, limit, entry.line))
-        return value
-
-
 _NUMBER = r"[-+]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})"
 _RECORD = re.compile(r"N\s*(\d{1,6})\s*(Q\d+)?\s*(.*)", re.ASCII)
 _VALUE = re.compile(rf"(?:([LAST])\s*(\d{{1,4}})\s*)?([PMI])\s*({_NUMBER})\s*", re.ASCII)
@@ -313,11 +259,13 @@ def _take(dump: Dump, record: re.Match[str], line: int) -> None:
 
 
 class Draft:
-    """Tables of a machine file, filled from the records of a dump."""
+    """Tables of a machine file, filled from the checked values of a dump."""
 
     def __init__(self, dump: Dump, data: dict[str, Any]) -> None:
         self.dump = dump  # the records
-        self.values = DumpValues(dump)  # the same as numbers and bits
+        self.axes = (1, 2, 3)  # numbers of the axes X, Y, Z in the dump
+        self.problems: list[Problem] = []  # implausible values; the caller checks them at the end
+        self.differing: list[tuple[int, float]] = []
         self.data = data  # tables of the machine file
         self.read: list[ReadParameter] = []  # every value of the dump that was stored in a key
         self.tables: list[ReadTable] = []  # tables of offsets and variables that were stored in keys
@@ -325,15 +273,59 @@ class Draft:
         self.missing: list[MissingParameter] = []
         self.remarks: dict[str, str] = {}  # origin of the value by dotted key
 
+    def scalar(self, number: int, high: float = _MAX_VALUE, unit: str = "", low: float = 0.0) -> float | None:
+        """A parameter without axes; if the dump has it per axis, the largest of X, Y, Z."""
+        entry = self.dump.get(number)
+        if entry is not None:
+            return self._number(entry, low, high, unit)
+        values = [self._number(each, low, high, unit) for each in self.entries(number)]
+        if values and min(values) != max(values):
+            self.differing.append((number, max(values)))
+        return max(values, default=None)
+
+    def per_axis(self, number: int, high: float = _MAX_VALUE, unit: str = "", low: float = 0.0) -> list[float] | None:
+        """The values of X, Y, Z; or, for all three, the one value without an axis; None if the dump has neither."""
+        entries = self.entries(number)
+        if len(entries) < 3:
+            one = self.dump.get(number)
+            return [self._number(one, low, high, unit)] * 3 if one else None
+        return [self._number(entry, low, high, unit) for entry in entries]
+
+    def entries(self, number: int) -> list[Entry]:
+        """Entries of a parameter for X, Y and Z, in this order, as far as the dump has them."""
+        found = (self.dump.get(number, axis) for axis in self.axes)
+        return [entry for entry in found if entry is not None]
+
+    def bit(self, number: int, bit: int) -> bool | None:
+        """A bit of a parameter, counted from the right, from 0; that of X if per axis; None: missing or malformed."""
+        entry = self.dump.get(number) or next(iter(self.entries(number)), None)
+        return None if entry is None else self.bit_of(entry, bit)
+
+    def bit_of(self, entry: Entry, bit: int) -> bool | None:
+        """A bit of a value of eight bits, from the right, from 0; for another value note a problem and return None."""
+        if len(entry.text) != 8 or set(entry.text) - {"0", "1"}:
+            name = f"parameter {entry.number} {entry.target}".rstrip()
+            self.problems.append(Problem(name, entry.text, "must be eight bits, 0 or 1", entry.line))
+            return None
+        return entry.text[7 - bit] == "1"
+
+    def _number(self, entry: Entry, low: float, high: float, unit: str) -> float:
+        value = float(entry.text) * (MM_PER_INCH if entry.letter == "I" and unit.startswith("mm") else 1.0)
+        if not low <= value <= high:
+            name = f"parameter {entry.number} {entry.target}".rstrip()
+            limit = f"must be {low:g} to {high:g} (unit: {unit})"
+            self.problems.append(Problem(name, entry.text, limit, entry.line))
+        return value
+
     def problem(self, number: int, message: str) -> None:
         """Report a parameter that makes the dump useless, with its line."""
         line = next((entry.line for (n, _), entry in self.dump.entries.items() if n == number), None)
-        self.values.problems.append(Problem(f"parameter {number}", "", message, line))
+        self.problems.append(Problem(f"parameter {number}", "", message, line))
 
     def miss(self, number: int | str, why: str, line: int | None = None) -> None:
         """Note a parameter that is missing or has no effect."""
         if line is None and isinstance(number, int):
-            entry = self.dump.get(number) or next(iter(self.values.entries(number)), None)
+            entry = self.dump.get(number) or next(iter(self.entries(number)), None)
             line = entry.line if entry else None
         self.missing.append(MissingParameter(str(number), line, why))
 
@@ -369,7 +361,7 @@ class Draft:
         if note:
             self.assume(key, shown, note)
         for number in numbers:
-            axes = self.values.axes if axis is None else (axis,)
+            axes = self.axes if axis is None else (axis,)
             entries = [entry for a in axes if (entry := self.dump.get(number, a))]
             path = self.dump.get(number)
             for entry in entries or ([path] if path else []):
@@ -377,7 +369,7 @@ class Draft:
 
     def choose(self, key: str, number: int, bit: int, on: Value = True, off: Value = False) -> bool | None:
         """Put one of two values into the machine by a bit of the dump; do nothing and return None without it."""
-        found = self.values.bit(number, bit)
+        found = self.bit(number, bit)
         if found is not None:
             self.set(key, on if found else off, number)
         return found

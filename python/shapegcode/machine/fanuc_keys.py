@@ -49,10 +49,9 @@ def take_parameters(draft: Draft) -> None:
 
 def _limits_and_law(draft: Draft) -> bool:
     """Read axis limits and kind of acceleration; True for acceleration before interpolation."""
-    values = draft.values
-    acceleration = values.per_axis(1660, unit="mm/s²")
-    speed, time = values.per_axis(1770, unit="mm/min"), values.per_axis(1771, LONGEST_MS, "ms")
-    filter_ms, bell_ms = values.scalar(1769, LONGEST_MS, "ms"), values.scalar(1772, LONGEST_MS, "ms")
+    acceleration = draft.per_axis(1660, unit="mm/s²")
+    speed, time = draft.per_axis(1770, unit="mm/min"), draft.per_axis(1771, LONGEST_MS, "ms")
+    filter_ms, bell_ms = draft.scalar(1769, LONGEST_MS, "ms"), draft.scalar(1772, LONGEST_MS, "ms")
     numbers: tuple[int, ...] = ()
     if acceleration and min(acceleration) > 0:
         numbers = (1660,)
@@ -63,7 +62,7 @@ def _limits_and_law(draft: Draft) -> bool:
     before = bool(numbers) and (numbers[0] == 1770 or filter_ms is not None or bell_ms is not None)
     if before:
         why = "the dump has acceleration before interpolation, but the program decides whether it is on (G05.1, G08)"
-        if values.bit(1604, 0):
+        if draft.bit(1604, 0):
             draft.set("controller.motion", "look_ahead", 1604, *numbers)
         else:
             draft.set("controller.motion", "look_ahead", *numbers, note=why)
@@ -77,7 +76,7 @@ def _limits_and_law(draft: Draft) -> bool:
         _after_interpolation(draft)
     if numbers and acceleration:
         for k, name in enumerate("xyz"):
-            axis = values.axes[k]
+            axis = draft.axes[k]
             draft.set(f"axes.{name}.max_acceleration_mm_s2", acceleration[k], *numbers, axis=axis)
     return before
 
@@ -85,7 +84,7 @@ def _limits_and_law(draft: Draft) -> bool:
 def _look_ahead_filter(draft: Draft, time_s: float) -> None:
     """Read 1769; a bell or exponential filter (1602#3, #6) becomes a moving average with the same radial error."""
     key = "controller.look_ahead_filter_time_constant_s"
-    linear, bell = draft.values.bit(1602, 6), draft.values.bit(1602, 3)
+    linear, bell = draft.bit(1602, 6), draft.bit(1602, 3)
     if linear is None or bell is None:
         draft.set(key, time_s, 1769, note="no 1602: linear after interpolation")
     elif bell:
@@ -100,14 +99,13 @@ def _look_ahead_filter(draft: Draft, time_s: float) -> None:
 
 def _cutting_feeds(draft: Draft) -> None:
     """Set the maximum feeds: per axis the smallest of parameters 1422, 1430 (look-ahead off), 1432 (on)."""
-    values = draft.values
-    found = {n: values.per_axis(n, unit="mm/min") for n in (1422, 1430, 1432)}
+    found = {n: draft.per_axis(n, unit="mm/min") for n in (1422, 1430, 1432)}
     for k, name in enumerate("xyz"):
         usable = {n: feeds[k] for n, feeds in found.items() if feeds and feeds[k] > 0}
         if usable:
             number = min(usable, key=lambda n: usable[n])
             key = f"axes.{name}.max_feed_mm_per_min"
-            draft.set(key, usable[number], number, axis=values.axes[k])
+            draft.set(key, usable[number], number, axis=draft.axes[k])
             others = [f"{n}: {feed:g}" for n, feed in usable.items() if n != number]
             if others:
                 draft.remarks[key] += f", the smallest ({', '.join(others)})"
@@ -115,10 +113,10 @@ def _cutting_feeds(draft: Draft) -> None:
 
 def _after_interpolation_s(draft: Draft) -> tuple[float, float, str, str] | None:
     """Filter by parameter 1622: time constant, second time constant, shape and note; None: not in the dump."""
-    time = draft.values.scalar(1622, LONGEST_MS, "ms")
+    time = draft.scalar(1622, LONGEST_MS, "ms")
     if time is None:
         return None
-    linear, bell = draft.values.bit(1610, 0), draft.values.bit(1610, 1)
+    linear, bell = draft.bit(1610, 0), draft.bit(1610, 1)
     if bell:
         # Two moving averages of T/√2 have the variance T²/12 together, and so the radial error of the manual.
         part = time / 1000 / math.sqrt(2)
@@ -137,7 +135,7 @@ def _after_interpolation(draft: Draft) -> None:
     why = "no acceleration before interpolation in the dump"
     draft.set("controller.motion", "after_interpolation", 1622, note=why)
     _set_filter(draft, found, "time_constant_s", "bell_time_s", "after_interpolation_shape")
-    lowest = draft.values.scalar(1623, unit="mm/min")
+    lowest = draft.scalar(1623, unit="mm/min")
     if lowest:
         draft.miss(1623, f"lowest feed of exponential acceleration, {lowest:g} mm/min: read, but without a key")
 
@@ -158,42 +156,40 @@ def _set_filter(draft: Draft, found: tuple[float, float, str, str], *names: str)
 
 
 def _corners_and_arcs(draft: Draft) -> None:
-    values = draft.values
-    steps = values.per_axis(1783, unit="mm/min")
+    steps = draft.per_axis(1783, unit="mm/min")
     if steps and min(steps) > 0:
         draft.set("controller.corner_speed_difference_mm_per_min", steps, 1783)
     elif steps:
         draft.miss(1783, "0: the behaviour of the controller is not known")
-    across = [v for v in values.per_axis(1735, unit="mm/s²") or [] if v > 0]
-    feed, radius = values.scalar(1730, unit="mm/min"), values.scalar(1731, unit="µm")
+    across = [v for v in draft.per_axis(1735, unit="mm/s²") or [] if v > 0]
+    feed, radius = draft.scalar(1730, unit="mm/min"), draft.scalar(1731, unit="µm")
     if across:
         draft.set("controller.centripetal_acceleration_mm_s2", min(across), 1735)
     elif feed and radius:
         draft.set("controller.centripetal_acceleration_mm_s2", (feed / 60) ** 2 / (radius / 1000), 1730, 1731)
-    if values.scalar(1732, unit="mm/min"):
+    if draft.scalar(1732, unit="mm/min"):
         draft.miss(1732, "lowest feed of the clamp on arcs: read, but without a key")
-    along = values.per_axis(1737, unit="mm/s²")
+    along = draft.per_axis(1737, unit="mm/s²")
     if along and min(along) > 0:
         draft.set("controller.contour_acceleration_mm_s2", along, 1737)
 
 
 def _rapids(draft: Draft, before: bool) -> None:
-    values = draft.values
-    rates = values.per_axis(1420, unit="mm/min", low=1e-3)
+    rates = draft.per_axis(1420, unit="mm/min", low=1e-3)
     for k, name in enumerate("xyz"):
         if rates:
-            draft.set(f"axes.{name}.rapid_mm_per_min", rates[k], 1420, axis=values.axes[k])
+            draft.set(f"axes.{name}.rapid_mm_per_min", rates[k], 1420, axis=draft.axes[k])
     look_ahead = before or draft.get("controller.motion") == "look_ahead"
-    ahead = values.per_axis(1773, LONGEST_MS, "ms") if look_ahead else None
+    ahead = draft.per_axis(1773, LONGEST_MS, "ms") if look_ahead else None
     use_1773 = bool(ahead) and min(ahead or [0]) > 0
-    times = ahead if use_1773 else values.per_axis(1620, LONGEST_MS, "ms")
+    times = ahead if use_1773 else draft.per_axis(1620, LONGEST_MS, "ms")
     if times:
         draft.set("controller.rapid_time_constant_s", [t / 1000 for t in times], 1773 if use_1773 else 1620)
     number = 1774 if use_1773 else 1621
-    bell = values.scalar(number, LONGEST_MS, "ms")
+    bell = draft.scalar(number, LONGEST_MS, "ms")
     if bell is not None:
         note = ""
-        if number == 1621 and bell and values.bit(1603, 6) is False:
+        if number == 1621 and bell and draft.bit(1603, 6) is False:
             # Newer series have no RBL and take the bell from 1621 alone [general knowledge].
             note = "bell bit 1603#6 is 0; on this series " + ("1621 alone decides" if draft.dump.with_q else "off")
             bell = bell if draft.dump.with_q else 0.0
@@ -209,13 +205,12 @@ def _multiplier(code: float) -> float | None:
 
 
 def _servo(draft: Draft) -> None:
-    values = draft.values
-    gains = values.per_axis(1825, unit="0.01/s", low=1)
+    gains = draft.per_axis(1825, unit="0.01/s", low=1)
     if gains:
         draft.set("controller.position_gain_per_s", [g * 0.01 for g in gains], 1825)
-    widths = values.per_axis(1826, unit="detection units")
+    widths = draft.per_axis(1826, unit="detection units")
     if widths and min(widths) > 0:
-        codes = values.per_axis(1820, 1000)
+        codes = draft.per_axis(1820, 1000)
         multipliers = [_multiplier(code) for code in codes or ()]
         step_um, known = increment_um(draft)
         if len(multipliers) == 3 and all(multipliers):
@@ -226,12 +221,12 @@ def _servo(draft: Draft) -> None:
             units, numbers, note = [1.0] * 3, (1826,), "detection unit 1 µm assumed (no command multiplier 1820)"
         um = [round(width * unit, 9) for width, unit in zip(widths, units, strict=True)]
         draft.set("controller.in_position_width_um", um, *numbers, note=note)
-    on = [draft.dump.get(2005, axis) for axis in values.axes]
+    on = [draft.dump.get(2005, axis) for axis in draft.axes]
     if all(on):
-        fine, coarse = values.per_axis(2092, 10_000, "0.01 %"), values.per_axis(2068, 100, "%")
+        fine, coarse = draft.per_axis(2092, 10_000, "0.01 %"), draft.per_axis(2068, 100, "%")
         ratios = [0.0, 0.0, 0.0]
         for k, entry in enumerate(on):
-            if entry is not None and values.bit_of(entry, 1):
+            if entry is not None and draft.bit_of(entry, 1):
                 ratios[k] = fine[k] / 1e4 if fine and fine[k] else (coarse[k] / 100 if coarse else 0.0)
         draft.set("controller.feed_forward_ratio", ratios, 2005, 2092 if fine else 2068)
 
@@ -256,7 +251,7 @@ def _tools(draft: Draft, tables: ControlTables) -> None:
     # Memory A: one value; B: geometry and wear; C: geometry and wear, separately for length and radius.
     memory = "C" if tables.kinds & {12, 13} else "B" if tables.kinds & {10, 11} else "A"
     _put(draft, tables, "tools", "controller.offset_memory", memory, 1)
-    halved = 2.0 if draft.values.bit(5004, 2) else 1.0
+    halved = 2.0 if draft.bit(5004, 2) else 1.0
     mm = {
         kind: {number: round(_mm(draft, *each), 9) for number, each in rows.items()}
         for kind, rows in tables.tools.items()
@@ -282,7 +277,7 @@ def _mm(draft: Draft, value: float, point: bool) -> float:
     """Convert a table value to mm: with a point it is in mm or inch (0000#2), without one in least increments."""
     if not point:
         return value * (increment_um(draft)[0] / 1000)
-    return value * (MM_PER_INCH if draft.values.bit(0, 2) else 1.0)
+    return value * (MM_PER_INCH if draft.bit(0, 2) else 1.0)
 
 
 def _systems(draft: Draft, tables: ControlTables) -> None:
@@ -315,7 +310,7 @@ def _axes(draft: Draft) -> None:
     if absent:
         draft.problem(1020, f"no axis is named {', '.join(absent)}")
         return
-    draft.values.axes = (names[88], names[89], names[90])
+    draft.axes = (names[88], names[89], names[90])
 
 
 def increment_um(draft: Draft) -> tuple[float, bool]:
@@ -323,13 +318,13 @@ def increment_um(draft: Draft) -> tuple[float, bool]:
     number = _increment_parameter(draft)
     if number is None:
         return 1.0, False
-    fine, coarse = draft.values.bit(number, 1), draft.values.bit(number, 0)
+    fine, coarse = draft.bit(number, 1), draft.bit(number, 0)
     return (0.1 if fine else 10.0 if coarse else 1.0), True
 
 
 def _increment_parameter(draft: Draft) -> int | None:
     """Number of the parameter with the increment bits: 1013 per axis; in older series 1004 for all."""
-    return next((n for n in (1013, 1004) if draft.values.bit(n, 1) is not None), None)
+    return next((n for n in (1013, 1004) if draft.bit(n, 1) is not None), None)
 
 
 def _increments(draft: Draft) -> None:
@@ -338,7 +333,7 @@ def _increments(draft: Draft) -> None:
         draft.miss(1013, "no increment system: IS-B is assumed, least increment 0.001 mm")
         return
     step_um, _ = increment_um(draft)
-    steps = {draft.values.bit_of(entry, 1) for entry in draft.values.entries(number)}
+    steps = {draft.bit_of(entry, 1) for entry in draft.entries(number)}
     if len(steps) > 1:
         draft.assume(f"parameter {number}", "differs", "increment systems differ between the axes; that of X counts")
     draft.set("controller.least_increment_mm", round(step_um / 1000, 9), number)
@@ -346,7 +341,6 @@ def _increments(draft: Draft) -> None:
 
 
 def _words_and_arcs(draft: Draft) -> None:
-    values = draft.values
     draft.choose("controller.calculator_decimal_point", 3401, 0)
     draft.choose("input.arc_without_centre", 3403, 5, "alarm", "line")
     entry = draft.dump.get(3410)
@@ -356,10 +350,10 @@ def _words_and_arcs(draft: Draft) -> None:
     elif entry:
         draft.miss(3410, "0: means no check on some series; not known here", entry.line)
     if draft.choose("power_on.motion", 3402, 0, "G01", "G00") is not None:
-        draft.choose("power_on.plane", 3402, 2, "G19", "G18" if values.bit(3402, 1) else "G17")
+        draft.choose("power_on.plane", 3402, 2, "G19", "G18" if draft.bit(3402, 1) else "G17")
         draft.choose("power_on.distance", 3402, 3, "G91", "G90")
     draft.choose("power_on.units", 0, 2, "G20", "G21")
-    codes = {n: values.scalar(n, 99_999_999) for n in range(3411, 3433)}
+    codes = {n: draft.scalar(n, 99_999_999) for n in range(3411, 3433)}
     given = {n: int(code) for n, code in codes.items() if code}
     if given:
         draft.set("controller.no_buffer_m_codes", tuple(sorted(set(given.values()))), *given)
@@ -367,10 +361,10 @@ def _words_and_arcs(draft: Draft) -> None:
 
 def _length_mm(draft: Draft, number: int) -> float | None:
     """Read a length without axes: with a point in mm or inch, without one in least increments."""
-    value = draft.values.scalar(number, unit="mm")
+    value = draft.scalar(number, unit="mm")
     if value is None:
         return None
-    entry = draft.dump.get(number) or draft.values.entries(number)[0]
+    entry = draft.dump.get(number) or draft.entries(number)[0]
     return value if "." in entry.text else round(value * increment_um(draft)[0] / 1000, 9)
 
 
@@ -382,7 +376,7 @@ def _cycles_and_offsets(draft: Draft) -> None:
         largest = max(given.values())
         note = "" if min(given.values()) == largest else "G73 and G83 differ; the larger one counts for both"
         draft.set("input.peck_clearance_mm", largest, *given, note=note)
-    if draft.values.bit(5003, 1):
+    if draft.bit(5003, 1):
         draft.miss(5003, "start-up of cutter compensation of type C: read, but not supported; type A or B is used")
     else:
         draft.choose("input.compensation_start_up", 5003, 0, "B", "A")
@@ -390,12 +384,12 @@ def _cycles_and_offsets(draft: Draft) -> None:
 
 def _work_offsets(draft: Draft) -> None:
     """Read 1221 to 1226 (G54 to G59), each with 1220 added."""
-    values, step_mm = draft.values, increment_um(draft)[0] / 1000
+    step_mm = increment_um(draft)[0] / 1000
     found: dict[int, list[float]] = {}
     for number in _OFFSETS:
-        entries = values.entries(number)
+        entries = draft.entries(number)
         if len(entries) == 3:
-            mm = values.per_axis(number, unit="mm", low=-1e7) or []
+            mm = draft.per_axis(number, unit="mm", low=-1e7) or []
             found[number] = [v if "." in e.text else v * step_mm for v, e in zip(mm, entries, strict=True)]
     shift = found.pop(1220, [0.0, 0.0, 0.0])
     if found:
@@ -418,7 +412,7 @@ def _calls(draft: Draft) -> None:
         ("input.m_macros", range(6080, 6090), 9020),
     )
     for key, numbers, first in tables:
-        codes = {n: draft.values.scalar(n, 99_999_999, low=-9999) for n in numbers}
+        codes = {n: draft.scalar(n, 99_999_999, low=-9999) for n in numbers}
         given = {n: int(code) for n, code in codes.items() if code and code > 0}
         for n in (n for n, code in codes.items() if code and code < 0):
             draft.miss(n, "a code that calls a macro in every block (negative): read, but not used")
@@ -429,16 +423,16 @@ def _calls(draft: Draft) -> None:
 
 def _serial_line(draft: Draft) -> None:
     """Read the baud rate of the I/O channel in 0020; without 0020 drip feed is not assumed."""
-    channel = draft.values.scalar(20, 35)
+    channel = draft.scalar(20, 35)
     if channel is None:
-        if draft.values.scalar(103) is not None:
+        if draft.scalar(103) is not None:
             draft.miss(103, "no 0020: input channel not known; drip feed not assumed")
         return
     number = _SERIAL.get(int(channel))
     if number is None:
         draft.set("controller.dnc_baud", 0, 20)
         return
-    speed = draft.values.scalar(number, 1000)
+    speed = draft.scalar(number, 1000)
     if speed is None:
         draft.miss(number, f"transfer speed of channel {channel:g} (0020) is not in the dump")
     elif not speed < len(_BAUD):
