@@ -240,7 +240,7 @@ def test_words_that_change_no_path() -> None:
     )  # fmt: skip
     assert plain(START + text + "M30")[1:] == ["G01X1.F1000.", "M19"]
     program = read(START + text + "M30")
-    told = " ".join(note.text for note in program.notes)
+    told = " ".join(text for _, text in program.notes)
     for word in ("CYCLE832", "COMPCAD", "RTLION", "SOFT", "G601", "FFWON", "CTOL", "G26", "SPOS"):
         assert word in told
 

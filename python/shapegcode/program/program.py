@@ -455,7 +455,7 @@ def _read_foreign(data: bytes, source: str, reading: Reading, folder: Path | Non
         index = foreign.line_files[line] if foreign.line_files else 0
         file = foreign.files[index - 1] if index else source
         raise located_error(file, foreign.lines[line], 1, str(error), error.alarm) from None
-    notes = [(note.line, note.text) for note in foreign.notes]
+    notes = list(foreign.notes)
     if foreign.reason:
         notes.insert(0, (1, f"read as a program for {CONTROLS[foreign.dialect]}: {foreign.reason}"))
     core.lead_back(data, list(foreign.lines), list(foreign.line_files), list(foreign.files), notes)

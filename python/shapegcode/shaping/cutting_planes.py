@@ -11,6 +11,7 @@ import math
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from typing import NamedTuple, Self
 
 import highspy
@@ -168,7 +169,7 @@ _STARTS = 5  # initial frequencies of a band in every search
 _BOUNDS_SHARE = 0.5  # of the worst residual: planes whose value is below this fraction count as inactive
 _SAME_VALUE = 1e-6  # relative
 _BESIDE = np.array([-1.0, 0.0, 1.0])
-_QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * math.pi
+_QUARTERS = [share * math.pi for share in (0.0, 0.5, 1.0, 1.5)]
 
 
 class Bounds(NamedTuple):
@@ -184,26 +185,21 @@ class Bounds(NamedTuple):
 
 @dataclass
 class CutPool:
-    """Planes found so far, per band: angular frequency and direction. Valid for every duration.
+    """Planes found so far, per band, each with angular frequency and direction. Valid for every duration.
 
     Directions are relative to the phase of an impulse in the middle of the shaper: so the directions of the best design
     hardly depend on its duration.
     """
 
-    omegas: list[list[float]]
-    directions: list[list[float]]
+    planes: list[list[tuple[float, float]]]
     starts: int = 0
     """This many planes of each band, the first ones, are never removed."""
 
     @classmethod
     def around(cls, bands: Sequence[ModeBand]) -> Self:
         """Start with four directions at a few frequencies of every band."""
-        pool = cls([], [], _STARTS * len(_QUARTERS))
-        for band in bands:
-            low, high = _ends(band)
-            pool.omegas.append(np.repeat(np.linspace(low, high, _STARTS), len(_QUARTERS)).tolist())
-            pool.directions.append(np.tile(_QUARTERS, _STARTS).tolist())
-        return pool
+        omegas = (np.linspace(*_ends(band), _STARTS).tolist() for band in bands)
+        return cls([list(product(each, _QUARTERS)) for each in omegas], _STARTS * len(_QUARTERS))
 
 
 class _Band:
@@ -308,34 +304,30 @@ class TapProblem:
     def _add_cuts(self, taps: FloatArray, bound: float) -> float:
         """Add planes where the bound is exceeded; returns the largest residual over the bands."""
         worst = 0.0
-        for band, omegas, directions in zip(self._bands, self.pool.omegas, self.pool.directions, strict=True):
+        for band, planes in zip(self._bands, self.pool.planes, strict=True):
             where, values = band.peaks(taps)
             size = np.abs(values)
             worst = max(worst, float(size.max()))
             over = size > (1.0 + 0.1 * SAME_RESIDUAL) * bound
-            omegas.extend(where[over].tolist())
-            directions.extend(np.angle(values[over]).tolist())
+            planes.extend(zip(where[over].tolist(), np.angle(values[over]).tolist(), strict=True))
         return worst
 
     def _forget(self, taps: FloatArray, worst: float) -> None:
         """Remove inactive cutting planes from the pool."""
         self._program = None if self._bands else self._program
-        for rows, omegas, directions in zip(self._rows, self.pool.omegas, self.pool.directions, strict=True):
+        for rows, planes in zip(self._rows, self.pool.planes, strict=True):
             keep = [
                 k for k in range(len(rows)) if k < self.pool.starts or float(rows[k] @ taps) >= _BOUNDS_SHARE * worst
             ]
             rows[:] = [rows[k] for k in keep]
-            omegas[:] = [omegas[k] for k in keep]
-            directions[:] = [directions[k] for k in keep]
+            planes[:] = [planes[k] for k in keep]
 
     def _with_planes(self, limit: float) -> TapProgram:
         new: list[FloatArray] = []
-        for band, rows, omegas, directions in zip(
-            self._bands, self._rows, self.pool.omegas, self.pool.directions, strict=True
-        ):
-            done = len(rows)
-            if done < len(omegas):
-                turned = np.exp(np.outer(omegas[done:], band.q) - 1j * np.array(directions[done:])[:, None])
+        for band, rows, planes in zip(self._bands, self._rows, self.pool.planes, strict=True):
+            if len(rows) < len(planes):
+                omegas, directions = np.array(planes[len(rows) :]).T
+                turned = np.exp(np.outer(omegas, band.q) - 1j * directions[:, None])
                 rows.extend(turned.real)
                 new.extend(turned.real)
         if self._program is None or (self._bands and limit != self._limit):

@@ -16,7 +16,7 @@ from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode
 from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import check_times, whole_periods
 from shapegcode.shaping.cutting_planes import LinearProgram
-from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, refined, shortest_non_negative
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, exact_conditions, refined, shortest_non_negative
 
 _LOOKS = 16  # steps from node to node; the residual is checked between them
 _SUPPORT = 1e-9  # smaller amplitudes are no taps
@@ -134,7 +134,7 @@ def taps_of_mean(
 ) -> tuple[NDArray[np.intp], FloatArray, Shaper] | None:
     """Delays in periods and taps as in `shaper_of_mean`; and their shaper, moved so that its times begin at 0."""
     steps = np.arange(periods + 1.0)
-    matrix, right = _conditions(modes, period_s, steps)
+    matrix, right = exact_conditions(modes, period_s, periods)
     matrix = np.vstack([matrix, steps / periods])
     right = np.append(right, mean_s / period_s / periods)
     cost = steps**2 / periods**2
@@ -166,15 +166,6 @@ def _vertices(matrix: FloatArray, right: FloatArray, *costs: FloatArray) -> list
     return found
 
 
-def _conditions(modes: Sequence[Mode], period_s: float, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Equations: sum of the impulses 1, real and imaginary part of every mode's residual 0; scaled so that no entry
-    exceeds 1."""
-    poles = np.array([mode.pole for mode in modes])
-    terms = np.exp(np.outer(poles, (steps[-1] - steps) * period_s))
-    matrix = np.vstack([terms.real, terms.imag, np.ones(len(steps))])
-    return matrix, np.append(np.zeros(len(matrix) - 1), 1.0)
-
-
 def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_s: float) -> list[Shaper]:
     """One shaper for each set of modes, all with the same mean delay; without a common one the shortest shapers."""
     shortest = [shortest_non_negative(modes, period_s, max_duration_s) for modes in found]
@@ -197,7 +188,7 @@ def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_
 def mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[float, float]:
     """Smallest and largest mean delay of non-negative exact shapers, in periods; (inf, -inf): there are none."""
     steps = np.arange(periods + 1.0)
-    matrix, right = _conditions(modes, period_s, steps)
+    matrix, right = exact_conditions(modes, period_s, periods)
     least, largest = _vertices(matrix, right, steps / periods, -steps / periods)
     if least is None or largest is None:
         return math.inf, -math.inf

@@ -65,8 +65,8 @@ def read_haas(source: str, *, file: str, machine: Machine, folder: Path | None =
     if called:
         lines, numbers = _with_subprograms(lines, called, file)
     settings = ForeignSettings(calculator_decimal_point=None, called_text=called_haas_text)
-    found = tuple(sorted(notes.values(), key=lambda note: note.line))
-    return ForeignProgram("haas", "".join(lines), numbers, notes=found, settings=settings)
+    found = sorted(notes.values(), key=lambda note: note[0])
+    return ForeignProgram("haas", "".join(lines), numbers, notes=tuple(found), settings=settings)
 
 
 def called_haas_text(source: str, file: str) -> str:
@@ -94,7 +94,7 @@ def _lines(source: str, file: str, notes: dict[str, Note]) -> tuple[list[str], d
         line = code[starts[index] : starts[index + 1]]
 
         def note(key: str, text: str, number: int = index + 1) -> None:
-            notes.setdefault(key, Note(number, text))
+            notes.setdefault(key, (number, text))
 
         try:
             lines[index] = _plain_line(lines[index], line, note)

@@ -19,12 +19,9 @@ from shapegcode.machine import Machine
 _MAX_CALLED_BYTES = 10_000_000
 
 
-@dataclass(frozen=True)
-class Note:
-    """A note about a line of the source."""
-
-    line: int  # of the source, from 1
-    text: str  # one sentence, with both meanings where a word means another thing on FANUC
+Note = tuple[
+    int, str
+]  # line of the source, from 1; a sentence, with both meanings of a word that FANUC reads otherwise
 
 
 @dataclass(frozen=True)
@@ -70,7 +67,7 @@ def program_of_core(dialect: str, expanded: _core.ExpandedProgram, settings: For
         dialect,
         expanded.text.decode("latin-1"),
         expanded.lines,
-        notes=tuple(Note(line, text) for line, text in expanded.notes),
+        notes=tuple(expanded.notes),
         files=tuple(expanded.files),
         line_files=expanded.line_files,
         settings=settings,
