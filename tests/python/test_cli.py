@@ -13,7 +13,7 @@ import pytest
 import shapegcode as sg
 from acceptance import PROGRAMS
 from command import run, run_process
-from shapegcode.cli import COMMANDS, convert
+from shapegcode.cli import COMMANDS, convert, interface_of
 from shapegcode.cli.options import load_machine, overridden
 from shapegcode.results.json import schema
 
@@ -176,7 +176,7 @@ def test_an_option_has_one_name_and_one_unit_on_every_command() -> None:
 
     for command in COMMANDS:
         parser = argparse.ArgumentParser()
-        command.interface().declare(parser)
+        interface_of(command).declare(parser)
         look(parser)
     # What is written has the name of what it is, and the program of a test cut its number.
     written = {"--html", "--output", "--program"}
@@ -294,7 +294,7 @@ def test_help(folder: Path, command: str) -> None:
     done = run(folder, command, "--help", COLUMNS="100")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"usage: shapegcode {command}")
-    assert all(each.name in run(folder, "--help").stdout for each in COMMANDS)
+    assert all(each in run(folder, "--help").stdout for each in COMMANDS)
 
 
 def test_version_and_debug(folder: Path) -> None:

@@ -92,7 +92,7 @@ def test_an_unknown_shell_is_refused(capsys: pytest.CaptureFixture[str]) -> None
 def test_manual_pages_are_what_a_formatter_takes(tmp_path: Path) -> None:
     """A page for each command; mandoc finds nothing wrong, and shows groups, options and examples."""
     pages = write_man.pages()
-    assert set(pages) == {"shapegcode.1", *(f"shapegcode-{command.name}.1" for command in COMMANDS)}
+    assert set(pages) == {"shapegcode.1", *(f"shapegcode-{command}.1" for command in COMMANDS)}
     for name, text in pages.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     files = sorted(tmp_path.glob("*.1"))

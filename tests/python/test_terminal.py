@@ -26,10 +26,10 @@ def _actions(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentPars
 def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
     """Every command and action with its parser."""
     for command in COMMANDS:
-        parser = _actions(parser_of(command.name))[command.name]
-        yield command.name, parser
+        parser = _actions(parser_of(command))[command]
+        yield command, parser
         for name, action in _actions(parser).items():
-            yield f"{command.name} {name}", action
+            yield f"{command} {name}", action
 
 
 def test_each_command_has_two_examples_that_it_understands() -> None:

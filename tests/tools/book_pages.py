@@ -82,18 +82,18 @@ def _page_width(columns: int) -> Iterator[None]:
 def _commands() -> dict[str, str]:
     rows, found = [], {}
     with _page_width(88):
-        for command in cli.COMMANDS:
-            whole = cli.parser_of(command.name)
-            own = next(each for each in parsers(whole) if each.prog.split()[1:] == [command.name])
-            parts = [f"# `shapegcode {command.name}`\n\n{command.help[:1].upper()}{command.help[1:]}.\n"]
+        for command, line in cli.COMMANDS.items():
+            whole = cli.parser_of(command)
+            own = next(each for each in parsers(whole) if each.prog.split()[1:] == [command])
+            parts = [f"# `shapegcode {command}`\n\n{line[:1].upper()}{line[1:]}.\n"]
             for each in parsers(own):
                 if each is not own:
                     parts.append(f"## `{each.prog}`\n")
                 parts.append(f"```text\n{each.format_help().rstrip()}\n```\n")
-            found[f"reference/commands/{command.name}.md"] = "\n".join(parts)
-            rows.append(f"| [`{command.name}`]({command.name}.md) | {command.help} |")
+            found[f"reference/commands/{command}.md"] = "\n".join(parts)
+            rows.append(f"| [`{command}`]({command}.md) | {line} |")
     head = "# Commands\n\nWhat `shapegcode COMMAND --help` says.\n\n| command | what it does |\n|---|---|\n"
-    names = "\n".join(command.name for command in cli.COMMANDS)
+    names = "\n".join(cli.COMMANDS)
     found["reference/commands/index.md"] = head + "\n".join(rows) + f"\n\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"
     return found
 

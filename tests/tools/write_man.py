@@ -21,10 +21,10 @@ def pages() -> dict[str, str]:
     os.environ["COLUMNS"] = "78"  # the usage stands in the page as wide as the parser makes it
     found = {"shapegcode.1": _page(parser_of(None), "shapegcode")}
     for command in COMMANDS:
-        whole = parser_of(command.name)
+        whole = parser_of(command)
         (actions,) = [each for each in whole._actions if isinstance(each, argparse._SubParsersAction)]
-        name = f"shapegcode-{command.name}"
-        found[f"{name}.1"] = _page(actions.choices[command.name], name)
+        name = f"shapegcode-{command}"
+        found[f"{name}.1"] = _page(actions.choices[command], name)
     return found
 
 

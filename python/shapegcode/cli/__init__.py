@@ -14,7 +14,6 @@ import os
 import signal
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -47,51 +46,42 @@ _HOMES = {
 """Modules shared by several commands; each other command has a module of its own."""
 
 
-@dataclass(frozen=True)
-class Command:
-    """One sub-command."""
-
-    name: str  # as typed; in capitals the name of its `Interface` in the module
-    help: str  # one line for ``shapegcode --help``
-
-    def interface(self) -> Interface:
-        """Import the command's module, and return the command's options and function."""
-        home = next((module for module, names in _HOMES.items() if self.name in names), self.name)
-        found: Interface = getattr(importlib.import_module(f"{__name__}.{home}"), self.name.upper())
-        return found
+def interface_of(command: str) -> Interface:
+    """Import the module of a command, and return its options and function."""
+    home = next((module for module, names in _HOMES.items() if command in names), command)
+    found: Interface = getattr(importlib.import_module(f"{__name__}.{home}"), command.upper())
+    return found
 
 
 def command_in(words: Iterable[str]) -> str | None:
     """The first word that names a command; None: there is none."""
-    return next((word for word in words if word in {command.name for command in COMMANDS}), None)
+    return next((word for word in words if word in COMMANDS), None)
 
 
-COMMANDS: tuple[Command, ...] = (
-    Command("convert", "convert a CNC program into an input-shaped FANUC program, and check the result"),
-    Command("shaper", "compare input shapers for some vibration modes, and recommend one"),
-    Command("simulate", "simulate a program on a model of the machine: cycle time, vibration, contour error"),
-    Command("feed", "set the feeds of a program so that cutting force and deflection stay within the tool's limits"),
-    Command("expand", "write the expanded program: calls, macros and coordinate modes resolved"),
-    Command("measure", "measure the simulated part: contour, radius, walls, roughness, vibration"),
-    Command("time", "predict the cycle time of a program and show where the time goes"),
-    Command("check", "list what the control would refuse in a program, or not run as programmed"),
-    Command("compare", "list what differs between two programs: path, rapids, tools, offsets, functions"),
-    Command("setup", "make the first machine file by answering questions"),
-    Command("machine", "write or explain a machine file, or import one from the control's parameters"),
-    Command("characterize", "measure a control with test programs, and fit the machine file to the results"),
-    Command("identify", "find vibration modes in a tap test or decay, and write them to the machine file"),
-    Command("sweep", "write a program that shakes an axis, to find modes without a hammer (identify --sweep)"),
-    Command("testcut", "write test cuts as programs, and fit cutting-force coefficients to their measured forces"),
-    Command("batch", "run a command over many programs and machines, and resume where it stopped"),
-    Command("study", "simulate a program on sampled machines (Monte Carlo): probability of staying within tolerance"),
-    Command(
-        "optimize", "choose settings for the shortest program that stays within tolerance on most sampled machines"
-    ),
-    Command("report", "make HTML pages from --json files"),
-    Command("completion", "print the shell completion script for bash, zsh or fish"),
-    Command("demo", "reproduce a paper's figures, compared with the published ones"),
-)
-"""Every sub-command, in the order of the help text. A new one needs a row here and its interface in a module."""
+COMMANDS = {
+    "convert": "convert a CNC program into an input-shaped FANUC program, and check the result",
+    "shaper": "compare input shapers for some vibration modes, and recommend one",
+    "simulate": "simulate a program on a model of the machine: cycle time, vibration, contour error",
+    "feed": "set the feeds of a program so that cutting force and deflection stay within the tool's limits",
+    "expand": "write the expanded program: calls, macros and coordinate modes resolved",
+    "measure": "measure the simulated part: contour, radius, walls, roughness, vibration",
+    "time": "predict the cycle time of a program and show where the time goes",
+    "check": "list what the control would refuse in a program, or not run as programmed",
+    "compare": "list what differs between two programs: path, rapids, tools, offsets, functions",
+    "setup": "make the first machine file by answering questions",
+    "machine": "write or explain a machine file, or import one from the control's parameters",
+    "characterize": "measure a control with test programs, and fit the machine file to the results",
+    "identify": "find vibration modes in a tap test or decay, and write them to the machine file",
+    "sweep": "write a program that shakes an axis, to find modes without a hammer (identify --sweep)",
+    "testcut": "write test cuts as programs, and fit cutting-force coefficients to their measured forces",
+    "batch": "run a command over many programs and machines, and resume where it stopped",
+    "study": "simulate a program on sampled machines (Monte Carlo): probability of staying within tolerance",
+    "optimize": "choose settings for the shortest program that stays within tolerance on most sampled machines",
+    "report": "make HTML pages from --json files",
+    "completion": "print the shell completion script for bash, zsh or fish",
+    "demo": "reproduce a paper's figures, compared with the published ones",
+}
+"""Help line of every sub-command, in the order of the help; its interface, in a module, has its name in capitals."""
 
 
 class _Version(argparse.Action):
@@ -116,12 +106,10 @@ def parser_of(selected: str | None) -> argparse.ArgumentParser:
     # Only for the help: main() removes it, so that it is allowed anywhere.
     parser.add_argument(_DEBUG, action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, title="commands")
-    for command in COMMANDS:
-        sub = commands.add_parser(
-            command.name, help=command.help, description=f"{command.help[:1].upper()}{command.help[1:]}."
-        )
-        if command.name == selected:
-            command.interface().declare(sub)
+    for name, text in COMMANDS.items():
+        sub = commands.add_parser(name, help=text, description=f"{text[:1].upper()}{text[1:]}.")
+        if name == selected:
+            interface_of(name).declare(sub)
     return parser
 
 
