@@ -176,7 +176,7 @@ def _restarts(program: Program, emitted: Program, written: Written, machine: Mac
         yield _restart_lines(emitted, placed)
     count = sum(len(each.marks) for each in restarts)
     if count:
-        before = (*emission.prologue, *emission.locking)
+        before = (*emission.prologue, *emission.around_cuts["LOCK"])
         shakes_um = max(mark.vibration_um for each in restarts for mark in each.marks)
         switched = f", enter {' '.join(before)} by MDI" if before else ""
         yield (

@@ -256,17 +256,14 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
         start_s = float(times[0])
         if time.label.unit is None and options.time_unit is None:
             reader.warnings.append(f"the time has no unit: s is assumed, {1.0 / period:.6g} samples per second")
-    at = 0 if time is None else 1
-    force_n = None
-    if force is not None:
-        force_n = np.ascontiguousarray(values[:, at] * force.factor)
-        at += 1
+    values_of = dict(zip((column.index for column in columns), values.T, strict=True))
+    force_n = None if force is None else np.ascontiguousarray(values_of[force.index] * force.factor)
     several = len(responses) > 1
     return [
         Record(
             source=f"{path} {column.label.text}" if several else str(path),
             period_s=period,
-            response=np.ascontiguousarray(values[:, at + k] * column.factor),
+            response=np.ascontiguousarray(values_of[column.index] * column.factor),
             quantity=column.quantity,
             force_n=force_n,
             axis=column.label.axis or (options.axis if not several else None),
@@ -275,7 +272,7 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
             notes=tuple(reader.notes),
             widened=widened,
         )
-        for k, column in enumerate(responses)
+        for column in responses
     ]
 
 

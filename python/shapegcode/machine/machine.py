@@ -135,14 +135,14 @@ class Machine(TomlTable):
         emission, controller = self.emission, self.controller
         if emission.override != "lock":
             return self
-        own = dialect_of(emission.dialect)
+        own, (*_, lock, unlock) = dialect_of(emission.dialect), emission.around_cuts.values()
         if own is None or not own.lock_word:
-            for name, lines in zip(_LOCK_LINES, (emission.locking, emission.unlocking), strict=True):
+            for name, lines in zip(_LOCK_LINES, (lock, unlock), strict=True):
                 if not lines:
                     none = f": no word that switches the feed override of {own.control} off is known" if own else ""
                     limit = f'must not be empty with emission.override = "lock"{none}'
                     raise KeyProblem(f"emission.{name}", [], limit)
-        variables = set(_VARIABLE.findall(" ".join((*emission.locking, *emission.unlocking))))
+        variables = set(_VARIABLE.findall(" ".join((*lock, *unlock))))
         kept = variables - {"#3003", "#3004"}
         for name, lines in (("prologue", emission.prologue), ("epilogue", emission.epilogue)):
             if used := kept & set(_VARIABLE.findall(" ".join(lines))):

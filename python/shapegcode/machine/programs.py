@@ -277,25 +277,13 @@ class Emission(TomlTable):
         return self
 
     @property
-    def locking(self) -> tuple[str, ...]:
-        """Lines that switch the feed override off, in the dialect's words; empty: no lock, or one by `lock_word`."""
-        return self._override_lines(0, self.lock_lines)
-
-    @property
-    def unlocking(self) -> tuple[str, ...]:
-        """Lines that switch the feed override on again, in the dialect's words; empty: see `locking`."""
-        return self._override_lines(1, self.unlock_lines)
-
-    def _override_lines(self, rank: int, stated: tuple[str, ...]) -> tuple[str, ...]:
-        if self.override != "lock":
-            return ()
-        own = dialect_of(self.dialect)
-        return stated if own is None or stated != _FANUC_LOCK[rank] else own.lock[rank]
-
-    @property
     def around_cuts(self) -> Mapping[str, tuple[str, ...]]:
-        """Lines before and after a shaped cut, by their purpose."""
-        return {"PROLOGUE": self.prologue, "EPILOGUE": self.epilogue, "LOCK": self.locking, "UNLOCK": self.unlocking}
+        """Lines before and after a shaped cut, by purpose; no LOCK and UNLOCK: no lock, or one by `lock_word`."""
+        lock, unlock = (self.lock_lines, self.unlock_lines) if self.override == "lock" else ((), ())
+        if (own := dialect_of(self.dialect)) is not None:  # FANUC's usual lines become those of the dialect
+            lock = own.lock[0] if lock == _FANUC_LOCK[0] else lock
+            unlock = own.lock[1] if unlock == _FANUC_LOCK[1] else unlock
+        return {"PROLOGUE": self.prologue, "EPILOGUE": self.epilogue, "LOCK": lock, "UNLOCK": unlock}
 
     @property
     def position_decimals(self) -> int | None:

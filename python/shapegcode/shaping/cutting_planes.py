@@ -126,29 +126,27 @@ class TapProgram:
     """Taps of least cost under equations and planes; an additional unknown is the excess over the planes."""
 
     def __init__(
-        self, equal: tuple[FloatArray, FloatArray], *, signed: bool, largest: float = math.inf, last_tap: float = 0.0
+        self, equal: tuple[FloatArray, FloatArray], max_abs_sum: float | None, largest: float, last_tap: float
     ) -> None:
         matrix, right = equal
-        self._count, self._signed = matrix.shape[1], signed
+        self._count, self._signed = matrix.shape[1], max_abs_sum is not None
         matrix = np.hstack([*self._parts(matrix), np.zeros((len(matrix), 1))])
         least = np.zeros(matrix.shape[1])
         least[self._count - 1] = last_tap
         self._program = LinearProgram(least, np.full(matrix.shape[1], largest), (matrix, right))
+        if max_abs_sum is not None:
+            self._program.add_below(np.append(np.ones(2 * self._count), 0.0)[None, :], np.array([max_abs_sum]))
 
     def add_planes(self, planes: FloatArray, above: FloatArray) -> None:
         """Add planes; each may exceed its limit in `above` by at most the excess."""
         self._program.add_below(np.hstack([*self._parts(planes), np.full((len(planes), 1), -1.0)]), above)
 
-    def limit_magnitudes(self, total: float) -> None:
-        """Limit the sum of the magnitudes of signed taps."""
-        self._program.add_below(np.append(np.ones(2 * self._count), 0.0)[None, :], np.array([total]))
-
-    def solve(self, cost: FloatArray | None, most: float) -> tuple[FloatArray, float] | None:
-        """Taps of least cost with an excess up to *most*, and their excess; without a cost: taps of least excess."""
+    def solve(self, cost: FloatArray | None) -> tuple[FloatArray, float] | None:
+        """Taps of least cost without an excess; without a cost: taps of least excess, and that."""
         objective = np.zeros(self._count) if cost is None else cost
         width = len(objective) * (1 + self._signed)
         self._program.set_cost(np.append(np.resize(objective, width), 1.0 if cost is None else 0.0))
-        self._program.bound(width, 0.0, math.inf if cost is None else most)
+        self._program.bound(width, 0.0, math.inf if cost is None else 0.0)
         x = self._program.solve()
         if x is None:
             return None
@@ -331,10 +329,7 @@ class TapProblem:
                 rows.extend(turned.real)
                 new.extend(turned.real)
         if self._program is None or (self._bands and limit != self._limit):
-            signed = self.max_abs_sum is not None
-            self._program = TapProgram(self.equalities, signed=signed, largest=self.largest, last_tap=self.last_tap)
-            if self.max_abs_sum is not None:
-                self._program.limit_magnitudes(self.max_abs_sum)
+            self._program = TapProgram(self.equalities, self.max_abs_sum, self.largest, self.last_tap)
             self._limit = limit
             new = [row for rows in self._rows for row in rows]
         if new:
@@ -343,7 +338,7 @@ class TapProblem:
 
     def _solve(self, cost: FloatArray | None, limit: float) -> tuple[FloatArray, float] | None:
         """Solve the linear program with the current planes: least cost within the limit, or the least excess."""
-        found = self._with_planes(limit).solve(cost, 0.0)
+        found = self._with_planes(limit).solve(cost)
         return None if found is None else (found[0], found[1] + limit)
 
 

@@ -180,8 +180,8 @@ class Thinner:
         self._most = most
         self._names: list[str] = []
         self._pieces: list[tuple[IntArray, IntArray, FloatArray, BoolArray]] = []
-        self._low: FloatArray | None = None
-        self._high: FloatArray | None = None
+        self._low: FloatArray = np.array(np.inf)
+        self._high: FloatArray = np.array(-np.inf)
         # The error of repeated decimation is the sum of the tolerances.
         self._spent = _STEP
         self._path_spent = _path_factor(_STEP)
@@ -194,9 +194,8 @@ class Thinner:
         """Decimate samples and add them."""
         self._names = list(curves)
         values = np.column_stack([command_mm, deviation_um, *curves.values()])
-        low, high = values.min(axis=0), values.max(axis=0)
-        self._low = low if self._low is None else np.minimum(self._low, low)
-        self._high = high if self._high is None else np.maximum(self._high, high)
+        self._low = np.minimum(self._low, values.min(axis=0))
+        self._high = np.maximum(self._high, values.max(axis=0))
         started = np.zeros(len(sample), dtype=bool)
         started[starts] = True
         # The ranges only grow, so tolerances from the ranges so far are finer than those at the end.
@@ -210,7 +209,6 @@ class Thinner:
             self._path_spent += _path_factor(factor)
 
     def _tolerances(self, factor: float) -> FloatArray:
-        assert self._low is not None and self._high is not None
         # The path is drawn large: its tolerance grows only after that of the curves has grown twentyfold.
         path = np.full(3, self._scales["path"] * _path_factor(factor))
         span = np.maximum(self._high - self._low, 1e-12)
