@@ -26,9 +26,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, overload
 
-from shapegcode.batching import process
+from shapegcode.batching import COMMANDS, process
 from shapegcode.batching.manifest import Manifest, base_folder
-from shapegcode.batching.plan import COMMANDS, Plan, find_programs, plan
+from shapegcode.batching.plan import Plan, find_programs, plan
 from shapegcode.batching.result import Batch, BatchRow, Ended, figures_of
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import is_temporary, write_bytes, write_lines

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from shapegcode.batching import WRITES
 from shapegcode.batching.manifest import MANIFEST, short
 from shapegcode.batching.process import Base, BatchJob
 from shapegcode.errors import ArgumentError
@@ -153,10 +154,6 @@ def _mentioned(text: bytes, folders: Sequence[Path]) -> list[int]:
     return [int(number) for number in _NUMBER.findall(text)]
 
 
-COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
-"""Commands for one program that can be run on many."""
-
-WRITES = ("convert", "feed")  # commands that write a program
 _AMOUNT = frozenset({"-q", "--quiet", "-v", "--verbose"})
 _OF_ONE_RUN = (
     "-o", "--output", "-m", "--machine", "--json", "--html", "--html-script", "--csv", "--npz", "--plots",

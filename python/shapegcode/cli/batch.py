@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from shapegcode.batching import COMMANDS, WRITES
 from shapegcode.cli import ExitCode, parser_of, runner
 from shapegcode.cli.arguments import NEEDED, Interface, Row, count, ratio, seconds, size
 from shapegcode.cli.options import AMOUNT, MACHINE_OR_NONE, RESULT_OF_DRAWS, cluster, cluster_of, load_machine, plots
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from shapegcode.studies.study_file import StudyFile
 
 _INDEX = "index.html"
-_COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
 
 
 def _batch(args: argparse.Namespace) -> int:
@@ -28,7 +28,7 @@ def _batch(args: argparse.Namespace) -> int:
 
     options = list(getattr(args, "rest", ()))
     # argparse refuses arguments unknown to the command before any run.
-    target = ["-o", "out"] if args.batch_command in ("convert", "feed") else []
+    target = ["-o", "out"] if args.batch_command in WRITES else []
     parser_of(args.batch_command).parse_args([args.batch_command, "part.nc", "-m", "vx500", *target, *options])
     html, args.html = args.html, None
     name = f"{args.batch_command}: "
@@ -67,7 +67,7 @@ BATCH = Interface(
         ("-m --machine", "MACHINE", [None],
          "machine file or built-in machine; more than one -m: every program on each of them", NEEDED),
         ("-o --output", "DIR", None, "folder of the results", NEEDED),
-        ("--command", None, {"dest": "batch_command", "choices": _COMMANDS},
+        ("--command", None, {"dest": "batch_command", "choices": COMMANDS},
          "command to run on each program (default: convert)", "convert"),
         ("--resume", None, bool, "run only what is missing, failed or changed"),
         ("--jobs", "N", count, "parallel processes (default: one per processor)", 0),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 from scipy.optimize import linear_sum_assignment
-from tomlkit.items import AoT, Key, SingleKey, Table
+from tomlkit.items import AoT, Key, SingleKey, Table, Whitespace
 
 from shapegcode.errors import ArgumentError, MachineError
 from shapegcode.identification.across import MIN_MOVE, significant_motions
@@ -302,7 +302,7 @@ class ModeTables:
             else:
                 self.notes.append(f"removed {toml(old['frequency_hz'])} Hz, {why}: {toml(old)}")
                 tail = edit.take_tail(table)
-                blank = tail[:1] if tail and edit.is_blank(tail[0]) else []
+                blank = tail[:1] if tail and isinstance(tail[0][1], Whitespace) else []
                 left += tail[len(blank) :]
                 self._gap = blank if number == 0 else self._gap
                 continue
@@ -364,7 +364,7 @@ class ModeTables:
         places |= {key.key: place for place, (key, _) in enumerate(entries[:below]) if key is not None}
         added = []
         for key, (value, remark) in values.items():
-            entry = edit.entry_of(_line(key, value, remark) + self.newline)
+            entry = tomlkit.parse(_line(key, value, remark) + self.newline).body[0]
             if key in places:
                 entry[1].trivia.indent = entries[places[key]][1].trivia.indent
                 entries[places[key]] = entry

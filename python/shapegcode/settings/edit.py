@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import tomlkit
-from tomlkit.items import AoT, Comment, InlineTable, Item, Key, Table, Whitespace
+from tomlkit.items import AoT, Comment, InlineTable, Item, Key, Table
 
 from shapegcode.errors import ArgumentError
 from shapegcode.settings.keys import ORIGIN, ORIGIN_TEXT, ORIGIN_WORDS, lines_of, origin_of, remarks_of, take_origins
@@ -33,11 +33,6 @@ def parse_exactly(text: str, file: str) -> tomlkit.TOMLDocument:
     lines = zip(text.splitlines(), rendered.splitlines(), strict=False)
     number, (line, other) = next((n, pair) for n, pair in enumerate(lines, start=1) if pair[0] != pair[1])
     raise ArgumentError(f"{file}:{number}: {line.strip()!r} cannot be kept unchanged: write it as {other.strip()!r}")
-
-
-def entry_of(line: str) -> Entry:
-    """A line with a key as an entry, with its comment and line end."""
-    return tomlkit.parse(line).body[0]
 
 
 def commented(entry: Entry, pattern: re.Pattern[str]) -> str:
@@ -68,11 +63,6 @@ def take_tail(table: Table) -> list[Entry]:
     tail += entries[end:]
     del entries[end:]
     return tail
-
-
-def is_blank(entry: Entry) -> bool:
-    """True for a blank line."""
-    return isinstance(entry[1], Whitespace)
 
 
 # --- origins of values ------------------------------------------------------------------------------------------------

@@ -7,9 +7,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-_MODULES = (
-    "bands", "registry", "robust", "result", "comparison", "track", "grid", "plots",
-)  # fmt: skip
+_MODULES = ("bands", "registry", "robust", "result", "comparison", "track", "grid", "plots")
 
 
 def __getattr__(name: str) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -65,22 +66,24 @@ def _taps(each: Design) -> tuple[float, ...]:
     return tuple(float(f"{value:.9g}") for value in (*each.shaper.times_s, *each.shaper.amplitudes))
 
 
-def _shapers_and_bands(
+def _curves_and_bands(
     result: Shapers, modes: Sequence[float | str | Mode | ModeBand]
-) -> tuple[Mapping[str, Shaper], Sequence[ModeBand]]:
-    """Shapers to draw, with their names in the legend as keys; and the modes."""
+) -> tuple[list[tuple[str, Shaper, str]], Sequence[ModeBand]]:
+    """Name in the legend, shaper and colour of each curve; and the modes."""
+    bands = result.modes if isinstance(result, Recommendation) else [mode_band(each) for each in modes]
     if isinstance(result, Recommendation):
-        shapers = {
+        shapers: Mapping[str, Shaper] = {
             f"{each.family}, {each.duration_s * 1e3:.4g} ms"
             + (f" ({times_name(each.period_s)})" if each.period_s is not None else ""): each.shaper
             for each in selected(result)
         }
-        return shapers, result.modes
-    if isinstance(result, Shaper):
-        result = {"shaper": result}
-    elif not isinstance(result, Mapping):
-        result = {f"shaper {number}": each for number, each in enumerate(result, 1)}
-    return result, [mode_band(each) for each in modes]
+    elif isinstance(result, Shaper):
+        shapers = {"shaper": result}
+    elif isinstance(result, Mapping):
+        shapers = result
+    else:
+        shapers = {f"shaper {number}": each for number, each in enumerate(result, 1)}
+    return [(*each, colour) for each, colour in zip(shapers.items(), cycle(plot.COLOURS), strict=False)], bands
 
 
 def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
@@ -145,25 +148,23 @@ def plot_sensitivity(
     Returns:
         The axes of the plot.
     """
-    shapers, bands = _shapers_and_bands(result, modes)
+    curves, bands = _curves_and_bands(result, modes)
     vibration_limit = result.vibration_limit if isinstance(result, Recommendation) else None
     panel = plot.axes(ax, size_inch=(9.0, 5.4), title="Residual vibration at other frequencies")
     panel.text(
         1.0, 1.01, "curves turn at 0, as an amplitude has no sign", ha="right", fontsize=8,
         color="#555555", transform=panel.transAxes,
     )  # fmt: skip
-    longest_s = max(shaper.duration_s for shaper in shapers.values())
+    longest_s = max(shaper.duration_s for _, shaper, _ in curves)
     highest = max(
         (band.mode.frequency_hz * (1.0 + band.uncertainty) for band in bands),
         default=_PERIODS_IN_DURATION / longest_s if longest_s > 0.0 else 1.0,
     )
     frequencies_hz = np.linspace(0.0, 1.25 * highest, _FREQUENCIES)[1:]
     nominal = [band.mode for band in bands]
-    for number, (label, shaper) in enumerate(shapers.items()):
-        panel.plot(
-            frequencies_hz, 100.0 * residual_curve(shaper, frequencies_hz, nominal), label=label,
-            color=plot.COLOURS[number % len(plot.COLOURS)], linewidth=1.6,
-        )  # fmt: skip
+    for label, shaper, colour in curves:
+        percent = 100.0 * residual_curve(shaper, frequencies_hz, nominal)
+        panel.plot(frequencies_hz, percent, label=label, color=colour, linewidth=1.6)
     for band in bands:
         frequency, width = band.mode.frequency_hz, band.mode.frequency_hz * band.uncertainty
         panel.axvspan(frequency - width, frequency + width, color="#e4e4e4", zorder=0)
@@ -194,11 +195,10 @@ def plot_impulses(result: Shapers, ax: Axes | None = None) -> Axes:
     Returns:
         The upper panel.
     """
-    shapers, _ = _shapers_and_bands(result, ())
-    panels = plot.column(ax, len(shapers), size_inch=(9.0, 1.2 + 1.35 * len(shapers)), title="Impulses")
-    unit, scale = _time_unit(max(shaper.duration_s for shaper in shapers.values()))
-    for number, (panel, (label, shaper)) in enumerate(zip(panels, shapers.items(), strict=True)):
-        colour = plot.COLOURS[number % len(plot.COLOURS)]
+    curves, _ = _curves_and_bands(result, ())
+    panels = plot.column(ax, len(curves), size_inch=(9.0, 1.2 + 1.35 * len(curves)), title="Impulses")
+    unit, scale = _time_unit(max(shaper.duration_s for _, shaper, _ in curves))
+    for panel, (label, shaper, colour) in zip(panels, curves, strict=True):
         panel.vlines(shaper.times_s * scale, 0.0, shaper.amplitudes, color=colour, linewidth=2.5)
         panel.plot(shaper.times_s * scale, shaper.amplitudes, "o", color=colour, markersize=4)
         panel.axhline(0.0, color="black", linewidth=0.8)
@@ -222,22 +222,19 @@ def plot_steps(result: Shapers, ax: Axes | None = None, *, modes: Sequence[float
     Raises:
         ArgumentError: a shaper without modes.
     """
-    shapers, bands = _shapers_and_bands(result, modes)
+    curves, bands = _curves_and_bands(result, modes)
     if not bands:
         raise ArgumentError("modes: 0 given: a step is drawn with the modes that follow it, at least one")
     nominal = [band.mode for band in bands]
     slowest_s = 1.0 / min(band.mode.frequency_hz for band in bands)
-    until_s = max(shaper.duration_s for shaper in shapers.values()) + _CYCLES_SHOWN * slowest_s
+    until_s = max(shaper.duration_s for _, shaper, _ in curves) + _CYCLES_SHOWN * slowest_s
     period_s = until_s / _SAMPLES_OF_A_STEP
     unit, scale = _time_unit(until_s)
     panels = plot.column(
         ax, 1 + len(nominal), size_inch=(9.0, 2.2 + 1.9 * (1 + len(nominal))),
         title="Step after each shaper, and response of the modes (grey: unshaped)",
     )  # fmt: skip
-    curves = [("", Shaper([0.0], [1.0]), plot.GREY)]
-    for number, (label, shaper) in enumerate(shapers.items()):
-        curves.append((label, shaper, plot.COLOURS[number % len(plot.COLOURS)]))
-    for label, shaper, colour in curves:
+    for label, shaper, colour in [("", Shaper([0.0], [1.0]), plot.GREY), *curves]:
         command = shaped_step(shaper, period_s, until_s)
         times = np.arange(len(command)) * (period_s * scale)
         commands = np.tile(command[:, None], (1, len(nominal)))
