@@ -262,10 +262,7 @@ class TapProblem:
         self._rows = [[] for _ in self.bands]
 
     def least_worst(self, limit: float | None = None) -> Bounds | None:
-        """Taps with the smallest worst residual, and its bounds; None: no taps satisfy the equations.
-
-        With a limit the search ends once the limit is met or impossible.
-        """
+        """Taps with the smallest worst residual (with a limit: until it is met or impossible); None: there are none."""
         best = np.zeros(self.last + 1)
         lower, upper = 0.0, math.inf
         # far below the limit the program would be degenerate, and the solver may cycle

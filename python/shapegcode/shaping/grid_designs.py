@@ -326,13 +326,11 @@ def polished(
     taps: FloatArray, conditions: tuple[FloatArray, FloatArray], period_s: float, threshold: float,
     largest: float | None = None,
 ) -> Shaper | None:  # fmt: skip
-    """Re-solve the taps above a threshold to round-off accuracy; None if they miss a condition.
-
-    Without a largest magnitude taps must be above 0 (else None); with one, taps at that magnitude are not changed.
-    """
+    """Re-solve the taps above a threshold to round-off accuracy; None if they miss a condition or are negative."""
     matrix, right = conditions
     support = np.flatnonzero(np.abs(taps) > threshold)
     columns, amplitudes = matrix[:, support], taps[support]
+    # Taps at the largest magnitude, where there is one, are not changed.
     free = np.ones(len(support), dtype=bool) if largest is None else np.abs(amplitudes) < largest - 1e-8
     if largest is not None:
         amplitudes[~free] = np.copysign(largest, amplitudes[~free])

@@ -274,11 +274,7 @@ def _other_period(highest_hz: float, period_s: float) -> str:
 
 
 def solve_minimal(bands: Sequence[ModeBand], options: DesignOptions) -> list[_core.Shaper]:
-    """Minimal shapers of the bands' nominal modes: those without negative impulses first, each group by duration.
-
-    Searched up to the duration of the convolved ZV, and, only if there is none, up to twice that; never beyond
-    `options.max_duration_s` or 100 periods of the fastest mode.
-    """
+    """Minimal shapers of the bands' nominal modes: those without negative impulses first, each group by duration."""
     modes = [band.mode for band in bands]
     longest_s = min(options.max_duration_s, _MAX_PERIODS / max(mode.frequency_hz for mode in modes))
     usual_s = _core.convolved_zv(modes).duration_s

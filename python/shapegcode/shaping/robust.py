@@ -282,12 +282,8 @@ def _below(task: Task, last: int, limit: float) -> Bounds | None:
 
 
 def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, precision: float = 0.0) -> int | None:
-    """Smallest number of periods of a design below the limit, or None if it exceeds `most`.
-
-    A design stays valid with zero taps added: the number of periods is raised until it suffices, then bisected. The
-    search starts near the duration of the convolved ZV, or at a multiple of `too_few` (known not to suffice) if that is
-    longer. With a relative `precision` the result suffices, but may exceed the smallest number by that ratio.
-    """
+    """Smallest number of periods of a design below the limit, to a relative precision; None if it exceeds `most`."""
+    # A design stays valid with zero taps added. The search starts near the duration of the convolved ZV.
     start = max(1.0, sum(0.5 / band.mode.frequency_hz for band in task.bands) / task.period_s, _GROWTH * too_few)
     return smallest_enough(
         lambda last: _below(task, last, limit) is not None, math.ceil(start), most, too_few, growth=_GROWTH,

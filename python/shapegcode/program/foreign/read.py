@@ -186,12 +186,7 @@ class Recognition:
 
 
 def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]:
-    """For each control for which the program may have been written: its first sign in the program.
-
-    Words of FANUC are sought only with `of_fanuc`, or if there are signs of another control. If that is a Haas, they
-    are ignored, as a Haas knows them too.
-    The first 64 KiB are searched, without comments, up to the second line `%`.
-    """
+    """First sign of each control for which a program may have been written; FANUC's if needed, or with *of_fanuc*."""
     code = re.sub(rb";[^\n]*", b"", COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
     ends = [match.end() for match in _PERCENT.finditer(code)] if b"%" in code else []
     code = code[: ends[1]] if len(ends) > 1 else code  # no control reads beyond its second `%` line
