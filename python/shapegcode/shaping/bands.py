@@ -188,7 +188,7 @@ def check_times(**times_s: float) -> None:
             raise ArgumentError(f"{name} is {value} s: it must be finite and above 0")
 
 
-def check_modes_and_times(modes: Sequence[Mode | ModeBand], **times_s: float) -> None:
+def check_modes_and_times(modes: Sequence[object], **times_s: float) -> None:
     """Refuse an empty list of modes, and times that are not finite and above 0."""
     if not modes:
         raise ArgumentError("a shaper needs at least one mode: 0 given")

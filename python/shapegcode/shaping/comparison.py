@@ -16,6 +16,7 @@ from shapegcode.shaping.bands import (
     Design,
     DesignOptions,
     ModeBand,
+    check_modes_and_times,
     evaluate,
     machine_bands,
     mode_band,
@@ -195,8 +196,7 @@ def choose(
 def _check(
     bands: Sequence[ModeBand], periods_s: Sequence[float | None], options: DesignOptions, objective: str
 ) -> None:
-    if not bands:
-        raise ArgumentError("a shaper needs at least one mode: 0 given")
+    check_modes_and_times(bands)
     for (first, one), (second, other) in itertools.combinations(enumerate(bands, start=1), 2):
         if (one.mode.frequency_hz, one.mode.damping_ratio) == (other.mode.frequency_hz, other.mode.damping_ratio):
             raise ArgumentError(f"modes {first} and {second} are equal ({one}): specify each mode once")

@@ -213,7 +213,8 @@ class Recommendation(Result):
     @property
     def recommended_on_grid(self) -> int | None:
         """Index of the best design on a grid, as needed to write blocks; None: no such design."""
-        return self._best_of([index for index, each in enumerate(self.designs) if each.period_s is not None])
+        indices = [index for index, each in enumerate(self.designs) if each.period_s is not None]
+        return self._best_of(indices) if indices else None
 
     @property
     def best_by_period(self) -> dict[float, int]:
@@ -222,12 +223,9 @@ class Recommendation(Result):
         for index, each in enumerate(self.designs):
             if each.period_s is not None:
                 indices.setdefault(each.period_s, []).append(index)
-        best = {period_s: self._best_of(indices[period_s]) for period_s in sorted(indices)}
-        return {period_s: index for period_s, index in best.items() if index is not None}
+        return {period_s: self._best_of(indices[period_s]) for period_s in sorted(indices)}
 
-    def _best_of(self, indices: Sequence[int]) -> int | None:
-        if not indices:
-            return None
+    def _best_of(self, indices: Sequence[int]) -> int:
         designs = [self.designs[index] for index in indices]
         return indices[recommend(designs, self.vibration_limit, self.objective, self.allow_negative)]
 

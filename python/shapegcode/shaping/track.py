@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, Shaper, VaryingFir
 from shapegcode.io.units import FloatArray
-from shapegcode.shaping.bands import check_times, whole_periods
+from shapegcode.shaping.bands import check_modes_and_times, check_times, whole_periods
 from shapegcode.shaping.cutting_planes import LinearProgram
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, exact_conditions, refined, shortest_non_negative
 
@@ -90,8 +90,7 @@ def design_track(
 ) -> ShaperTrack:
     """Design shapers along an axis with every mode's residual below a limit, also between the nodes."""
     low, high = span_mm
-    if not modes:
-        raise ArgumentError("a shaper needs at least one mode: 0 given")
+    check_modes_and_times(modes)
     if not (math.isfinite(low) and math.isfinite(high) and low <= high):
         raise ArgumentError(f"span is {low} to {high} mm: must be finite and ascend")
     if not residual_limit > 0.0:
