@@ -326,7 +326,7 @@ def polished(
     taps: FloatArray, conditions: tuple[FloatArray, FloatArray], period_s: float, threshold: float,
     largest: float | None = None,
 ) -> Shaper | None:  # fmt: skip
-    """Re-solve the taps above a threshold to round-off accuracy; None if they miss a condition or are negative."""
+    """Re-solve taps above a threshold to round-off; None if they miss a condition, or must be above 0 and are not."""
     matrix, right = conditions
     support = np.flatnonzero(np.abs(taps) > threshold)
     columns, amplitudes = matrix[:, support], taps[support]
