@@ -19,9 +19,8 @@ from shapegcode.machine import Machine
 _MAX_CALLED_BYTES = 10_000_000
 
 
-Note = tuple[
-    int, str
-]  # line of the source, from 1; a sentence, with both meanings of a word that FANUC reads otherwise
+# Line of the source, from 1; a sentence, with both meanings of a word that FANUC reads otherwise.
+Note = tuple[int, str]
 
 
 @dataclass(frozen=True)
