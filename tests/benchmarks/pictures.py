@@ -15,7 +15,7 @@ from processes import SHAPEGCODE, launched
 from table import Sample
 
 PROGRAM = GOLDEN / "PARALLEL.NC"
-COMMANDS = (["simulate"], ["convert", "-o", "out.nc"], ["time"])
+COMMANDS = (["simulate"], ["convert", "-o", "out.nc", "--shape-all"], ["time"])
 
 
 def seconds(words: list[str], folder: Path) -> float:

@@ -117,7 +117,7 @@ def main() -> int:
         folder = Path(place)
         machine = sg.Machine.load("vx500")
         begun = time.process_time()
-        conversion = sg.convert(args.program, machine)
+        conversion = sg.convert(args.program, machine, shape_all=True)
         figures["conversion_cpu_s"] = time.process_time() - begun
         page = conversion.page()
         figures["page_cpu_s"] = time.process_time() - begun - figures["conversion_cpu_s"]

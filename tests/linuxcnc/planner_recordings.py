@@ -60,6 +60,7 @@ def ini_of(acceleration: float, *, as_delivered: bool, max_feed_override: float 
 def cut_of(command: NDArray[np.float64]) -> NDArray[np.float64]:
     """From the last pause before the end on: the first position, every set-point, the last position."""
     moved = np.flatnonzero(np.any(np.diff(command, axis=0) != 0.0, axis=1))
+    assert len(moved), "LinuxCNC commanded no motion: it may not have kept up on a loaded machine"
     pauses = np.flatnonzero(np.diff(moved) > 300)
     first = moved[pauses[-1] + 1] if len(pauses) else moved[0]
     return command[first : moved[-1] + 2]

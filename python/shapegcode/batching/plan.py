@@ -15,11 +15,10 @@ from shapegcode.batching.process import Base, BatchJob
 from shapegcode.errors import ArgumentError
 from shapegcode.io.data_file import MAX_SETTINGS_BYTES, read_file
 from shapegcode.machine import Machine
-from shapegcode.program.reading import PROGRAM_SUFFIXES, is_subprogram, program_loader
+from shapegcode.program.reading import CALLS, PROGRAM_SUFFIXES, is_subprogram, program_loader
 
 _NUMBERED = re.compile(r"[Oo]\d{1,8}")
 _COMMENT = re.compile(r"(?:^|\s)#.*")
-_CALL = re.compile(rb"(?:M *0*(?:98|198)|G *0*(?:65|66))(?!\d)", re.IGNORECASE)
 _NUMBER = re.compile(rb"P *0*(\d{1,8})", re.IGNORECASE)
 _COMPUTED = re.compile(rb"P *[\[#]", re.IGNORECASE)
 
@@ -145,7 +144,7 @@ def called_files(path: str | Path, machine: Machine, base: str = ".") -> Iterato
 
 def _mentioned(text: bytes, folders: Sequence[Path]) -> list[int]:
     """Numbers of programs that a program may call: in one with calls any number after P."""
-    if not _CALL.search(text):
+    if not CALLS.search(text):
         return []
     if _COMPUTED.search(text):
         # A computed number is known only when executed: take all existing programs.

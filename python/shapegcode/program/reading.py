@@ -33,7 +33,7 @@ from shapegcode.settings.keys import toml
 _ADDRESS = re.compile(r"#([1-9][0-9]{0,8})")
 _NUMBER = re.compile(r"[Oo:]?0*([1-9][0-9]{0,7})")
 _COMMENT = re.compile(rb"\([^()\r\n]*\)")
-_CALLS = re.compile(rb"(?:M *0*1?98|G *6[56](?: *\. *1)?)(?![0-9.])")
+CALLS = re.compile(rb"(?:M *0*1?98|G *0*6[56](?: *\. *1)?)(?![0-9.])", re.IGNORECASE)  # of another program
 _CALLED = re.compile(rb"P *0*([0-9]+)")
 _RETURNS, _ENDS = re.compile(rb"M *0*99(?!\d)"), re.compile(rb"M *0*(?:2|30)(?!\d)")
 
@@ -120,7 +120,7 @@ def called_from(text: bytes, index: int, kept: Iterable[int]) -> tuple[ProgramPl
         elif same and same[0] not in found | {index}:
             found.add(same[0])
             lines = _COMMENT.sub(b"", text[places[same[0]].text_begin : places[same[0]].text_end]).upper().splitlines()
-            calls = (_CALLED.search(line) for line in lines if _CALLS.search(line))
+            calls = (_CALLED.search(line) for line in lines if CALLS.search(line))
             waiting += [(same[0], int(call[1])) for call in calls if call]
     return tuple(places[at] for at in sorted(found))
 

@@ -299,8 +299,7 @@ class DesignOptions:
     @property
     def grid_period_s(self) -> float:
         """The period of the grid, s."""
-        if self.period_s is None:
-            raise ArgumentError("this family is designed on a grid: specify its period")
+        assert self.period_s is not None  # `design` refuses a family without its grid
         return self.period_s
 
 
