@@ -234,19 +234,3 @@ def test_results_are_read_only() -> None:
     profile = _core.plan_speed(path, motion_limits(machine))
     with pytest.raises(ValueError, match="read-only"):
         _core.interpolate(path, profile, 0.001)[0, 0] = 1.0
-
-
-def test_designs_leave_nothing() -> None:
-    x, y = sg.Mode(46.0, 0.02), sg.Mode(131.0, 0.02)
-    designs = [sg.convolved_zv([x, y]), sg.grid_polynomial([x, y], 0.005), sg.shortest_non_negative([x, y], 0.005)]
-    designs += sg.minimal_two_mode(x, y, 0.02)
-    for design in designs:
-        assert design.times_s[0] == 0.0
-        assert np.sum(design.amplitudes) == pytest.approx(1.0)
-        for mode in (x, y):
-            assert design.residual_ratio(mode) < 1e-9
-    choice = sg.choose_block_period([x, y], 0.001, 0.005)
-    assert choice.period_s >= 0.005
-    grid = sg.choose_grid(sg.Machine.load("vx500"))
-    assert grid.block_period_s == choice.period_s
-    assert grid.shaper.times_s == pytest.approx(choice.shaper.times_s)

@@ -2,14 +2,14 @@
 
 import typing
 
-import numpy as np
 import pytest
 
 import shapegcode as sg
 from acceptance import machine_with
+from extra_insensitive import worst_over_bands
 from shapegcode._core import DesignError
 from shapegcode.machine.programs import Shaping
-from shapegcode.shaping import FAMILIES, choose_shaper
+from shapegcode.shaping import FAMILIES, ModeBand, choose_shaper
 from shapegcode.shaping.grid import choose_grid
 
 Axis = list[tuple[float, float, float | None]]  # Hz, damping ratio, ± % or None
@@ -51,17 +51,13 @@ def machine_of(x: Axis, y: Axis, keys: dict[str, float]) -> sg.Machine:
 
 
 def worst_left(machine: sg.Machine, shaper: sg.Shaper) -> float:
-    """Largest residual ratio anywhere in the modes' bands: the sum of decaying oscillations, written out."""
-    times, amplitudes = np.asarray(shaper.times_s), np.asarray(shaper.amplitudes)
-    worst = 0.0
-    for axis in machine.axes.as_tuple():
-        for mode in axis.modes:
-            half = (mode.frequency_uncertainty_percent or 0.0) / 100.0
-            omega = 2 * np.pi * mode.frequency_hz * np.linspace(1 - half, 1 + half, 201)
-            pole = omega * (-mode.damping_ratio + 1j * np.sqrt(1 - mode.damping_ratio**2))
-            left = np.abs(np.exp(pole[:, None] * (times[-1] - times)) @ amplitudes)
-            worst = max(worst, float(left.max()))
-    return worst
+    """Largest residual ratio anywhere in the modes' bands."""
+    bands = [
+        ModeBand(sg.Mode(mode.frequency_hz, mode.damping_ratio), (mode.frequency_uncertainty_percent or 0.0) / 100.0)
+        for axis in machine.axes.as_tuple()
+        for mode in axis.modes
+    ]
+    return worst_over_bands(shaper.times_s, shaper.amplitudes, bands, 201)
 
 
 def agree(machine: sg.Machine, families: list[str]) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from minimal_figures import random_sets, solve
 from numpy.typing import NDArray
-from scipy.optimize import fsolve, least_squares
+from scipy.optimize import fsolve
 
 from shapegcode._core import (
     ArgumentError,
@@ -71,71 +71,6 @@ def test_scipy_finds_no_three_mode_shaper_that_is_not_listed(modes: Sequence[Mod
         assert np.abs(listed - times).max(axis=1).min() < 1e-6 * longest_s
     seen = {int(np.abs(listed - times).max(axis=1).argmin()) for times in found}
     assert len(seen) >= len(listed) / 2
-
-
-def brute_force_two_modes(modes: tuple[Mode, Mode], longest_s: float) -> list[FloatArray]:
-    """(t2, t3) of all shapers: least squares from every local minimum of the smallest singular value on a fine grid."""
-    fastest = max(mode.frequency_hz for mode in modes)
-    axis = np.arange(0.01, longest_s * fastest + 0.04, 0.02) / fastest
-    t2, t3 = np.meshgrid(axis, axis)
-    s = np.array([mode.pole for mode in modes])[:, None, None]
-    terms = [np.exp(s.real * (t3 - t)) * np.exp(-1j * s.imag * t) for t in (0.0 * t3, t2, t3)]
-    stack = np.stack([np.concatenate([each.real, each.imag]) for each in terms], axis=-1)
-    smallest = np.linalg.svd(np.moveaxis(stack, 0, 2), compute_uv=False)[..., -1]
-    inner = smallest[1:-1, 1:-1]
-    around = [
-        smallest[1 + i : smallest.shape[0] - 1 + i, 1 + j : smallest.shape[1] - 1 + j]
-        for i in (-1, 0, 1)
-        for j in (-1, 0, 1)
-        if (i, j) != (0, 0)
-    ]
-    minima = np.all([inner <= each for each in around], axis=0) & (inner < 0.15) & (t2 < t3)[1:-1, 1:-1]
-    found: list[FloatArray] = []
-
-    def error(x: FloatArray) -> FloatArray:
-        times = np.array([0.0, x[0], x[1]]) / fastest
-        return np.asarray(conditions(modes, times) @ x[2:] - np.eye(5)[-1])
-
-    for i, j in zip(*np.nonzero(minima), strict=True):
-        times = np.array([axis[j + 1], axis[i + 1]])
-        first = np.linalg.lstsq(conditions(modes, np.concatenate([[0.0], times])), np.eye(5)[-1], rcond=None)[0]
-        fit = least_squares(error, np.concatenate([times * fastest, first]), xtol=1e-15, ftol=1e-15, gtol=1e-15)
-        times = np.sort(fit.x[:2]) / fastest
-        apart = min(times[0], times[1] - times[0]) * fastest > 1e-3
-        inside = times[1] <= longest_s and np.abs(fit.x[2:]).sum() < 10.0
-        if fit.cost < 1e-20 and apart and inside and all(np.abs(times - other).max() > 1e-6 for other in found):
-            found.append(times)
-    return found
-
-
-@pytest.mark.parametrize(
-    ("modes", "longest_s"), [((Mode(1.0, 0.0), Mode(2.7, 0.0)), 1.6), ((Mode(1.0, 0.06), Mode(3.4, 0.01)), 1.6)]
-)
-def test_two_modes_are_complete_by_brute_force(modes: tuple[Mode, Mode], longest_s: float) -> None:
-    listed = [shaper.times_s[1:] for shaper in minimal_shapers(modes, longest_s).shapers]
-    scanned = brute_force_two_modes(modes, longest_s)
-    assert len(listed) == len(scanned) >= 8
-    for times in scanned:
-        assert min(np.abs(np.asarray(each) - times).max() for each in listed) < 1e-7
-
-
-def test_the_spec_list_for_1_and_4_hz() -> None:
-    a, b, c = 0.72361, 0.44721, 0.27639
-    expected = [
-        ((0.0, 0.2, 0.4), (a, -b, a)),
-        ((0.0, 0.2, 0.6), (c, c, b)),
-        ((0.0, 0.4, 0.6), (b, c, c)),
-        ((0.0, 1 / 3, 2 / 3), (1 / 3, 1 / 3, 1 / 3)),
-        ((0.0, 0.2, 0.8), (-b, a, a)),
-        ((0.0, 0.4, 0.8), (c, b, c)),
-        ((0.0, 0.6, 0.8), (a, a, -b)),
-    ]
-    result = minimal_shapers([Mode(1.0, 0.0), Mode(4.0, 0.0)], 0.8)
-    assert result.complete
-    assert len(result.shapers) == len(expected)
-    for shaper, (times, amplitudes) in zip(result.shapers, expected, strict=True):
-        assert shaper.times_s == pytest.approx(times, abs=1e-12)
-        assert shaper.amplitudes == pytest.approx(amplitudes, abs=1e-5)
 
 
 def test_the_spec_shaper_of_46_and_131_hz_from_the_registry() -> None:

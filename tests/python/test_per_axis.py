@@ -1,6 +1,5 @@
 """A shaper for each axis: its filters against a linear program written out, and programs judged independently."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,8 +8,9 @@ from scipy.optimize import linprog
 
 import shapegcode as sg
 from acceptance import check_figures, convert, machine_with
-from shapegcode._core import Fir, Mode
+from shapegcode._core import Mode, Shaper
 from shapegcode.shaping.track import design_per_axis
+from shaper_residual import left_of
 
 PART = "%\nO1\nG21G17G90G94\nG54G00X0.Y0.\nG01X20.F12000\nG03X40.Y20.R20.\nG01Y40.\nG00X0.\nM30\n%\n"
 MODES = (
@@ -18,14 +18,6 @@ MODES = (
     ([Mode(30.0, 0.02), Mode(80.0, 0.02)], [Mode(45.0, 0.02), Mode(110.0, 0.02)], []),
     ([Mode(25.0, 0.0)], [], [Mode(60.0, 0.1)]),
 )
-
-
-def left(fir: Fir, mode: Mode, period_s: float) -> float:
-    """The residual ratio V from the last tap on, written out."""
-    omega, zeta = 2.0 * math.pi * mode.frequency_hz, mode.damping_ratio
-    t = (np.array(fir.delays) - fir.delays[-1]) * period_s
-    damped = omega * math.sqrt(1.0 - zeta**2)
-    return float(abs(np.sum(np.array(fir.taps) * np.exp(zeta * omega * t) * np.exp(1j * damped * t))))
 
 
 def exists(axis_modes: Sequence[Sequence[Mode]], period_s: float, periods: int) -> bool:
@@ -62,7 +54,8 @@ def test_shortest_of_one_mean(axis_modes: Sequence[Sequence[Mode]], ms: int) -> 
     assert max(fir.mean_samples for fir in firs) - min(fir.mean_samples for fir in firs) < 1e-6
     assert min(min(fir.taps) for fir in firs) >= 0.0
     for fir, modes in zip(firs, axis_modes, strict=True):
-        assert all(left(fir, mode, period_s) < 1e-9 for mode in modes)
+        shaper = Shaper([(delay - fir.delays[0]) * period_s for delay in fir.delays], fir.taps)
+        assert all(left_of(shaper, mode) < 1e-9 for mode in modes)
     longest = max(fir.duration_samples for fir, modes in zip(firs, axis_modes, strict=True) if modes)
     assert exists(axis_modes, period_s, longest)
     assert not exists(axis_modes, period_s, longest - 1)
