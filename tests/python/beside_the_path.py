@@ -3,11 +3,9 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 import shapegcode as sg
-
-Rows = npt.NDArray[np.float64]
+from shapegcode.io.units import FloatArray
 
 PERIOD_S = 0.001
 SPEED, ACCELERATION, JERK = 150.0, 1500.0, 60_000.0
@@ -30,7 +28,7 @@ def control(**changes: Any) -> sg.MotionController:
     return sg.MotionController(**(limits | changes))
 
 
-def largest_share(rows: Rows) -> float:
+def largest_share(rows: FloatArray) -> float:
     """Of the limits of speed, acceleration and jerk, by differences; at rest at zero before."""
     whole = np.vstack([np.zeros((4, rows.shape[1])), rows])
     limits = (SPEED, ACCELERATION, JERK)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import shapegcode as sg
@@ -17,9 +16,9 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.known_command import known_command
 from shapegcode.identification.result import Identification
 from shapegcode.identification.sweep_program import write_sweep
+from shapegcode.io.units import FloatArray
 from tap_truth import TrueMode, tap
 
-Vector = npt.NDArray[np.float64]
 Shape = tuple[float, float, float]
 AXES = "xyz"
 Structure = Sequence[tuple[TrueMode, Shape]]
@@ -62,7 +61,7 @@ def check(found: Identification, modes: Structure, within: float = 0.02) -> None
 
 def write(path: Path, records: Sequence[sg.Record]) -> Path:
     first = records[0]
-    columns: dict[str, Vector] = {"time [s]": first.period_s * np.arange(len(first.response))}
+    columns: dict[str, FloatArray] = {"time [s]": first.period_s * np.arange(len(first.response))}
     if first.force_n is not None:
         columns["force [N]"] = first.force_n
     columns |= {f"acc{(each.axis or '').upper()} [m/s^2]": each.response for each in records}
@@ -233,7 +232,7 @@ def in_one_file(hits: Sequence[Sequence[sg.Record]], source: str) -> list[sg.Rec
 def bounced(records: Sequence[sg.Record], after: int = 500) -> list[sg.Record]:
     """With a second pulse of 60 %."""
 
-    def twice(values: Vector) -> Vector:
+    def twice(values: FloatArray) -> FloatArray:
         return np.asarray(values + 0.6 * np.concatenate((np.zeros(after), values[:-after])))
 
     forces = [twice(record.force_n) for record in records if record.force_n is not None]

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import shapegcode as sg
@@ -12,8 +11,8 @@ from held_loop import encoder_m
 from shapegcode.identification.known_command import KnownCommand, known_command
 from shapegcode.identification.sweep import is_capture
 from shapegcode.identification.sweep_program import write_sweep
+from shapegcode.io.units import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 MODES = [(60.0, 23.0, 0.02), (40.0, 46.0, 0.03)]
 
 

@@ -4,12 +4,12 @@ import dataclasses
 import math
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import cut_reference as reference
 from shapegcode._core import ArgumentError
 from shapegcode.cutting.tool import COEFFICIENTS
+from shapegcode.io.units import FloatArray
 from shapegcode.testcut.cut import CuttingLaw, CutTool
 from shapegcode.testcut.forces import (
     CoefficientFit,
@@ -21,8 +21,6 @@ from shapegcode.testcut.forces import (
     straight_engagement,
 )
 
-Array = npt.NDArray[np.float64]
-
 TOOL = CutTool(8.0, 6, 50.0)
 AXIAL, SPINDLE = 15.0, 1800.0
 TRUE = [reference.PAPER[name] for name in COEFFICIENTS[:4]]
@@ -30,7 +28,7 @@ TRUE = [reference.PAPER[name] for name in COEFFICIENTS[:4]]
 
 def drawn(
     rng: np.random.Generator,
-    depths: Array,
+    depths: FloatArray,
     feeds: tuple[float, ...],
     noise: float,
     law: dict[str, float] = reference.PAPER,
@@ -88,7 +86,7 @@ def test_noise_of_five_percent_leaves_exponents_within_a_hundredth_and_factors_w
     assert fit.rms_percent == pytest.approx(5.0, abs=0.4)
 
 
-def share_of_intervals_with_the_truth(draws: int, seed: int) -> Array:
+def share_of_intervals_with_the_truth(draws: int, seed: int) -> FloatArray:
     rng = np.random.default_rng(seed)
     inside = np.zeros(4)
     for _ in range(draws):
@@ -170,7 +168,9 @@ def test_outliers_are_found_and_left_out() -> None:
         (np.linspace(0.4, 2.8, 20), (216.0,), True, "edge forces cannot be distinguished from the exponents"),
     ],
 )
-def test_what_the_forces_do_not_tell_is_refused(depths: Array, feeds: tuple[float, ...], edge: bool, said: str) -> None:
+def test_what_the_forces_do_not_tell_is_refused(
+    depths: FloatArray, feeds: tuple[float, ...], edge: bool, said: str
+) -> None:
     data = drawn(np.random.default_rng(5), depths, feeds, 0.01)
     with pytest.raises(ArgumentError, match=said):
         fit_coefficients(data, TOOL, AXIAL, edge=edge)

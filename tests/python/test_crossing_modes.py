@@ -4,7 +4,6 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import random_verdict
@@ -12,14 +11,13 @@ import shapegcode as sg
 from crossing_machines import PERIOD_S, ROCKING, ZIGZAG, deflection, largest_z_um, skewed_draw
 from random_verdict import complaints, convert
 from shapegcode import _core
+from shapegcode.io.units import FloatArray
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import axis_modes, excited_modes, own_modes
 from shapegcode.shaping.grid import choose_grid
 
-Vector = npt.NDArray[np.float64]
 
-
-def a_command(samples: int = 3000) -> Vector:
+def a_command(samples: int = 3000) -> FloatArray:
     rng = np.random.default_rng(1)
     kicks = [np.convolve(rng.normal(size=samples), np.hanning(60), "same") for _ in range(3)]
     return np.cumsum(np.cumsum(np.array(kicks).T, axis=0), axis=0) * 1e-6

@@ -5,7 +5,6 @@ from math import asin, pi, radians, tan
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from milling_brute_force import Cutter, Turn, turn
 from shapegcode import _core
@@ -21,8 +20,8 @@ from shapegcode._core import (
     ToolBeam,
     WallSide,
 )
+from shapegcode.io.units import FloatArray
 
-Array = NDArray[np.float64]
 SPEED = 1800.0
 TIGHT = 1e-3
 
@@ -95,7 +94,7 @@ def test_energy_balance(case: str) -> None:
     assert figures.mean_power_w == pytest.approx(figures.mean_torque_nm * SPEED * 2.0 * pi / 60.0, rel=1e-12)
 
 
-def deflected(expected: Turn, beam: ToolBeam, height_mm: float) -> Array:
+def deflected(expected: Turn, beam: ToolBeam, height_mm: float) -> FloatArray:
     """Deflection at a height at every angle (n, 2), um, each disc's force by its own influence."""
     weights = np.array([beam.compliance_um_per_n(height_mm, z) for z in expected.height_mm])
     return np.einsum("ndk,d->nk", expected.by_height, weights)
@@ -221,7 +220,7 @@ def test_tracks_in_two_threads() -> None:
     """Each thread has its own force model; the interpreter's lock is not held."""
     track = CornerCut(4.0, 8.0, 8.0, 0.8).track(15.0, 0.05)
     feeds = np.full(len(track), 200.0)
-    results: list[Array] = []
+    results: list[FloatArray] = []
 
     def work() -> None:
         results.append(model(CASES["paper"]).figures_of(track, feeds)["peak_resultant_n"])

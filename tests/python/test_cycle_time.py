@@ -7,7 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import signal
@@ -15,10 +14,10 @@ from scipy import signal
 import shapegcode as sg
 from acceptance import PROGRAMS, SAMPLE_KEYS, machine_with
 from shapegcode import _core
+from shapegcode.io.units import FloatArray
 from shapegcode.model.machine_model import fanuc_model
 
 SAMPLES = sorted(path for path in PROGRAMS.iterdir() if path.suffix.upper() == ".NC")
-Vector = npt.NDArray[np.float64]
 
 
 def model(**values: object) -> _core.FanucModel:
@@ -39,7 +38,7 @@ def read(text: str) -> _core.ProgramText:
 # --- Block overlap ----------------------------------------------------------------------------------------------------
 
 
-def increments(lengths: Vector, feeds: Vector, period_s: float, block_end: _core.BlockEnd) -> Vector:
+def increments(lengths: FloatArray, feeds: FloatArray, period_s: float, block_end: _core.BlockEnd) -> FloatArray:
     """Way per period of blocks run off at their feed, by cutting each block into pieces of F T."""
     if block_end == _core.BlockEnd.carry:
         ends = np.concatenate([[0.0], np.cumsum(lengths / feeds)])
@@ -54,7 +53,7 @@ def increments(lengths: Vector, feeds: Vector, period_s: float, block_end: _core
 
 
 @st.composite
-def sequences(draw: st.DrawFn) -> tuple[_core.FanucModel, list[Vector], list[tuple[Vector, Vector]]]:
+def sequences(draw: st.DrawFn) -> tuple[_core.FanucModel, list[FloatArray], list[tuple[FloatArray, FloatArray]]]:
     """A controller, its filters' kernels, and ten sequences of normal, short or mixed blocks."""
     period = draw(st.sampled_from([0.001, 0.002, 0.004]))
     length = draw(st.integers(2, 60))
@@ -87,7 +86,7 @@ def sequences(draw: st.DrawFn) -> tuple[_core.FanucModel, list[Vector], list[tup
     return made, kernels, found
 
 
-def check_block_overlap(case: tuple[_core.FanucModel, list[Vector], list[tuple[Vector, Vector]]]) -> None:
+def check_block_overlap(case: tuple[_core.FanucModel, list[FloatArray], list[tuple[FloatArray, FloatArray]]]) -> None:
     """The closed form is the time until the convolved increments end, to one period."""
     made, kernels, found = case
     for lengths, feeds in found:
@@ -103,7 +102,7 @@ def check_block_overlap(case: tuple[_core.FanucModel, list[Vector], list[tuple[V
 @settings(max_examples=200, deadline=None)
 @given(sequences())
 def test_block_overlap_is_the_moving_average(
-    case: tuple[_core.FanucModel, list[Vector], list[tuple[Vector, Vector]]],
+    case: tuple[_core.FanucModel, list[FloatArray], list[tuple[FloatArray, FloatArray]]],
 ) -> None:
     check_block_overlap(case)
 

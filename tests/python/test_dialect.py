@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import HealthCheck, given, settings
 
@@ -13,7 +11,6 @@ from judge.dialect import Alarm, play
 from judge.dialect.generate import compensated_programs, coordinate_programs, macro_programs
 from second_reading import compare, read_moves
 
-Vector = npt.NDArray[np.float64]
 DIALECT = Path(__file__).parents[1] / "golden" / "dialect"
 NAMES = sorted(path.stem for path in DIALECT.glob("*.nc"))
 #: The block skip switch is a setting; programs that have `/` are read with it off and on.

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from page_code import CELL
 from scipy.signal import lfilter, lsim
 
 from shapegcode import _core
+from shapegcode.io.units import FloatArray
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = ROOT / "integrations" / "example_control"
@@ -28,8 +28,6 @@ TOLERANCE_UM = 20.0
 GAIN_PER_S, SPEED_GAIN, INTEGRAL_TIME_S, MASS_KG, VISCOUS = 30.0, 1.65e5, 0.02, 550.0, 500.0
 MODES = {"x": [_core.Mode(46.0, 0.02)], "y": [_core.Mode(58.0, 0.02)], "z": []}
 
-Rows = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Run:
@@ -40,7 +38,7 @@ class Run:
     errors: str
     rows: np.ndarray
 
-    def columns(self, pattern: str) -> Rows:
+    def columns(self, pattern: str) -> FloatArray:
         return np.column_stack([self.rows[pattern.format(axis)] for axis in "xyz"])
 
 
@@ -93,8 +91,8 @@ def session(built: Path, fast_contour: Path, tmp_path_factory: pytest.TempPathFa
     return run(built, fast_contour, commands, tmp_path_factory.mktemp("record") / "run.csv", "--fast")
 
 
-def speed(of: Run) -> Rows:
-    found: Rows = np.linalg.norm(of.columns("v{}_mm_per_s"), axis=1)
+def speed(of: Run) -> FloatArray:
+    found: FloatArray = np.linalg.norm(of.columns("v{}_mm_per_s"), axis=1)
     return found
 
 

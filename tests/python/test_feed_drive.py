@@ -5,7 +5,6 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.signal import lsim
 
@@ -13,10 +12,9 @@ import feed_drive_reference as reference
 from acceptance import machine_with
 from shapegcode import ArgumentError, NumericError, _core
 from shapegcode.errors import MachineError
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.modes import drive_parameters
-
-Vector = npt.NDArray[np.float64]
 
 PERIOD_S = 1e-3
 LUGRE = _core.FrictionParameters(
@@ -55,13 +53,13 @@ def drive(**changes: Any) -> _core.FeedDriveParameters:
     return _core.FeedDriveParameters(**(values | changes))
 
 
-def reversals_mm(count: int) -> Vector:
+def reversals_mm(count: int) -> FloatArray:
     """Forth, a rest in which the table sticks, back, and on through zero."""
     t = np.arange(1, count + 1) * PERIOD_S
     return np.asarray(np.interp(t, [0, 0.04, 0.08, 0.12, 0.2], [0, 1.5, 1.5, 0.5, -1.5]), dtype=np.float64)
 
 
-def quadrant_mm(count: int) -> Vector:
+def quadrant_mm(count: int) -> FloatArray:
     """One axis of a circle of 20 mm at 50 mm/s, at rest at first, through its reversal half way."""
     t = np.arange(count) * PERIOD_S
     angle = 50.0 / 20.0 * (t - t[count // 2])
@@ -87,7 +85,7 @@ def quadrant_mm(count: int) -> Vector:
     ],
     ids=["reversals", "quadrant", "stribeck", "feed-forward", "backlash", "scale", "limit"],
 )
-def test_friction_plant_is_radaus(changes: dict[str, Any], setpoints: Vector, allowed_um: float) -> None:
+def test_friction_plant_is_radaus(changes: dict[str, Any], setpoints: FloatArray, allowed_um: float) -> None:
     parameters = drive(**changes)
     wanted = reference.play(reference.Drive(parameters, PERIOD_S), setpoints)
     usual = _core.FeedDrive(parameters, PERIOD_S).respond(setpoints)[:, :4]

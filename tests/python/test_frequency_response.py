@@ -15,11 +15,11 @@ from shapegcode.identification.identify import identify
 from shapegcode.identification.result import Identification
 from shapegcode.identification.update import update_machine
 from shapegcode.io.record import FrequencyResponse, Quantity, ReadOptions, ratio_unit
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from tap_truth import TrueMode, random_modes
 
 ComplexArray = npt.NDArray[np.complex128]
-FloatArray = npt.NDArray[np.float64]
 MODES = (TrueMode(46.0, 0.03, 120.0), TrueMode(121.0, 0.02, 60.0), TrueMode(263.0, 0.025, 30.0))
 HZ = np.arange(800) * 0.5
 NAMES = ("frequency_hz", "damping_ratio", "mass_kg", "stiffness_n_per_m")

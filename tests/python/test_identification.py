@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from shapegcode.errors import RecordError
@@ -13,7 +12,6 @@ from shapegcode.identification.result import Estimate, Identification, Identifie
 from shapegcode.io.record import Record
 from tap_truth import TrueMode, acceleration, random_modes, tap
 
-FloatArray = npt.NDArray[np.float64]
 NAMES = ("frequency_hz", "damping_ratio", "stiffness_n_per_m")
 
 

@@ -9,8 +9,7 @@ import scipy.optimize
 import scipy.signal
 
 from shapegcode import _core
-
-FloatArray = npt.NDArray[np.float64]
+from shapegcode.io.units import FloatArray
 
 PERIOD_S = 1 / 4000
 COUNT = 1500

@@ -9,18 +9,17 @@ from typing import Any
 
 import jsonschema
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.signal import lsim
 
 import shapegcode as sg
 from shapegcode.cli import main
+from shapegcode.io.units import FloatArray
 from shapegcode.results import plot as canvas
 from shapegcode.results.json import schema
 from shapegcode.shaping.bands import machine_bands
 from shapegcode.verdict.figures import stated_cases
 
-FloatArray = npt.NDArray[np.float64]
 PERIOD_S = 1.0 / 2048.0
 TWO = ((46.0, 0.02, 120.0), (131.0, 0.03, 60.0))
 ESTIMATES = ("frequency_hz", "damping_ratio", "mass_kg", "damping_n_s_per_m", "stiffness_n_per_m")

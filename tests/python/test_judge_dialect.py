@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from judge.dialect import Alarm, Item, play
+from shapegcode.io.units import FloatArray
 
-Vector = npt.NDArray[np.float64]
 DIALECT = Path(__file__).parents[1] / "golden" / "dialect"
 NAMES = sorted(path.stem for path in DIALECT.glob("*.nc"))
 HEAD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\n"
@@ -29,7 +28,7 @@ def run(body: str, **settings: Any) -> list[Item]:
     return play(HEAD + body + "\nM30\n%\n", **settings)
 
 
-def samples(item: Item, count: int = 60) -> Vector:
+def samples(item: Item, count: int = 60) -> FloatArray:
     """Points of a move in its plane."""
     s = np.linspace(0.0, 1.0, count)[:, None]
     a, b = item.flat(item.start), item.flat(item.end)

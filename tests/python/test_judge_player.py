@@ -4,7 +4,6 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import HealthCheck, given, settings
 from scipy.signal import lsim
@@ -22,8 +21,8 @@ from judge import (
     rest_index,
 )
 from judge.generate import programs
+from shapegcode.io.units import FloatArray
 
-Vector = npt.NDArray[np.float64]
 RANDOM = settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
 MODES = [(46.0, 0.02), (131.0, 0.02)]
 HEAD = "G21 G17 G90 G94\nG0 X0 Y0 Z0\n"
@@ -91,7 +90,7 @@ def test_player_refuses_what_it_cannot_know() -> None:
         play(interpret("G1 X1 F100").cuts)
 
 
-def paper_path(speed: float, reduction: float, step_s: float) -> Vector:
+def paper_path(speed: float, reduction: float, step_s: float) -> FloatArray:
     """Set-points of the path of paper 000: line 20, quarter arc R20, line 20; 50 ms ramps."""
     ramp, on_arc, arc = 0.05, speed * (1 - reduction), math.pi * 10
     steady = (20 - speed / 2 * ramp - (speed + on_arc) / 2 * ramp) / speed
@@ -108,7 +107,7 @@ def paper_path(speed: float, reduction: float, step_s: float) -> Vector:
     return np.stack([x, y], axis=1)
 
 
-def shaped(points: Vector, taps: dict[int, float]) -> Vector:
+def shaped(points: FloatArray, taps: dict[int, float]) -> FloatArray:
     kernel = np.zeros(max(taps) + 1)
     for k, a in taps.items():
         kernel[k] = a / sum(taps.values())

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from command import run
@@ -20,9 +19,9 @@ from shapegcode.identification.result import Identification
 from shapegcode.identification.sweep_program import write_sweep
 from shapegcode.identification.update import update_machine
 from shapegcode.io.record import FrequencyResponse, ReadOptions, Record
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 
-FloatArray = npt.NDArray[np.float64]
 VX500 = Machine.load("vx500")
 PHONE = Logger()
 MODES = [ShakenMode(0.5, 23.0, 0.02), ShakenMode(0.3, 46.0, 0.03)]

@@ -1,20 +1,18 @@
 """Exact propagation of linear plants: held against SciPy's exponential and simulation, and against closed forms."""
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy import linalg, signal
 
 import shapegcode as sg
 from shapegcode import _core
-
-Array = npt.NDArray[np.float64]
+from shapegcode.io.units import FloatArray
 
 PERIOD = 1e-3
 TURN = 2.0 * np.pi
 
 
-def modal(frequency: float, damping: float) -> tuple[Array, Array, Array, Array]:
+def modal(frequency: float, damping: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Base-excited mode: u'' + 2 zeta omega u' + omega^2 u = 2 zeta omega x' + omega^2 x."""
     omega = TURN * frequency
     a = np.array([[0.0, 1.0], [-(omega**2), -2.0 * damping * omega]])  # u, u' - 2 zeta omega x
@@ -22,7 +20,7 @@ def modal(frequency: float, damping: float) -> tuple[Array, Array, Array, Array]
     return a, b, np.array([[1.0, 0.0]]), np.zeros((1, 1))
 
 
-def drive() -> tuple[Array, Array, Array, Array]:
+def drive() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Motor and table on a stiff screw under P-PI control, electrical pole at 1e5 1/s: stiff. SI, angles as lengths."""
     motor, table, screw, damper = 60.0, 40.0, 3e8, 2e3
     velocity_gain, integral, position_gain, electrical = 4e4, 4e6, 60.0, 1e5
@@ -38,7 +36,7 @@ def drive() -> tuple[Array, Array, Array, Array]:
     return a, b, np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0]]), np.zeros((2, 1))
 
 
-def chain(modes: int) -> tuple[Array, Array, Array, Array]:
+def chain(modes: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Free masses on springs, no damping, pushed at one end: singular A, a double integrator and undamped modes."""
     springs = np.diff(np.eye(modes), axis=0)
     stiffness = 1e4 * springs.T @ springs
@@ -59,7 +57,7 @@ PLANTS = {
 }
 
 
-def inputs_for(plant: tuple[Array, Array, Array, Array], samples: int = 2000) -> Array:
+def inputs_for(plant: tuple[FloatArray, FloatArray, FloatArray, FloatArray], samples: int = 2000) -> FloatArray:
     rng = np.random.default_rng(5)
     walk = np.cumsum(rng.normal(size=(samples, plant[1].shape[1])), axis=0)
     walk[: samples // 10] = 0.0
@@ -67,7 +65,7 @@ def inputs_for(plant: tuple[Array, Array, Array, Array], samples: int = 2000) ->
 
 
 @pytest.mark.parametrize("plant", PLANTS.values(), ids=PLANTS.keys())
-def test_record_is_that_of_lsim(plant: tuple[Array, Array, Array, Array]) -> None:
+def test_record_is_that_of_lsim(plant: tuple[FloatArray, FloatArray, FloatArray, FloatArray]) -> None:
     inputs = inputs_for(plant)
     start = np.linspace(1.0, -1.0, len(plant[0]))
     times = np.arange(len(inputs)) * PERIOD
@@ -93,7 +91,9 @@ def test_steps_are_the_record_to_the_last_bit() -> None:
 
 @pytest.mark.parametrize("period", [1e-5, 1e-3, 0.05])
 @pytest.mark.parametrize("plant", PLANTS.values(), ids=PLANTS.keys())
-def test_exponential_is_that_of_scipy(plant: tuple[Array, Array, Array, Array], period: float) -> None:
+def test_exponential_is_that_of_scipy(
+    plant: tuple[FloatArray, FloatArray, FloatArray, FloatArray], period: float
+) -> None:
     matrix = plant[0] * period
     got = _core.matrix_exponential(matrix)
     # The scale of the state is ours to choose: in one where A is balanced, an error means the same in each element.

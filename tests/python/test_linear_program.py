@@ -8,14 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from shapegcode import Mode
+from shapegcode.io.units import FloatArray
 from shapegcode.shaping.bands import ModeBand
 from shapegcode.shaping.cutting_planes import LinearProgram, _Band
-
-FloatArray = NDArray[np.float64]
 
 
 def by_scipy(cost: FloatArray, equal: FloatArray, below: FloatArray, above: FloatArray) -> float | None:

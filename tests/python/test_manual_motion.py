@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import shapegcode as sg
-from beside_the_path import ACCELERATION, FILTERS, JERK, PERIOD_S, SPEED, Rows, control, largest_share
+from beside_the_path import ACCELERATION, FILTERS, JERK, PERIOD_S, SPEED, control, largest_share
+from shapegcode.io.units import FloatArray
 
 ACCEPTED = sg.JogResult.accepted
 
@@ -19,7 +20,7 @@ def ramp_s(speed: float) -> float:
     return 2.0 * math.sqrt(speed / JERK)
 
 
-def held_on_a_path(**changes: Any) -> tuple[sg.MotionController, list[Rows]]:
+def held_on_a_path(**changes: Any) -> tuple[sg.MotionController, list[FloatArray]]:
     made = control(**changes)
     made.push_line([100, 0, 0], 100.0)
     made.push_line([100, 50, 0], 100.0, stop_at_end=True)

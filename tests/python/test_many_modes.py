@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.stats import binom
 
@@ -16,8 +15,6 @@ from shapegcode.identification.frf_model import steady_sines
 from shapegcode.identification.identify import identify
 from shapegcode.identification.result import Identification, IdentifiedMode
 from tap_truth import TrueMode
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def near(mode: TrueMode, found: IdentifiedMode) -> bool:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from page_code import run_page
 from scipy import ndimage, optimize, spatial
@@ -20,6 +19,7 @@ import shapegcode as sg
 from acceptance import machine_with
 from shapegcode import _core
 from shapegcode.demos.path import path_program
+from shapegcode.io.units import FloatArray
 from shapegcode.metrology.figures import FittedCircle
 from shapegcode.metrology.result import MeasuredRegion
 from shapegcode.model.machine_model import MachineModel
@@ -27,7 +27,6 @@ from shapegcode.results import plot
 
 ROOT = Path(__file__).resolve().parents[2]
 TOOL_MM = 3.0
-FloatArray = npt.NDArray[np.float64]
 
 
 def program(moves: Sequence[str], machine: sg.Machine) -> sg.Program:

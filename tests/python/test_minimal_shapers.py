@@ -6,7 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from minimal_figures import random_sets, solve
-from numpy.typing import NDArray
 from scipy.optimize import fsolve
 
 from shapegcode._core import (
@@ -18,10 +17,10 @@ from shapegcode._core import (
     minimal_shapers,
     minimal_two_mode,
 )
+from shapegcode.io.units import FloatArray
 from shapegcode.shaping import DesignOptions, ModeBand, design
 from shaper_residual import simulated
 
-FloatArray = NDArray[np.float64]
 THREE = (Mode(20.0, 0.02), Mode(71.0, 0.05), Mode(160.0, 0.01))
 THREE_UNDAMPED = (Mode(1.0, 0.0), Mode(2.3, 0.0), Mode(5.2, 0.0))
 

@@ -7,14 +7,12 @@ import threading
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, strategies as st
 
 import shapegcode as sg
 from planned_steps import planned_steps
-
-Rows = npt.NDArray[np.float64]
+from shapegcode.io.units import FloatArray
 
 PERIOD_S = 0.001
 ACCELERATION = 1000.0
@@ -29,13 +27,13 @@ def control(**changes: Any) -> sg.MotionController:
     return sg.MotionController(**({**LIMITS, "smoothing_time_s": 0.0, "period_s": PERIOD_S} | changes))
 
 
-def line(to: float, made: sg.MotionController, feed: float = FEED) -> Rows:
+def line(to: float, made: sg.MotionController, feed: float = FEED) -> FloatArray:
     """All set-points of one move along X."""
     assert made.push_line([to, 0, 0], feed, stop_at_end=True) == sg.PushResult.accepted
     return made.run()
 
 
-def arrival(rows: Rows) -> int:
+def arrival(rows: FloatArray) -> int:
     """Periods until the end is reached: the first row that is the last one for good."""
     away = np.flatnonzero((rows != rows[-1]).any(axis=1))
     return int(away[-1]) + 2 if len(away) else 1
@@ -103,7 +101,7 @@ def test_a_set_of_equal_filters_followed_along_an_axis_is_that_filter() -> None:
     np.testing.assert_allclose(followed[:count], plain[:count], atol=1e-11)
 
 
-def differences(rows: Rows, order: int, start: Rows) -> Rows:
+def differences(rows: FloatArray, order: int, start: FloatArray) -> FloatArray:
     """Differences over the period of the set-points, with rest at the start before them."""
     whole = np.vstack([np.tile(start, (order, 1)), rows])
     return np.asarray(np.diff(whole, order, axis=0) / PERIOD_S**order)
@@ -453,7 +451,7 @@ def test_a_programmed_stop_waits_for_the_operator(lead: int | None) -> None:
     """Also where nothing follows yet, and where the thread that plans is ahead."""
     made = control(lead_periods=lead, shaper=sg.Fir([0, 11], [0.5, 0.5]))
 
-    def step(periods: int) -> Rows:
+    def step(periods: int) -> FloatArray:
         return planned_steps(made, periods, plans=lead is not None)
 
     made.push_line([10, 0, 0], FEED)

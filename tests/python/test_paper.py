@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import jsonschema
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import shapegcode as sg
@@ -13,10 +12,9 @@ from acceptance import BLOCK_ENDS, convert, figures, machine_with, whole_periods
 from judge import durations, residual_um
 from shapegcode import _core
 from shapegcode.demos.path import PathDemo, ideal_command, path_demo, path_program, statements
+from shapegcode.io.units import FloatArray
 from shapegcode.model.machine_model import motion_limits
 from shapegcode.results.json import schema
-
-Vector = npt.NDArray[np.float64]
 
 # Feed mm/s, arc feed ratio, orbit error in % of the zeta = .02 model, time added by the ideal command in %.
 CONDITIONS = [(100, 0.60, 0.0270, 31.5), (200, 0.60, 0.1074, 33.4), (100, 0.99, 0.0732, 2.0), (200, 0.99, 0.2908, 3.3)]
@@ -42,7 +40,7 @@ def vx500() -> sg.Machine:
 
 
 @functools.cache
-def ideal(feed: int, ratio: float) -> tuple[Vector, _core.SimulationFigures]:
+def ideal(feed: int, ratio: float) -> tuple[FloatArray, _core.SimulationFigures]:
     """The ideal command every 10 us, (n, 3), and its figures."""
     program = path_program(feed, vx500())
     samples, simulated = ideal_command(program.regions[-1].path, vx500(), ratio)
@@ -55,7 +53,7 @@ def paper_text(feed: int) -> str:
 
 
 @functools.cache
-def unshaped_residual_um(feed: int, ratio: float, period_s: float = 1e-3) -> Vector:
+def unshaped_residual_um(feed: int, ratio: float, period_s: float = 1e-3) -> FloatArray:
     """What the programmed path leaves, with the same reduction, by the same rule: the judge's measure."""
     path = path_program(feed, vx500()).regions[-1].path
     profile = _core.plan_speed(path, motion_limits(vx500(), arc_feed_ratio=ratio))
@@ -86,7 +84,7 @@ def test_orbit_error_is_the_area_between_command_and_arc(feed: int, ratio: float
     assert area / (np.pi * 100.0) * 100.0 == pytest.approx(percent, abs=5e-4)
 
 
-def passing_time_s(command: Vector, point: tuple[float, float]) -> float:
+def passing_time_s(command: FloatArray, point: tuple[float, float]) -> float:
     """When the command is nearest to a point."""
     return float(np.linalg.norm(command[:, :2] - point, axis=1).argmin()) * 1e-5
 

@@ -4,12 +4,11 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from page_code import run_page
 from scipy.optimize import brentq
 
-Vector = npt.NDArray[np.float64]
+from shapegcode.io.units import FloatArray
 
 
 def corners() -> dict[int, Any]:
@@ -17,7 +16,7 @@ def corners() -> dict[int, Any]:
     return found
 
 
-def resultant_n(radial_depth_mm: float, feed_mm_per_min: float, rev_per_min: float) -> Vector:
+def resultant_n(radial_depth_mm: float, feed_mm_per_min: float, rev_per_min: float) -> FloatArray:
     """Resultant over one tooth pitch by discs of 0.05 mm: eq. 1 to 5, 8 and 9, k1 and k2 at the mean chip."""
     radius, teeth, helix, depth = 4.0, 6, math.radians(50.0), 15.0
     per_tooth = feed_mm_per_min / (teeth * rev_per_min)

@@ -1,19 +1,17 @@
 """Whole records through base-excited modes, against SciPy's filter and simulation of the same plant."""
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy import signal
 
 import shapegcode as sg
-
-Array = npt.NDArray[np.float64]
+from shapegcode.io.units import FloatArray
 
 PERIOD = 1e-3
 MODES = [[sg.Mode(46.0, 0.02, 1.0), sg.Mode(210.0, 0.05, 0.2)], [sg.Mode(131.0, 0.0, 1.0)]]
 
 
-def record(rows: int = 5000) -> Array:
+def record(rows: int = 5000) -> FloatArray:
     rng = np.random.default_rng(1)
     steps = rng.normal(0.0, 0.1, (rows, 2))
     steps[rows // 2 :] = 0.0

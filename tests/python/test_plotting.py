@@ -7,7 +7,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from matplotlib.axes import Axes
 from rich.console import Console
@@ -16,14 +15,13 @@ from scipy.spatial import KDTree
 from effort import cpu_s
 from shapegcode.conversion import plots as pictures
 from shapegcode.conversion.convert import convert
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.results import plot
 from shapegcode.results.motion_plots import Trace, View, plot_feed, plot_vibration, thin_min_max
 from shapegcode.results.path_plots import follow, plot_path, polyline_of
 from shapegcode.results.table import warning_table
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def quarter(points: int) -> FloatArray:

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import shapegcode as sg
-from beside_the_path import ACCELERATION, FILTERS, JERK, PERIOD_S, Rows, control, largest_share
+from beside_the_path import ACCELERATION, FILTERS, JERK, PERIOD_S, control, largest_share
 from planned_steps import planned_steps
+from shapegcode.io.units import FloatArray
 
 
 @pytest.mark.parametrize("lead", [None, 60])
@@ -17,7 +18,7 @@ def test_a_probe_stops_the_motion_on_its_path(filters: dict[str, Any], lead: int
     """As soon as the limits allow, within what is planned ahead; the rest of the path is gone."""
     made = control(lead_periods=lead, **filters)
 
-    def step(periods: int) -> Rows:
+    def step(periods: int) -> FloatArray:
         return planned_steps(made, periods, plans=lead is not None)
 
     made.push_line([100, 0, 0], 100.0)

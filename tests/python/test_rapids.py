@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from judge import LineRecord, interpret, play, response, verify_conversion
@@ -15,11 +14,10 @@ from shapegcode._core import ArgumentError, InPosition, in_position_wait_behind_
 from shapegcode.cli import main
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.convert import Conversion, convert
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import fanuc_model
 from shapegcode.program import Program
-
-Vector = npt.NDArray[np.float64]
 
 # Figures of vx500.toml that the model of a rapid by hand needs.
 PERIOD_S, RAPID_MM_PER_S, RAMP_S, ARRIVAL_S = 0.001, 400.0, 0.15, {"X": 0.025, "Y": 0.025, "Z": 0.12}
@@ -69,7 +67,7 @@ def converted(text: str, machine: Machine | None = None, **options: Any) -> Conv
     return convert(Program.from_text(text, machine), machine, **({"shape_all": True} | options))
 
 
-def rapid_by_hand(start: Vector, end: Vector) -> Vector:
+def rapid_by_hand(start: FloatArray, end: FloatArray) -> FloatArray:
     """Paper 004, linear rapid: an even run smoothed by a moving average; a short one has run = average."""
     length = float(np.linalg.norm(end - start))
     share = length / np.abs(end - start).max()
@@ -86,11 +84,11 @@ def rapid_by_hand(start: Vector, end: Vector) -> Vector:
     return np.asarray(start + way[:, None] * (end - start))
 
 
-def hold(points: Vector, seconds: float) -> Vector:
+def hold(points: FloatArray, seconds: float) -> FloatArray:
     return np.concatenate([points, np.repeat(points[-1:], round(seconds / PERIOD_S), axis=0)])
 
 
-def command_between_cuts(records: list[LineRecord]) -> Vector:
+def command_between_cuts(records: list[LineRecord]) -> FloatArray:
     """Set-points of lines between two cuts: rapids with their wait, shaped blocks, dwells, waits of exact stops."""
     moves = [move for record in records for move in record.moves if move.length > 0.0]
     points = np.asarray(moves[0].start, dtype=float)[None, :]

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import shapegcode as sg
 from acceptance import machine_with
@@ -24,10 +23,10 @@ from planner_references import (
     table_off_path_um,
 )
 from shapegcode import _core
+from shapegcode.io.units import FloatArray
 from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.model.machine_model import fanuc_model
 
-Array = NDArray[np.float64]
 TESTS = Path(__file__).parents[1]
 DATA = TESTS / "benchmarks" / "data" / "recorded_planners.npz"
 LINUXCNC = TESTS / "golden" / "linuxcnc"
@@ -42,7 +41,7 @@ RECORDED = [
 ]
 
 
-def modelled(path: _core.Path, kind: str, acceleration: float, settings: dict[str, Any]) -> Array:
+def modelled(path: _core.Path, kind: str, acceleration: float, settings: dict[str, Any]) -> FloatArray:
     """Set-points of a path at 1 ms by our model of a control's planner."""
     axes = {f"axes.{axis}.max_acceleration_mm_s2": acceleration for axis in "xyz"}
     rates = {f"axes.{axis}.max_feed_mm_per_min": 30_000.0 for axis in "xyz"}
@@ -66,7 +65,7 @@ def klipper_path(text: str, folder: Path) -> _core.Path:
     return _core.Path([_core.Segment.line(each.start, each.end, each.feed_mm_per_min / 60.0) for each in moves])
 
 
-def block_ends_s(points: Array, path: _core.Path) -> Array:
+def block_ends_s(points: FloatArray, path: _core.Path) -> FloatArray:
     """When set-points pass the ends of the blocks but the last, from the first that moves on."""
     moved = np.flatnonzero(np.any(np.diff(points, axis=0) != 0.0, axis=1))
     points = points[moved[0] : moved[-1] + 2]
@@ -75,7 +74,7 @@ def block_ends_s(points: Array, path: _core.Path) -> Array:
     return np.interp(ends[:-1] * travel[-1] / ends[-1], travel, np.arange(len(travel)) * PERIOD_S)
 
 
-def compare(recorded: Array, points: Array, path: _core.Path) -> tuple[Array, Array, float]:
+def compare(recorded: FloatArray, points: FloatArray, path: _core.Path) -> tuple[FloatArray, FloatArray, float]:
     """Residual of X and Y of both, µm, and the largest difference of the block ends, s."""
     was = residual_um(recorded, MODES, PERIOD_S, still_mm=1e-7)[:2]
     by_model = residual_um(points, MODES, PERIOD_S, still_mm=1e-7)[:2]

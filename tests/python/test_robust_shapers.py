@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 import highspy
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from extra_insensitive import ei_convolved, fine_enough_period_s, random_pairs, worst_over_bands
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, convolve, grid_polynomial, zv
+from shapegcode.io.units import FloatArray
 from shapegcode.shaping import (
     DesignOptions,
     ModeBand,
@@ -24,8 +24,6 @@ from shapegcode.shaping import (
     shortest_non_negative,
 )
 from shapegcode.shaping.grid_designs import lower_hull
-
-FloatArray = NDArray[np.float64]
 
 PAPER_BANDS = (ModeBand(Mode(46.0, 0.02), 0.1), ModeBand(Mode(131.0, 0.02), 0.1))
 

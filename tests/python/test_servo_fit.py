@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.signal import lsim
 
 import shapegcode as sg
@@ -14,8 +13,8 @@ from command import run
 from edge_writer import MEASURED, edge_document, write_edge
 from shapegcode import _core
 from shapegcode.identification.servo.fit import delayed, lagged_motion
+from shapegcode.io.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 PERIOD_S = 0.002
 
 

@@ -7,7 +7,8 @@ import pytest
 from scipy.signal import lsim
 
 import shapegcode as sg
-from beside_the_path import ACCELERATION, PERIOD_S, Rows, control, largest_share
+from beside_the_path import ACCELERATION, PERIOD_S, control, largest_share
+from shapegcode.io.units import FloatArray
 
 SLOW, FAST = sg.Mode(12.0, 0.01), sg.Mode(40.0, 0.01)
 EACH = [sg.Fir([0, 4], [0.5, 0.5]), sg.Fir([0], [1.0]), sg.Fir([0, 6, 12], [1.0, -1.0, 1.0])]
@@ -18,7 +19,7 @@ def zigzag(made: sg.MotionController, moves: int = 30) -> None:
         made.push_line([6.0 * n, 5.0 * (n % 2), 0.2 * n], 90.0, stop_at_end=n == moves)
 
 
-def left_of(rows: Rows, mode: sg.Mode, begin: int) -> float:
+def left_of(rows: FloatArray, mode: sg.Mode, begin: int) -> float:
     """Largest deflection of a mode behind the last step, mm, where the base went on evenly before the first
     one: SciPy's integration."""
     even = rows[0] + np.arange(len(rows))[:, None] * (rows[1] - rows[0])

@@ -1,10 +1,8 @@
 """``shapegcode simulate``: the motion of a whole program in time, its files and figures, with either plant."""
 
 import dataclasses
-import errno
 import json
 import os
-import resource
 import subprocess
 import sys
 import zipfile
@@ -13,7 +11,6 @@ from typing import Any
 
 import jsonschema
 import numpy as np
-import numpy.typing as npt
 import pytest
 import scipy.signal
 
@@ -21,6 +18,7 @@ import feed_drive_reference as reference
 import shapegcode as sg
 from acceptance import PROGRAMS
 from shapegcode.cli import main
+from shapegcode.io.units import FloatArray
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.stream import KINDS, REST_S, Chunk
 from shapegcode.results import plot
@@ -47,8 +45,6 @@ DRIVE = {
     "friction_static_n": 160.0,
 }
 
-Vector = npt.NDArray[np.float64]
-
 
 def machine_with(drive: dict[str, Any] | None = None, **tables: dict[str, Any]) -> sg.Machine:
     """The built-in vx500 with values of its tables, and the drive on every axis."""
@@ -69,7 +65,7 @@ def streamed(text: str, machine: sg.Machine, **options: Any) -> Chunk:
     return chunks[0]
 
 
-def axis(columns: dict[str, Any], name: str) -> Vector:
+def axis(columns: dict[str, Any], name: str) -> FloatArray:
     """A column of X, Y and Z as one array."""
     return np.column_stack([columns[f"{letter}_{name}"] for letter in "xyz"])
 
@@ -447,25 +443,6 @@ def test_api_refuses_before_anything_is_played() -> None:
     for options in ({"plant": "other"}, {"lines": (5, 4)}, {"lines": (1, 99)}, {"chunk_samples": 0}):
         with pytest.raises(sg.ArgumentError):
             sg.stream(program, machine, **options)
-
-
-@pytest.mark.parametrize("name", ["--csv", "--npz"])
-@pytest.mark.parametrize("existing", [False, True])
-def test_full_disk_leaves_no_half_file(folder: Path, name: str, existing: bool) -> None:
-    if existing:
-        (folder / "motion").write_text("as it was")
-    before = sorted(os.listdir(folder))
-    done = subprocess.run(
-        [COMMAND, "simulate", "part.nc", "-m", "vx500", name, "motion"],
-        cwd=folder, capture_output=True, text=True, check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)),
-    )  # fmt: skip
-    assert done.returncode == 2
-    assert done.stderr.startswith("shapegcode: motion: ")
-    assert os.strerror(errno.EFBIG) in done.stderr
-    assert sorted(os.listdir(folder)) == before
-    if existing:
-        assert (folder / "motion").read_text() == "as it was"
 
 
 POCKET = (

@@ -8,14 +8,15 @@ import numpy.typing as npt
 import pytest
 
 import shapegcode as sg
-from beside_the_path import ACCELERATION, FILTERS, JERK, PERIOD_S, Rows, control, largest_share
+from beside_the_path import ACCELERATION, FILTERS, JERK, PERIOD_S, control, largest_share
+from shapegcode.io.units import FloatArray
 
 FOLLOWING = [sg.FollowingLimits(max_feed=180.0, max_acceleration=2000.0, max_jerk=100_000.0)]
 COUNTS = 4096  # an encoder of 1 024 lines
 SYNCHRONOUS = sg.SegmentRules(feed_rate=sg.FeedRate.synchronous)
 
 
-def top_speed(rows: Rows, axis: int) -> float:
+def top_speed(rows: FloatArray, axis: int) -> float:
     return float(np.abs(np.diff(rows[:, axis])).max()) / PERIOD_S
 
 
@@ -110,7 +111,7 @@ def test_a_feed_per_revolution_follows_the_spindle() -> None:
         made.step(4, [0.0, 0.0, 0.0])
 
 
-def spindle_angle(t: npt.NDArray[np.floating[Any]], speed: float, ripple: float, frequency: float) -> Rows:
+def spindle_angle(t: npt.NDArray[np.floating[Any]], speed: float, ripple: float, frequency: float) -> FloatArray:
     return speed * t - speed * ripple / (2 * math.pi * frequency) * (np.cos(2 * math.pi * frequency * t) - 1.0)
 
 

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
@@ -12,9 +11,9 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.identify import identify
 from shapegcode.identification.update import update_machine
 from shapegcode.io.record import ReadOptions
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 
-FloatArray = npt.NDArray[np.float64]
 RATE_HZ, FINER = 1600.0, 4
 
 

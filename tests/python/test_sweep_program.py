@@ -4,16 +4,15 @@ import re
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from command import run
 from shapegcode.cli import main
 from shapegcode.errors import ArgumentError
 from shapegcode.identification.sweep_program import write_sweep
+from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 
-FloatArray = npt.NDArray[np.float64]
 VX500 = Machine.load("vx500")
 PLAIN = VX500.with_values({"controller.motion": "after_interpolation", "controller.time_constant_s": 0.008})
 

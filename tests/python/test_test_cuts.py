@@ -10,7 +10,6 @@ from typing import Any
 
 import jsonschema
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import cut_reference as reference
@@ -18,10 +17,9 @@ import shapegcode as sg
 from shapegcode import _core
 from shapegcode.cli import main
 from shapegcode.cutting.tool import Tool
+from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
 from shapegcode.results.json import schema
-
-Array = npt.NDArray[np.float64]
 
 RADIUS, AXIAL, SPINDLE, FLUTES = 4.0, 15.0, 1800.0, 6
 FINE = 0.004  # of what is tried point by point, mm
@@ -77,7 +75,7 @@ def moves(text: str) -> list[list[tuple[float, float, float, float]]]:
     return parts
 
 
-def edge_behind(lines: list[tuple[float, float, float, float]], x: Array, side: float) -> Array:
+def edge_behind(lines: list[tuple[float, float, float, float]], x: FloatArray, side: float) -> FloatArray:
     """Outermost height of the material at each X that circles along lines leave; *side* -1: material towards -Y."""
     centres = np.vstack(
         [np.linspace((a, b), (c, d), max(2, math.ceil(math.hypot(c - a, d - b) / 0.01) + 1)) for a, b, c, d in lines]
@@ -91,7 +89,7 @@ def edge_behind(lines: list[tuple[float, float, float, float]], x: Array, side: 
     return height
 
 
-def radial_depths(program: Path, number: int, at: Array, side: float = -1.0) -> Array:
+def radial_depths(program: Path, number: int, at: FloatArray, side: float = -1.0) -> FloatArray:
     """Radial depth that a measuring pass meets, from all moves before it."""
     parts = moves(program.read_text(encoding="utf-8"))
     before = [line for part in parts[: 2 * number - 1] for line in part]
@@ -102,7 +100,7 @@ def radial_depths(program: Path, number: int, at: Array, side: float = -1.0) -> 
     return radial_depths_of(lambda x: np.interp(x, grid, edge), at)
 
 
-def radial_depths_of(edge: Callable[[Array], Array], at: Array) -> Array:
+def radial_depths_of(edge: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:
     """Height of the first point at which the front of the tool comes out of an edge, its wall at height 0."""
     found = np.empty(len(at))
     u = np.arange(0.0, RADIUS, FINE)
@@ -210,7 +208,7 @@ def test_what_cannot_be_cut_is_refused(
 
 def simulated(
     each: dict[str, Any],
-    edge: Callable[[Array], Array],
+    edge: Callable[[FloatArray], FloatArray],
     *,
     rate: float = 1013.0,
     noise: float = 0.05,
@@ -219,7 +217,7 @@ def simulated(
     lag_s: float = 0.0,
     runout: tuple[float, ...] = (),
     seed: int = 1,
-) -> tuple[Array, Array, Array]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Time, X and forces on the work piece of one pass, with offset, drift and noise of a dynamometer."""
     rng = np.random.default_rng(seed)
     way = reference.lagging_way([(end, feed * override) for end, feed in each["feeds"]], each["start_mm"], lag_s)
@@ -247,12 +245,12 @@ def simulated(
     return times, x, -force
 
 
-def saved(path: Path, **columns: Array) -> str:
+def saved(path: Path, **columns: FloatArray) -> str:
     path.write_text(reference.rows(columns), encoding="utf-8")
     return str(path)
 
 
-def taper_edge(x: Array) -> Array:
+def taper_edge(x: FloatArray) -> FloatArray:
     return 0.4 + 2.4 / 40.0 * x
 
 
@@ -327,7 +325,7 @@ def test_samples_in_step_with_the_teeth_are_told(tmp_path: Path) -> None:
     assert any("5.0 samples per tooth" in note for note in fitted(tmp_path, file)["warnings"])
 
 
-def mean_rows(depth: Array, feed: float, noise: float, seed: int) -> Array:
+def mean_rows(depth: FloatArray, feed: float, noise: float, seed: int) -> FloatArray:
     """Mean force on the work piece at radial depths."""
     begin, end = reference.climb_arc(depth, RADIUS)
     force = reference.mean_force(begin, end, feed / SPINDLE / FLUTES, FLUTES, AXIAL, reference.PAPER)
@@ -414,7 +412,7 @@ def test_the_table_is_not_written_over_a_tool_file(tmp_path: Path, capsys: pytes
     assert tool.read_text(encoding="utf-8") == TOOL
 
 
-def corner_edge(side: dict[str, Any]) -> Callable[[Array], Array]:
+def corner_edge(side: dict[str, Any]) -> Callable[[FloatArray], FloatArray]:
     each = side["passes"][0]
     return lambda x: np.interp(x, each["edge_x_mm"], each["edge_height_mm"])
 

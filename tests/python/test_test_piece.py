@@ -15,6 +15,7 @@ import pytest
 import shapegcode as sg
 from acceptance import convert, machine_with
 from rs274_tool import canonical_moves, run_rs274
+from shapegcode.io.units import FloatArray
 
 WRITER = Path(__file__).parents[1] / "tools" / "write_test_piece.py"
 TEXT = (resources.files("shapegcode") / "data" / "iso10791_7.nc").read_text(encoding="ascii")
@@ -23,8 +24,6 @@ DRILLS = {4, 5, 7, 8}  # cut straight down
 CELL_MM, STEP_MM = 0.5, 1.0
 STOCK_HALF_MM, STOCK_TOP_MM = 90.0, 2.0
 HOME_MM = 100.0  # above this: on the way to the reference position
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,11 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import shapegcode as sg
+from shapegcode.io.units import FloatArray
 from time_optimal import Limits, rounded_polyline, time_optimal
-
-Rows = npt.NDArray[np.float64]
 
 PERIOD_S = 0.001
 LIMITS: dict[str, Any] = {
@@ -19,13 +17,13 @@ LIMITS: dict[str, Any] = {
 }
 
 
-def differences(points: Rows, order: int) -> Rows:
+def differences(points: FloatArray, order: int) -> FloatArray:
     """Over the period, with rest before and after."""
     whole = np.vstack([np.tile(points[:1], (order, 1)), points, np.tile(points[-1:], (order, 1))])
     return np.asarray(np.diff(whole, order, axis=0) / PERIOD_S**order)
 
 
-def off_polyline(points: Rows, corners: Rows) -> float:
+def off_polyline(points: FloatArray, corners: FloatArray) -> float:
     """Largest distance of any point from the polyline."""
     begin, leg = corners[:-1], np.diff(corners, axis=0)
     share = ((points[:, None] - begin) * leg).sum(axis=2) / (leg**2).sum(axis=1)
@@ -33,7 +31,7 @@ def off_polyline(points: Rows, corners: Rows) -> float:
     return float(np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1).max())
 
 
-def polyline(seed: int, corners: int, size: float) -> Rows:
+def polyline(seed: int, corners: int, size: float) -> FloatArray:
     steps = np.random.default_rng(seed).normal(0.0, size, (corners, 3))
     return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
+from shapegcode.io.units import FloatArray
 from time_optimal import (
     CallablePath,
     Limits,
@@ -17,11 +17,9 @@ from time_optimal import (
     time_optimal,
 )
 
-Vector = npt.NDArray[np.float64]
-
 
 def straight(length: float) -> CallablePath:
-    def constant(value: float) -> Vector:
+    def constant(value: float) -> FloatArray:
         return np.array([value])
 
     return CallablePath(
@@ -33,7 +31,7 @@ def straight(length: float) -> CallablePath:
 
 
 def circle(radius: float) -> CallablePath:
-    def turned(p: Vector, quarter: int) -> Vector:
+    def turned(p: FloatArray, quarter: int) -> FloatArray:
         at = p / radius + 0.5 * math.pi * quarter
         return np.column_stack((np.cos(at), np.sin(at))) / radius**quarter
 

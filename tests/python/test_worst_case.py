@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import shapegcode as sg
@@ -18,12 +17,12 @@ from command import run
 from judge import Mode, Move, contour_error_um, durations, play, residual_um, response, starts
 from judge.player import BlockEnd, moving_average
 from shapegcode.cli import main
+from shapegcode.io.units import FloatArray
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results.outcome import Deviation
 from shapegcode.shaping import choose_shaper
 from shapegcode.verdict.figures import CaseFigures, RegionLimits, judge_region, stated_cases
 
-Vector = npt.NDArray[np.float64]
 TICK = 0.001
 UNCERTAIN = {
     "axes.x.modes": [
@@ -180,7 +179,7 @@ def test_a_stated_uncertainty_is_part_of_the_feed_search(judged: Judged) -> None
     assert report["worst_case"]["contour_error_um"]["response"] > report["cases"][0]["contour_error_um"]["response"]
 
 
-def distance(point: Vector, begin: Vector, end: Vector) -> float:
+def distance(point: FloatArray, begin: FloatArray, end: FloatArray) -> float:
     """From a point to a straight leg."""
     along, offset = end - begin, point - begin
     square = float(along @ along)
@@ -188,7 +187,7 @@ def distance(point: Vector, begin: Vector, end: Vector) -> float:
     return float(np.linalg.norm(offset - share * along))
 
 
-def starved_points(cuts: list[Move], after: int, wait_s: float, rule: BlockEnd) -> tuple[Vector, int, int]:
+def starved_points(cuts: list[Move], after: int, wait_s: float, rule: BlockEnd) -> tuple[FloatArray, int, int]:
     """Set-points of blocks with a wait behind one of them; first and last row of the wait."""
     head = play(cuts[: after + 1], period_s=TICK, block_end=rule)
     tail = play(cuts[after + 1 :], period_s=TICK, block_end=rule)
@@ -221,7 +220,7 @@ def test_a_starved_block_is_as_bad_as_the_worst_of_all_places(time_constant_tick
     assert case["time_s"] == pytest.approx(nominal["time_s"] + 0.020)
 
 
-def planned_points(cuts: list[Move], acceleration_mm_s2: float) -> Vector:
+def planned_points(cuts: list[Move], acceleration_mm_s2: float) -> FloatArray:
     """Set-points along X under a speed that keeps every block's feed and an acceleration, from rest to rest."""
     lengths = np.array([move.length for move in cuts])
     feeds = np.array([move.feed / 60.0 for move in cuts])

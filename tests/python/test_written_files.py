@@ -88,6 +88,7 @@ def test_a_full_disk_is_told_with_the_name_of_the_file(kind: str, folder: Path) 
     done = run(folder, *(word.replace("FILE", "/dev/full") for word in WRITTEN[kind]))
     assert done.returncode == 2, done.stderr
     assert f"/dev/full: {os.strerror(errno.ENOSPC)}" in done.stderr
+    assert Path("/dev/full").is_char_device()
 
 
 def test_a_picture_for_which_there_is_no_room_is_named(tmp_path: Path) -> None:
