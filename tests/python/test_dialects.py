@@ -24,10 +24,11 @@ from dialect_readers import (
     read_siemens,
 )
 from effort import trials
-from judge import Mode, residual_um
+from judge import residual_um
 from shapegcode import _core
 from shapegcode.conversion.translate import translate
 from shapegcode.machine.dialects import DialectName, all_dialects
+from test_planner_models import MODES, PAPER, READING
 
 PROGRAMS = Path(__file__).parents[1] / "golden" / "programs"
 READERS = {
@@ -64,9 +65,6 @@ M05
 M30
 %
 """
-
-
-READING = {"input.tool_change_unknown_axes": ""}
 
 
 def machine_for(dialect: str, keys: Mapping[str, Any] | None = None) -> sg.Machine:
@@ -203,16 +201,14 @@ PLANNED = [(10_000.0, 1.5), (50_000.0, 1.5), (5_000.0, 3.0)]
 
 @pytest.mark.parametrize(("acceleration", "limit_um"), PLANNED)
 def test_klipper_plans_the_shaped_program(acceleration: float, limit_um: float, tmp_path: Path) -> None:
-    text = "G21G90\nG00X0.Y0.Z0.\nG01X20.F12000.\nG03X40.Y20.R20.\nG01Y40.\nG04P500\nM30\n"  # paper 000's path
     machine = machine_for("klipper")
-    conversion = converted("klipper", text)
-    original = translate(sg.Program.from_text(text, machine), machine).text
-    modes = [[Mode(46.0, 0.02)], [Mode(131.0, 0.02)], []]
+    conversion = converted("klipper", PAPER)
+    original = translate(sg.Program.from_text(PAPER, machine), machine).text
     found = []
     for program in (original, conversion.text):
         cut = [each for each in read_klipper(program.decode(), tmp_path) if not is_fast(each) and not each.dwell_s]
         points, time_s = plan_klipper(cut, acceleration, tmp_path)
-        found.append((residual_um(points, modes, 0.001)[:2], time_s))
+        found.append((residual_um(points, MODES, 0.001)[:2], time_s))
     (before, _), (after, shaped_s) = found
     assert np.all(after < limit_um) and np.all(after < 0.5 * before)
     assert shaped_s == pytest.approx(conversion.cutting_time_s.emitted, rel=0.01, abs=0.01)

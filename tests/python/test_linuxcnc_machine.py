@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import shapegcode as sg
-from acceptance import machine_with
 from command import run
 from shapegcode import _core
 from shapegcode.machine.control_import import read_ini
 from shapegcode.model.machine_model import fanuc_model
+from test_planner_models import machine_of
 
 INI = """\
 [EMC]
@@ -113,10 +113,7 @@ def kinked(angle_rad: float, speed: float) -> _core.Path:
 
 
 def linuxcnc(**settings: Any) -> sg.Machine:
-    axes = {f"axes.{axis}.max_acceleration_mm_s2": 5000.0 for axis in "xyz"}
-    rates = {f"axes.{axis}.max_feed_mm_per_min": 30_000.0 for axis in "xyz"}
-    own = {"controller.linuxcnc": settings} if settings else {}
-    return machine_with({**axes, **rates, "controller.kind": "linuxcnc", "emission.dialect": "linuxcnc", **own})
+    return machine_of("linuxcnc", 5000.0, **settings).with_values("emission.dialect", "linuxcnc")
 
 
 def test_the_kink_rule_in_closed_form() -> None:

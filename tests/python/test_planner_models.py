@@ -1,7 +1,5 @@
 """The planners of open controls as they are modelled, beside their own and beside independent calculations."""
 
-import gzip
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,7 @@ import pytest
 import shapegcode as sg
 from acceptance import machine_with
 from judge import Mode, residual_um
-from planner_references import PERIOD_S, Grbl, distance_in_time, grbl_lines, klipper_points, path_of_text, smoothed
+from planner_references import PERIOD_S, Grbl, grbl_lines, klipper_points, smoothed
 from shapegcode import _core
 from shapegcode.machine.controller import PLANNER_NAMES
 from shapegcode.model.machine_model import fanuc_model
@@ -20,6 +18,7 @@ from shapegcode.model.machine_model import fanuc_model
 PROGRAMS = Path(__file__).parents[1] / "golden" / "programs"
 NAMES = ["CONTOUR_R.NC", "VINT_360arc.NC", "helical_bore.nc", "TEST_G90.NC", "PARALLEL.NC"]
 PAPER = "G21G90\nG00X0.Y0.Z0.\nG01X20.F12000.\nG03X40.Y20.R20.\nG01Y40.\nG04P500\nM30\n"
+MODES = [[Mode(46.0, 0.02)], [Mode(131.0, 0.02)], []]
 READING = {"input.tool_change_unknown_axes": ""}
 
 
@@ -145,40 +144,6 @@ def test_chords_lie_within_their_tolerance_and_one_less_does_not() -> None:
             _core.Segment.line([0, 0, 0], [9, 0, 0], 10.0).chords_within(tolerance)
 
 
-LINUXCNC = Path(__file__).parents[1] / "golden" / "linuxcnc"
-#: Largest distance in time from the recording, µm, and of the times, ms. Where two segments overlap the model has one
-#: after the other.
-RUNS = {
-    "paper-original-5000-delivered": (0.01, 0.0),
-    "paper-shaped-5000-two-lines": (0.01, 0.0),
-    "paper-shaped-10000-delivered": (0.01, 0.0),
-    "paper-shaped-10000-two-lines": (0.01, 0.0),
-    "corners-original-5000-delivered": (0.2, 0.0),
-    "corners-original-10000-delivered": (80.0, 1.0),
-    "short-original-5000-delivered": (2.0, 0.0),
-    "short-original-10000-delivered": (15.0, 0.0),
-    "short-original-10000-two-lines": (15.0, 0.0),
-    "short-shaped-10000-two-lines": (0.01, 0.0),
-    "arcs-original-10000-delivered": (150.0, 2.0),
-    "arcs-original-5000-two-lines": (150.0, 2.0),
-}
-
-
-@pytest.mark.parametrize("run", RUNS)
-def test_recordings_of_linuxcnc(run: str, tmp_path: Path) -> None:
-    found = next(each for each in json.loads((LINUXCNC / "runs.json").read_text()) if each["run"] == run)
-    with gzip.open(LINUXCNC / f"{run}.csv.gz", "rt") as file:
-        recorded = np.loadtxt(file, delimiter=",")
-    path = path_of_text((LINUXCNC / f"{found['program']}.ngc").read_text(), tmp_path)
-    lines = {} if found["as_delivered"] else {"ramp_frequency_hz": 10_000.0, "kink_ratio": 0.7}
-    machine = machine_of("linuxcnc", float(found["acceleration"]), rapid_follows=False, **lines)
-    points = smoothed(planned(path, machine)[0])
-    limit_um, limit_ms = RUNS[run]
-    assert distance_in_time(recorded, points) * 1e3 < limit_um
-    moved_ms = [int(np.flatnonzero(np.any(np.diff(each, axis=0) != 0.0, axis=1))[-1]) for each in (recorded, points)]
-    assert abs(moved_ms[0] - moved_ms[1]) <= limit_ms + 3.0
-
-
 def test_a_line_in_linuxcnc_in_closed_form() -> None:
     """20 mm at 100 mm/s and 5 000 mm/s²: 0.2 s and 0.02 s; without a rapid behind it half of the acceleration."""
     line = _core.Path([_core.Segment.line([0, 0, 0], [20, 0, 0], 100.0)])
@@ -226,7 +191,7 @@ def test_a_conversion_is_judged_by_the_planner(kind: str) -> None:
     blocks = conversion.placed[0].blocks(conversion.emitted)
     points, _ = planned(blocks, machine, emitted=True)
     points = smoothed(points) if kind == "linuxcnc" else points
-    residual = residual_um(points, [[Mode(46.0, 0.02)], [Mode(131.0, 0.02)], []], PERIOD_S)
+    residual = residual_um(points, MODES, PERIOD_S)
     assert cases[0].residual_um.x == pytest.approx(residual[0], abs=0.02)
     assert cases[0].residual_um.y == pytest.approx(residual[1], abs=0.02)
     assert conversion.cutting_time_s.emitted == pytest.approx((len(points) - 1) * PERIOD_S, abs=3.0 * PERIOD_S)
