@@ -14,8 +14,6 @@ import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-__all__ = ["ANSWERS", "MAX_BYTES", "MAX_CPU_S", "RECORD_BOMBS", "TOML_BOMBS", "Done", "changed", "command", "sound"]
-
 #: Valid answers for `setup`.
 ANSWERS = """\
 name = "VMC-3"

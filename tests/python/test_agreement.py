@@ -1,6 +1,5 @@
 """Commands that are given an emitted program say of it what the conversion said."""
 
-import inspect
 import math
 import re
 from collections.abc import Callable
@@ -178,29 +177,6 @@ def test_contour_says_against_what(emitted: Path, original: Path, machine: sg.Ma
     assert "against its own blocks" in alone.answer and "--against ORIGINAL" in alone.next_step
     beside = sg.simulate(emitted, machine, record_samples=0, against=original)
     assert beside.measured_against == str(original) and "own blocks" not in beside.answer
-
-
-def test_every_function_takes_the_path_of_a_file(emitted: Path, original: Path, machine: sg.Machine) -> None:
-    calls: dict[str, Callable[[Any], Any]] = {
-        "check": lambda program: sg.check(program, machine),
-        "cycle_time": lambda program: sg.cycle_time(program, machine),
-        "simulate": lambda program: sg.simulate(program, machine, record_samples=0),
-        "simulate_motion": lambda program: sg.simulate_motion(program, machine),
-        "stream": lambda program: next(iter(sg.stream(program, machine))),
-        "measure": lambda program: sg.measure(program, machine, 10.0),
-    }
-    taking = {
-        name
-        for name in sg.__all__
-        if inspect.isfunction(function := getattr(sg, name))
-        and {"program", "programs"} & set(inspect.signature(function).parameters)
-    }
-    # in their own tests
-    others = {"batch", "convert", "convert_scheduled", "expand", "optimize", "schedule_feed", "study", "survey"}
-    assert taking == {*calls, *others}
-    for call in calls.values():
-        for program in (str(original), original, str(emitted), emitted):
-            call(program)
 
 
 def test_emitted_programs_are_not_shaped_twice(emitted: Path, machine: sg.Machine) -> None:

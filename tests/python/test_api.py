@@ -93,7 +93,9 @@ def test_a_file_name_does_for_a_program(tmp_path: Path, kind: type[str] | type[P
     (tmp_path / "part.nc").write_text(GOOD)
     file = kind(tmp_path / "part.nc")
     program = sg.Program.read(file, machine)
-    assert sg.simulate(file, machine).to_dict() == sg.simulate(program, machine).to_dict()
+    for function in (sg.check, sg.cycle_time, sg.simulate):
+        assert function(file, machine).to_dict() == function(program, machine).to_dict()
+    assert np.array_equal(sg.simulate_motion(file, machine).high, sg.simulate_motion(program, machine).high)
     assert sg.measure([file], machine, 3.0).to_dict() == sg.measure(program, machine, 3.0).to_dict()
     assert sg.measure(file, machine, 3.0, against=file).programs[0].measured_against == str(file)
     streamed, other = (next(sg.stream(each, machine)) for each in (file, program))

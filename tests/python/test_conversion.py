@@ -408,14 +408,6 @@ def test_corner_between_z_and_xy_is_a_forced_stop() -> None:
             assert move.delta[2] == 0.0 or not move.delta[:2].any()
 
 
-def test_conversion_is_the_same_every_time() -> None:
-    text = read_sample("CONTOUR_R.NC")
-    machine = machine_with(CALCULATOR)
-    first, second = (sg.convert(sg.Program.from_text(text, machine), machine) for _ in range(2))
-    assert first.text == second.text
-    assert first.to_dict() == second.to_dict()
-
-
 def check_made_up(text: str) -> None:
     judged = convert(text, machine_with())
     whole_periods(judged)

@@ -116,15 +116,6 @@ def test_the_next_step_follows_the_verdict() -> None:
     assert bad.next_step.startswith("do not run it (lines 3 to 9: contour error too large)")
 
 
-def test_pictures_are_drawn_into_the_callers_axes() -> None:
-    from matplotlib.figure import Figure
-
-    drawn = converted().plots()
-    assert set(drawn) == {"path", "feed", "vibration", "tolerance"}
-    ax = Figure().subplots()
-    assert drawn["path"](ax).get_figure(root=True) is ax.get_figure(root=True)
-
-
 @pytest.mark.parametrize(
     ("options", "keys"),
     [

@@ -119,25 +119,16 @@ def test_table_sticks_at_rest_on_its_bristles() -> None:
     np.testing.assert_allclose(rest[-1, 5], rest[-1, 3], rtol=1e-3)  # the spring holds what the friction takes
 
 
-@pytest.mark.parametrize("forward", [0.0, 0.8])
-def test_linear_drive_is_lsim(forward: float) -> None:
-    viscous = _core.FrictionParameters(viscous_n_s_per_m=1500)
-    parameters = drive(table_friction=viscous, velocity_feed_forward_ratio=forward)
-    setpoints = quadrant_mm(300)
-    a, b, c, d = _core.linear_model(parameters)
-    times = np.arange(len(setpoints)) * PERIOD_S
-    _, wanted, _ = lsim((a, b, c, d), setpoints, times)
-    found = _core.FeedDrive(parameters, PERIOD_S, 1e-11, 1e-12).respond(setpoints[1:])[:, 0]
-    assert np.abs(found - wanted[1:]).max() < 1e-8 * np.abs(wanted).max()
-
-
-def test_acceleration_feed_forward_is_the_second_input_of_the_linear_model() -> None:
+@pytest.mark.parametrize(("viscous", "velocity", "acceleration"), [(1500, 0.0, 0.0), (1500, 0.8, 0.0), (0, 1.0, 0.9)])
+def test_linear_drive_is_lsim(viscous: float, velocity: float, acceleration: float) -> None:
+    """Feed-forward of the acceleration is the second input of the linear model."""
     parameters = drive(
-        table_friction=_core.FrictionParameters(), velocity_feed_forward_ratio=1.0, acceleration_feed_forward_ratio=0.9
-    )
+        table_friction=_core.FrictionParameters(viscous_n_s_per_m=viscous),
+        velocity_feed_forward_ratio=velocity, acceleration_feed_forward_ratio=acceleration,
+    )  # fmt: skip
     setpoints = quadrant_mm(300)
     a, b, c, d = _core.linear_model(parameters)
-    inputs = np.column_stack([setpoints, np.diff(setpoints, prepend=0.0) / PERIOD_S])
+    inputs = np.column_stack([setpoints, np.diff(setpoints, prepend=0.0) / PERIOD_S])[:, : 2 if acceleration else 1]
     _, wanted, _ = lsim((a, b, c, d), inputs, np.arange(len(setpoints)) * PERIOD_S)
     found = _core.FeedDrive(parameters, PERIOD_S, 1e-11, 1e-12).respond(setpoints[1:])[:, 0]
     assert np.abs(found - wanted[1:]).max() < 1e-8 * np.abs(wanted).max()

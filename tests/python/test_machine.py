@@ -19,8 +19,6 @@ from shapegcode.machine.result import MachineDescription
 from shapegcode.results.json import schema
 from shapegcode.settings.keys import PerAxis
 
-ROOT = Path(__file__).resolve().parents[2]
-
 MINIMAL = """
 name = "M"
 [axes.x]
@@ -50,17 +48,13 @@ def problems(text: str) -> list[str]:
 
 def test_minimal_file_gets_the_documented_defaults() -> None:
     machine = Machine.from_toml(MINIMAL)
-    assert machine.controller.interpolation_period_s == 0.001
-    assert machine.controller.in_position_s.as_tuple() == (0.025, 0.025, 0.12)
-    assert machine.controller.corner_speed_difference_mm_per_min == PerAxis(x=500, y=500, z=500)
+    controller = machine.controller
+    assert controller.interpolation_period_s == 0.001
+    assert controller.in_position_s.as_tuple() == (0.025, 0.025, 0.12)
+    assert controller.corner_speed_difference_mm_per_min == PerAxis(x=500, y=500, z=500)
     assert machine.axes.x.modes == ()
     assert machine.axes.x.max_jerk_mm_s3 is None
     assert machine.emission.block_period_s is None
-
-
-def test_keys_that_describe_the_controller_have_their_documented_defaults() -> None:
-    machine = Machine.from_toml(MINIMAL)
-    controller = machine.controller
     assert controller.after_interpolation_shape == "linear"
     assert controller.look_ahead_filter_time_constant_s == 0
     assert controller.contour_acceleration_mm_s2 is None

@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,6 @@ from shapegcode.metrology.result import MeasuredRegion
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results import plot
 
-ROOT = Path(__file__).resolve().parents[2]
 TOOL_MM = 3.0
 
 

@@ -195,14 +195,6 @@ def test_shapers_by_name_are_drawn_as_those_of_a_comparison() -> None:
         sg.plot_steps(shapers)
 
 
-def test_the_same_picture_gives_the_same_bytes(tmp_path: Path) -> None:
-    result = choose_shaper(["46:0.02±5%"], periods_s=[0.005], families=FEW[1:])
-    for name in ("one.png", "two.png", "one.svg", "two.svg"):
-        canvas.save(result.plots()["shaper-pareto"](), tmp_path / name)
-    for suffix in (".png", ".svg"):
-        assert (tmp_path / f"one{suffix}").read_bytes() == (tmp_path / f"two{suffix}").read_bytes()
-
-
 def test_families_that_were_asked_for_are_drawn_where_there_is_room() -> None:
     names = ["zv", "smooth-zv", "smooth-ei", "mirrored"]
     result = choose_shaper(["30:0.1"], periods_s=[0.001], families=names)

