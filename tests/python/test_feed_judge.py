@@ -122,13 +122,6 @@ QUICK = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("seed", "kind", "machine", "limited", "near", "options"), QUICK)
-def test_schedule_of_a_random_program(
-    seed: int, kind: str, machine: str, limited: str, near: float, options: dict[str, float]
-) -> None:
-    assert_good(judged(seed, kind, machine, limited, **options), near=near)
-
-
 MORE = [
     (28, "outside", "vx500", "all", 0.6, {}),
     (25, "inside", "vx500", "resultant_n", 0.6, {}),
@@ -147,9 +140,11 @@ MORE = [
 ]  # fmt: skip
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("seed", "kind", "machine", "limited", "near", "options"), MORE)
-def test_schedule_of_more_random_programs(
+@pytest.mark.parametrize(
+    ("seed", "kind", "machine", "limited", "near", "options"),
+    [*QUICK, *(pytest.param(*each, marks=pytest.mark.slow) for each in MORE)],
+)
+def test_schedule_of_a_random_program(
     seed: int, kind: str, machine: str, limited: str, near: float, options: dict[str, float]
 ) -> None:
     assert_good(judged(seed, kind, machine, limited, **options), near=near)

@@ -112,18 +112,6 @@ def test_what_is_no_result_is_refused_and_nothing_is_written(tmp_path: Path) -> 
     assert (tmp_path / "part.nc").read_text() == PART
 
 
-@pytest.mark.parametrize("words", ["simulate", "time", "check", "measure --tool-diameter 10mm"])
-def test_every_command_of_a_program_shows_its_motion(words: str, tmp_path: Path) -> None:
-    (tmp_path / "part.nc").write_text(PART)
-    command, *more = words.split()
-    done = run(tmp_path, command, "part.nc", "-m", "vx500", *more, "--json", "r.json", "--html", "p.html")
-    assert done.returncode in (0, 1), done.stderr
-    assert "wrote p.html" in done.stdout
-    found = pieces(tmp_path / "p.html")
-    assert found["result"] == json.loads((tmp_path / "r.json").read_text())
-    assert len(found["scene-head"]["variants"]) == 1
-
-
 def test_programs_of_one_file_have_a_page_each(tmp_path: Path) -> None:
     second = PART.replace(f"O0001 {COMMENT}", "O0002")
     (tmp_path / "part.nc").write_text(PART.removesuffix("%\n") + second.removeprefix("%\n"))

@@ -50,6 +50,12 @@ def point_lines(conversion: sg.Conversion) -> list[str]:
     return [lines[point.line - 1] for point in conversion.restart_points]
 
 
+def begin(moves: list[Move], point: RestartPoint) -> int:
+    """Set-point at which the block of a point begins."""
+    before = moves[: next(k for k, move in enumerate(moves) if move.line == point.line)]
+    return round(float(durations(before).sum()) / 1e-3)
+
+
 @pytest.fixture(scope="module")
 def long_cut() -> sg.Conversion:
     return converted(zigzag(8), restart_interval_s=5.0)
@@ -103,12 +109,9 @@ def test_a_program_that_begins_at_a_point_runs_the_rest_of_the_path(long_cut: sg
 
 def test_the_command_is_nearly_at_rest_where_a_point_stands(long_cut: sg.Conversion) -> None:
     moves = cuts(long_cut.text.decode())
-    points = play(moves)
-    speed = np.linalg.norm(np.diff(points, axis=0), axis=1) / 1e-3
-    begins = np.concatenate([[0.0], np.cumsum(durations(moves))])
+    speed = np.linalg.norm(np.diff(play(moves), axis=0), axis=1) / 1e-3
     for point in long_cut.restart_points:
-        block = next(k for k, move in enumerate(moves) if move.line == point.line)
-        tick = round(float(begins[block]) / 1e-3)
+        tick = begin(moves, point)
         assert speed[max(tick - 2, 0) : tick + 2].max() < 0.25 * 2400.0 / 60.0
         assert point.vibration_um <= 20.0 and point.speed_mm_per_s <= 0.2 * 2400.0 / 60.0
 
@@ -117,10 +120,8 @@ def test_a_start_at_a_point_leaves_what_is_said_of_it(long_cut: sg.Conversion) -
     moves = cuts(long_cut.text.decode())
     modes = [(46.0, 0.02), (131.0, 0.02), None]
     whole = play(moves)
-    begins = np.concatenate([[0.0], np.cumsum(durations(moves))])
     for point in long_cut.restart_points[:3]:
-        block = next(k for k, move in enumerate(moves) if move.line == point.line)
-        tick = round(float(begins[block]) / 1e-3)
+        tick = begin(moves, point)
         span = slice(tick, min(tick + 200, len(whole)))
         _, _, started = response(whole[span], modes, 1e-3)
         _, _, went_on = response(whole[: span.stop], modes, 1e-3)
@@ -193,10 +194,9 @@ def test_without_a_place_of_rest_there_are_points_only_where_stops_are_asked_for
     cost_s = stopped.cutting_time_s.emitted - none.cutting_time_s.emitted
     assert float(told[2]) == pytest.approx(cost_s, abs=0.1) and cost_s > 0.05
     moves = cuts(stopped.text.decode())
-    begins = np.concatenate([[0.0], np.cumsum(durations(moves))])
     speed = np.linalg.norm(np.diff(play(moves), axis=0), axis=1) / 1e-3
     for point in stopped.restart_points:
-        tick = round(float(begins[next(k for k, move in enumerate(moves) if move.line == point.line)]) / 1e-3)
+        tick = begin(moves, point)
         assert speed[tick - 2 : tick + 2].max() < 2.5
 
 

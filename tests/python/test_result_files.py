@@ -124,8 +124,13 @@ def test_a_result_comes_back_from_its_json(shown: Shown) -> None:
     assert result.page(motion=False).verdict == result.answer
 
 
-def test_its_page_holds_its_json(shown: Shown) -> None:
-    assert pieces(shown.page)["result"] == json.loads(shown.json.read_text())
+def test_its_page_holds_its_json_and_the_motion_of_its_programs(shown: Shown) -> None:
+    found = pieces(shown.page)
+    assert found["result"] == json.loads(shown.json.read_text())
+    assert f"wrote {shown.page.name}" in " ".join(shown.out.split())
+    programs = {"Conversion": 2, "Simulation": 1, "CycleTime": 1, "Check": 1, "Measurement": 1}
+    if shown.name in programs:
+        assert len(found["scene-head"]["variants"]) == programs[shown.name]
 
 
 def test_output_fits_80_columns_and_begins_with_the_answer(shown: Shown) -> None:

@@ -5,6 +5,7 @@ import pytest
 from rounding_figures import PATHS, PERIODS_S, UNITS, Outcome, machine, outcomes, path
 
 import shapegcode as sg
+from shapegcode import _core
 from shapegcode.conversion.convert import convert
 
 
@@ -41,29 +42,25 @@ def test_a_third_of_the_residual_is_left_in_every_unit(
     _compare(outcomes(range(PATHS), period_s, inch=inch, increment_mm=increment_mm))
 
 
-def test_start_and_end_are_the_nearest_increments() -> None:
-    texts = {}
+def _emitted(number: int, **values: object) -> list[_core.Path]:
+    """The cut of a path with the nearest ends and with those that vibrate least."""
+    found = []
     for rounding in ("nearest", "vibration"):
-        owner = machine(rounding, 0.005)
-        program = sg.Program.from_text(path(4).encode(), owner, source="path")
-        result = convert(program, owner)
+        owner = machine(rounding, 0.005).with_values(values)
+        result = convert(sg.Program.from_text(path(number).encode(), owner, source="path"), owner)
         (place,) = result.placed
-        texts[rounding] = result.emitted.core.cutting_path(place.first_line, place.last_line)
-    np.testing.assert_array_equal(texts["nearest"].end_mm, texts["vibration"].end_mm)
-    np.testing.assert_array_equal(texts["nearest"].start_mm, texts["vibration"].start_mm)
+        found.append(place.blocks(result.emitted))
+    return found
+
+
+def test_start_and_end_are_the_nearest_increments() -> None:
+    nearest, vibration = _emitted(4)
+    np.testing.assert_array_equal(nearest.end_mm, vibration.end_mm)
+    np.testing.assert_array_equal(nearest.start_mm, vibration.start_mm)
 
 
 def test_without_modes_on_an_axis_its_words_are_the_nearest() -> None:
     # Only X vibrates: Y and Z keep their words, whatever X does.
-    words = {}
-    for rounding in ("nearest", "vibration"):
-        owner = machine(rounding, 0.005)
-        owner = owner.with_values("axes.y.modes", ())
-        program = sg.Program.from_text(path(11).encode(), owner, source="path")
-        result = convert(program, owner)
-        (place,) = result.placed
-        blocks = result.emitted.core.cutting_path(place.first_line, place.last_line)
-        words[rounding] = np.array([blocks[index].end_mm for index in range(len(blocks))])
-    assert len(words["nearest"]) == len(words["vibration"])
-    np.testing.assert_array_equal(words["nearest"][:, 1:], words["vibration"][:, 1:])
-    assert (words["nearest"][:, 0] != words["vibration"][:, 0]).any()
+    nearest, vibration = (np.array([block.end_mm for block in each]) for each in _emitted(11, **{"axes.y.modes": ()}))
+    np.testing.assert_array_equal(nearest[:, 1:], vibration[:, 1:])
+    assert (nearest[:, 0] != vibration[:, 0]).any()

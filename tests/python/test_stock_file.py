@@ -152,25 +152,27 @@ def test_radial_depth_in_the_corner_is_that_of_paper_001() -> None:
     assert int(np.argmax(depths)) == 14
 
 
-def test_wide_corners_keep_their_radius_less_the_allowance() -> None:
-    """A corner of 20 mm in the part is one of 19.2 mm before, if roughing could do 8."""
-    path = _core.Path([line((-30, 0), (0, 0)), arc((0, 0), (16, 16), (0, 16), 90), line((16, 16), (16, 46))])
-    (piece,) = stock_polygons(allowance(), [path], RADIUS)
-    rough = shapely.LinearRing(piece.rings[0])
-    for degrees in np.linspace(270, 360, 19):
-        direction = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
-        assert rough.distance(shapely.Point(np.array([0, 16]) + 19.2 * direction)) < NEAR_MM
+INSIDE = [line((-30, 0), (0, 0)), arc((0, 0), (16, 16), (0, 16), 90), line((16, 16), (16, 46))]
+OUTSIDE = [line((-30, 4), (0, 4)), arc((0, 4), (4, 0), (0, 0), -90), line((4, 0), (4, -30))]
 
 
-def test_outside_corners_get_the_allowance_all_round() -> None:
-    """Round a corner of the part, wall on the right, the layer is 0.8 mm everywhere: an arc of 0.8 about the edge."""
-    edge = np.array([0.0, 0.0])
-    path = _core.Path([line((-30, 4), (0, 4)), arc((0, 4), (4, 0), (0, 0), -90), line((4, 0), (4, -30))])
-    (piece,) = stock_polygons(allowance(), [path], RADIUS)
+@pytest.mark.parametrize(
+    ("cut", "centre", "radius", "degrees"),
+    [
+        # A corner of 20 mm in the part is one of 19.2 mm before, if roughing could do 8.
+        (INSIDE, (0, 16), 19.2, (270, 360, 19)),
+        # Round a corner of the part, wall on the right, the layer is 0.8 mm everywhere: an arc of 0.8 about the edge.
+        (OUTSIDE, (0, 0), 0.8, (0, 90, 10)),
+    ],
+)
+def test_corners_get_the_allowance_all_round(
+    cut: list[_core.Segment], centre: tuple[float, float], radius: float, degrees: tuple[float, float, int]
+) -> None:
+    (piece,) = stock_polygons(allowance(), [_core.Path(cut)], RADIUS)
     rough = shapely.LinearRing(piece.rings[0])
-    for degrees in np.linspace(0, 90, 10):
-        direction = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
-        assert rough.distance(shapely.Point(edge + 0.8 * direction)) < NEAR_MM
+    for angle in np.radians(np.linspace(*degrees)):
+        place = shapely.Point(centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle))
+        assert rough.distance(place) < NEAR_MM
 
 
 def test_a_straight_wall_is_a_plain_layer_that_goes_on_beyond_its_ends() -> None:
