@@ -115,8 +115,7 @@ def test_every_function_that_takes_a_program_takes_its_file() -> None:
 
 
 def test_figures_only_keeps_no_samples() -> None:
-    machine = sg.Machine.load("vx500")
-    simulation = sg.simulate(sg.Program.from_text(GOOD, machine), machine, record_samples=0)
+    simulation = sg.simulate(sg.Program.from_text(GOOD, "vx500"), "vx500", record_samples=0)
     assert len(simulation.regions[0].command_mm) == 0
     assert simulation.residual_vibration_um.x > 1.0
 
@@ -144,11 +143,10 @@ def test_errors_are_one_family_and_carry_their_place() -> None:
 
 
 def test_progress_is_told() -> None:
-    machine = sg.Machine.load("vx500")
     heard: list[tuple[str, float, int]] = []
     sg.convert(
-        sg.Program.read(PROGRAMS / "TEST_G90.NC", machine),
-        machine,
+        sg.Program.read(PROGRAMS / "TEST_G90.NC", "vx500"),
+        "vx500",
         shape_all=True,
         on_progress=lambda *step: heard.append(step),
     )

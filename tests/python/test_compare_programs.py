@@ -376,8 +376,7 @@ def stops(text: str) -> list[tuple[float, ...]]:
 
 @pytest.mark.parametrize("body", EXACT_STOPS)
 def test_exact_stop_mode_survives_shaping(body: str) -> None:
-    program = sg.Program.from_text(HEAD + body + TAIL, MACHINE)
-    conversion = sg.convert(program, MACHINE, shape_all=True)
+    conversion = sg.convert(HEAD + body + TAIL, MACHINE, shape_all=True)
     assert not conversion.proof.refused
     assert stops(conversion.text.decode()) == stops(HEAD + body + TAIL) != []
 

@@ -28,11 +28,10 @@ resultant_n = 200.0
 
 def scheduled(body: str, *, head: str = HEAD, flutes: float = 20.0, overhang: float = 32.0, number: int | None = None,
               feed: str = "") -> sg.FeedSchedule:  # fmt: skip
-    machine = sg.Machine.load("vx500")
     line = "" if number is None else f"number = {number}"
     tool = sg.Tool.from_toml(TOOL.format(number=line, flutes=flutes, overhang=overhang, feed=feed))
-    program = sg.Program.from_text(head + body + TAIL, machine, source="part.nc")
-    return sg.schedule_feed(program, machine, tool, sg.Stock.from_toml(BOX))
+    program = sg.Program.from_text(head + body + TAIL, "vx500", source="part.nc")
+    return sg.schedule_feed(program, "vx500", tool, sg.Stock.from_toml(BOX))
 
 
 def said(result: sg.FeedSchedule, words: str) -> bool:
@@ -138,9 +137,8 @@ def test_a_schedule_of_its_own_output_changes_little() -> None:
 
 
 def test_a_shaped_program_gets_no_other_feeds() -> None:
-    machine = sg.Machine.load("vx500")
     original = HEAD + "G01 X50. F5000.\nY20.\nX0.\n" + TAIL
-    shaped = sg.convert(original, machine, shape_all=True).text.decode()
+    shaped = sg.convert(original, "vx500", shape_all=True).text.decode()
     tool = sg.Tool.from_toml(TOOL.format(number="", flutes=20.0, overhang=32.0, feed=""))
     with pytest.raises(sg.ProgramError, match="1:1: already shaped by shapegcode"):
-        sg.schedule_feed(shaped, machine, tool, sg.Stock.from_toml(BOX))
+        sg.schedule_feed(shaped, "vx500", tool, sg.Stock.from_toml(BOX))

@@ -181,8 +181,7 @@ def test_a_conversion_is_judged_by_the_planner(kind: str) -> None:
         "klipper": {"emission.dialect": "klipper"}, "grbl": {"controller.grbl": {"look_ahead_blocks": 100}},
     }  # fmt: skip
     machine = machine_of(kind, 10_000.0).with_values(own[kind])
-    program = sg.Program.from_text(PAPER, machine)
-    conversion = sg.convert(program, machine, shape_all=True)
+    conversion = sg.convert(PAPER, machine, shape_all=True)
     cases = conversion.cases
     names = [case.name for case in cases]
     assert names[0] == f"nominal, planner of {PLANNER_NAMES[kind]}" and cases[0].counts

@@ -187,9 +187,8 @@ def test_a_long_region_shows_its_worst_place_and_its_stop(tmp_path: Path, monkey
 
 
 def test_polyline_is_close_to_large_arcs() -> None:
-    machine = Machine.load("vx500")
     text = "%\nO1\nG21G90G94G17\nG00X0Y0Z0\nG02X300.Y-300.I0.J-300.F3000\nM30\n%\n"
-    points = polyline_of(Program.from_text(text.encode(), machine, source="arc").regions[0].path)
+    points = polyline_of(Program.from_text(text.encode(), "vx500", source="arc").regions[0].path)
     middles = (points[1:] + points[:-1]) / 2
     assert np.abs(np.linalg.norm(middles - [0, -300, 0], axis=1) - 300).max() < 1.01e-5
 

@@ -135,9 +135,8 @@ def test_the_report_from_python(tmp_path: Path) -> None:
 def test_the_page_of_feeds_has_the_cutting_force(tmp_path: Path) -> None:
     """Along the path stands the force that the schedule knows: its largest is the peak of the JSON."""
     golden = Path(__file__).parents[1] / "golden" / "feed"
-    machine = sg.Machine.load("vx500")
     tool, stock = sg.Tool.load(golden / "pocket_tool.toml"), sg.Stock.load(golden / "pocket_stock.toml")
-    schedule = sg.schedule_feed(sg.Program.read(golden / "POCKET.NC", machine), machine, tool, stock)
+    schedule = sg.schedule_feed(sg.Program.read(golden / "POCKET.NC", "vx500"), "vx500", tool, stock)
     scene = schedule.page().scene
     for variant, peak in zip(scene.variants, ("original", "emitted"), strict=True):
         expected = getattr(schedule.resultant_force_n, peak).max

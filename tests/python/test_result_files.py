@@ -207,8 +207,7 @@ def test_a_file_that_was_cut_off_says_where(tmp_path: Path) -> None:
 
 def test_results_for_notebooks_and_tables(tmp_path: Path) -> None:
     (tmp_path / "a<b>.nc").write_text(PART)
-    machine = sg.Machine.load("vx500")
-    time = sg.cycle_time(tmp_path / "a<b>.nc", machine)
+    time = sg.cycle_time(tmp_path / "a<b>.nc", "vx500")
     html = time._repr_html_()
     assert "a&lt;b&gt;.nc" in html and "<b>.nc" not in html
     regions = time.to_pandas("regions")
@@ -218,8 +217,8 @@ def test_results_for_notebooks_and_tables(tmp_path: Path) -> None:
         time.to_pandas("regons")
     with pytest.raises(sg.ArgumentError, match="it has no arrays"):
         time.to_xarray()
-    motion = sg.simulate_motion(tmp_path / "a<b>.nc", machine)
-    simulation = sg.simulate(tmp_path / "a<b>.nc", machine)
+    motion = sg.simulate_motion(tmp_path / "a<b>.nc", "vx500")
+    simulation = sg.simulate(tmp_path / "a<b>.nc", "vx500")
     assert simulation.plot("path").get_xlabel()
     with pytest.raises(sg.ArgumentError, match="plot nothing: one of"):
         simulation.plot("nothing")

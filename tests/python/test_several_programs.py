@@ -119,10 +119,9 @@ def test_convert_writes_one_file_with_every_program_in_its_place(end: str, tmp_p
     assert SUB.replace("\n", end).encode() in emitted
     assert emitted.startswith(b"(LEADER)" + end.encode() + b"%" + end.encode() + b"&F=/ONE/")
     assert emitted.endswith(b"M30" + end.encode() + b"%" + end.encode())
-    machine = sg.Machine.load("vx500")
     for address in DONE:
-        was = sg.Program.from_text(original, machine, program_number=address)
-        now = sg.Program.from_text(emitted, machine, program_number=address)
+        was = sg.Program.from_text(original, "vx500", program_number=address)
+        now = sg.Program.from_text(emitted, "vx500", program_number=address)
         ends = [sum((region.path.end_mm - region.path.start_mm) for region in each.regions) for each in (was, now)]
         assert ends[1] == pytest.approx(ends[0], abs=1e-6)
         assert sum(region.blocks for region in now.regions) > sum(region.blocks for region in was.regions)

@@ -111,14 +111,13 @@ def test_motion_takes_the_cycle_time(motion: str) -> None:
 @pytest.mark.parametrize("name", ["CONTOUR_R.NC", "G17_18_19.NC", "TEST_G90.NC"])
 def test_motion_of_a_real_program_takes_its_cycle_time(name: str) -> None:
     """In the last one the position of X is not known for a while: the command jumps then, the plant does not."""
-    machine = sg.Machine.load("vx500")
-    program = sg.Program.read(PROGRAMS / name, machine)
+    program = sg.Program.read(PROGRAMS / name, "vx500")
     samples, fastest, largest = 0, 0.0, 0.0
-    for chunk in sg.stream(program, machine):
+    for chunk in sg.stream(program, "vx500"):
         samples += len(chunk)
         fastest = max(fastest, float(np.abs(chunk.velocity_mm_per_s).max()))
         largest = max(largest, float(np.abs(chunk.error_mm).max()))
-    expected = sg.cycle_time(program, machine).full_interpolation_s
+    expected = sg.cycle_time(program, "vx500").full_interpolation_s
     assert (samples - 1) * TICK_S == pytest.approx(expected + REST_S, abs=TICK_S)
     assert fastest <= 400.0 * (1 + 1e-9)
     assert 0.01 < largest < 0.2
@@ -214,9 +213,8 @@ def test_csv_on_standard_output(folder: Path, capfdbinary: pytest.CaptureFixture
 
 def test_pieces_of_any_size_are_the_same_motion() -> None:
     machine = sg.Machine.load("vx500")
-    program = sg.Program.from_text(WHOLE, machine)
     whole = streamed(WHOLE, machine)
-    pieces = list(sg.stream(program, machine, chunk_samples=777))
+    pieces = list(sg.stream(WHOLE, machine, chunk_samples=777))
     assert max(map(len, pieces)) == 777
     for name in ("time_s", "line", "kind", "command_mm", "response_mm"):
         np.testing.assert_array_equal(np.concatenate([getattr(each, name) for each in pieces]), getattr(whole, name))
@@ -328,8 +326,7 @@ def test_lag_along_the_path_is_no_contour_error() -> None:
 
 def test_contour_error_of_a_drive_is_that_of_its_track() -> None:
     machine = machine_with(DRIVE)
-    program = sg.Program.from_text(CORNER, machine)
-    contour = sg.simulate(program, machine, plant="feed-drive").contour_error_um.response
+    contour = sg.simulate(CORNER, machine, plant="feed-drive").contour_error_um.response
     x, y = streamed(CORNER, machine, plant="feed-drive").response_mm[:, :2].T
     # Brute force: distance of every sample from the two legs, and of the corner from the track.
     from_legs = np.minimum(np.hypot(np.maximum(x - 30.0, 0.0), y), np.hypot(x - 30.0, np.maximum(-y, 0.0)))
@@ -437,11 +434,9 @@ def test_memory_does_not_grow_with_the_length(folder: Path) -> None:
 
 
 def test_api_refuses_before_anything_is_played() -> None:
-    machine = sg.Machine.load("vx500")
-    program = sg.Program.from_text(WHOLE, machine)
     for options in ({"plant": "other"}, {"lines": (5, 4)}, {"lines": (1, 99)}, {"chunk_samples": 0}):
         with pytest.raises(sg.ArgumentError):
-            sg.stream(program, machine, **options)
+            sg.stream(WHOLE, "vx500", **options)
 
 
 POCKET = (

@@ -107,10 +107,9 @@ def test_a_raised_limit_lets_the_program_through() -> None:
 
 def test_least_time_is_never_above_the_clock() -> None:
     # The clock counts acceleration on top: what is refused for its time would have taken at least that.
-    machine = sg.Machine.load("vx500")
     text = f"{HEAD}G01 X80. F3000\nG02 X120. I20.\nG00 X0 Y300.\nG04 X1.5\nG81 X10. Z-5. R2. F200\nX20.\nG80\n{END}"
-    program = sg.Program.from_text(text, machine)
-    total_s = sg.cycle_time(program, machine).cycle_time_s
+    program = sg.Program.from_text(text, "vx500")
+    total_s = sg.cycle_time(program, "vx500").cycle_time_s
     assert 0.8 * total_s < program.core.least_time_s <= total_s
     # By hand: 80 mm and half a turn of 20 mm at 50 mm/s, the dwell, two holes of 7 mm at 200 mm/min; rapids on top.
     by_hand_s = (80.0 + 20.0 * math.pi) / 50.0 + 1.5 + 2 * 7.0 / (200.0 / 60.0)
@@ -191,9 +190,8 @@ def test_a_region_too_long_for_one_piece_keeps_its_text_and_is_named(monkeypatch
     from shapegcode.conversion import whole_text
 
     monkeypatch.setattr(whole_text, "_MAX_PERIODS", 1000)
-    machine = sg.Machine.load("vx500")
     text = f"{HEAD}G01 X200. F2000\nY100.\nX0\nG00 Z50.\nX0 Y0\nG01 X10. F2000\nY20.\n{END}"
-    converted = sg.convert(sg.Program.from_text(text, machine), machine, shape_all=True)
+    converted = sg.convert(sg.Program.from_text(text, "vx500"), "vx500", shape_all=True)
     assert b"\nG01 X200. F2000\nY100.\nX0\n" in converted.text
     assert any("exceed what can be shaped at a time" in warning for warning in converted.warnings)
     assert len(converted.placed) == 1
@@ -218,13 +216,12 @@ def test_of_very_many_sections_short_runs_are_measured_together_and_it_is_said(m
     from shapegcode.metrology import measure
 
     zigzag = "".join(f"X{k % 2}.Y{k}.\n" for k in range(1, 61))
-    machine = sg.Machine.load("vx500")
-    program = sg.Program.from_text(f"{HEAD}G01 F2000\n{zigzag}{END}", machine)
-    each = sg.measure(program, machine, 6.0)
+    program = sg.Program.from_text(f"{HEAD}G01 F2000\n{zigzag}{END}", "vx500")
+    each = sg.measure(program, "vx500", 6.0)
     assert len(each.programs[0].regions[0].sections) == 60
     assert not any("measured together" in warning for warning in each.warnings)
     monkeypatch.setattr(measure, "_MAX_SECTIONS", 20)
-    joined = sg.measure(program, machine, 6.0)
+    joined = sg.measure(program, "vx500", 6.0)
     assert len(joined.programs[0].regions[0].sections) <= 20
     assert any("measured together as curves" in warning for warning in joined.warnings)
     # Nothing is lost: the worst place is found in both.
