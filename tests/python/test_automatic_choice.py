@@ -40,14 +40,14 @@ SLOW_VARIANTS = ("2 ms blocks, both within 10 %", "one of two is uncertain")
 
 
 def machine_of(x: Axis, y: Axis, keys: dict[str, float]) -> sg.Machine:
-    data = machine_with(keys).model_dump(exclude_none=True)
-    for axis, modes in (("x", x), ("y", y)):
-        data["axes"][axis]["modes"] = [
-            {"frequency_hz": hz, "damping_ratio": zeta}
-            | ({} if percent is None else {"frequency_uncertainty_percent": percent})
-            for hz, zeta, percent in modes
+    names = ("frequency_hz", "damping_ratio", "frequency_uncertainty_percent")
+    modes = {
+        f"axes.{axis}.modes": [
+            {name: v for name, v in zip(names, mode, strict=True) if v is not None} for mode in given
         ]
-    return sg.Machine.from_data(data, "machine of a test")
+        for axis, given in (("x", x), ("y", y))
+    }
+    return machine_with({**keys, **modes})
 
 
 def worst_left(machine: sg.Machine, shaper: sg.Shaper) -> float:

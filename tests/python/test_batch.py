@@ -38,7 +38,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     for name, text in {
         "parts/a.nc": part(30), "parts/deep/a.nc": part(20), "parts/bad.nc": BAD, "parts/caller.nc": CALLER,
-        "parts/notes.md": "no program",
+        "parts/notes.md": "no program", "mine.toml": sg.Machine.builtin_text("vx500"),
     }.items():  # fmt: skip
         file = tmp_path / name
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -94,7 +94,6 @@ def test_the_bytes_are_those_of_the_single_command(folder: Path) -> None:
 
 
 def test_the_summary_has_the_figures_of_the_reports(folder: Path) -> None:
-    (folder / "mine.toml").write_bytes(sg.Machine.builtin_text("vx500").encode())
     told(folder, "parts/a.nc", "-m", "vx500", "-m", "mine.toml", "-o", "out", code=0)
     rows = list(csv.DictReader((folder / "out" / "summary.csv").read_text().splitlines()))
     assert [row["machine"] for row in rows] == ["vx500", "mine.toml"]
@@ -108,7 +107,6 @@ def test_the_summary_has_the_figures_of_the_reports(folder: Path) -> None:
 
 def test_resume_does_what_is_missing_or_changed_and_nothing_else(folder: Path) -> None:
     """A changed program, a changed subprogram, a lost or touched result, another option, another machine file."""
-    (folder / "mine.toml").write_bytes(sg.Machine.builtin_text("vx500").encode())
     words = ["parts", "-m", "mine.toml", "-o", "out", "--jobs", "1", "--resume", "--command", "time"]
     assert len(fresh(told(folder, *words))) == 4
     assert fresh(told(folder, *words)) == []
@@ -146,7 +144,6 @@ def test_an_older_result_of_another_name_goes(folder: Path) -> None:
 
 def test_resume_from_another_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is done stays done, what is missing gets the bytes of the first folder, and rows are named from here."""
-    (folder / "mine.toml").write_bytes(sg.Machine.builtin_text("vx500").encode())
     told(folder, "parts", "-m", "mine.toml", "-o", "out", "--html", "pages", "--command", "time")
     whole = contents(folder / "out", folder / "pages")
     (folder / "out/a.nc.json").unlink()
@@ -315,7 +312,7 @@ def test_one_batch_at_a_time(folder: Path) -> None:
         (("@bytes.txt", *ONE), "bytes.txt: not a list of programs: it is not text"),
         (("parts/d*", *ONE), "parts/d*: no such file, folder or match"),
         (("only", *ONE), "only/O5: a subprogram (M99)"),
-        (("parts", "-m", "mine.toml", "-o", "out"), "mine.toml: no such file"),
+        (("parts", "-m", "none.toml", "-o", "out"), "none.toml: no such file"),
         (("parts", "-m", "vx500", "-m", "vx500", "-o", "out"), "two machines would be written to out/vx500"),
         (("parts", *ONE, "--", "--shaper", "none"), "--shaper"),
         (("parts", *ONE, "--", "--json", "x.json"), "--json after --: is a file of one run"),

@@ -12,6 +12,7 @@ from shapegcode.identification.known_command import KnownCommand, known_command
 from shapegcode.identification.sweep import is_capture
 from shapegcode.identification.sweep_program import write_sweep
 from shapegcode.io.units import FloatArray
+from test_known_command import check_modes
 
 MODES = [(60.0, 23.0, 0.02), (40.0, 46.0, 0.03)]
 
@@ -35,11 +36,7 @@ def write(path: Path, command_m: FloatArray, actual_m: FloatArray, *, step_m: fl
 
 
 def check(found: sg.Identification, *, within: float = 0.005) -> None:
-    assert len(found.modes) == len(MODES), found
-    for mode, (_, hertz, zeta) in zip(found.modes, MODES, strict=True):
-        assert mode.frequency_hz.value == pytest.approx(hertz, rel=within)
-        assert mode.damping_ratio.value == pytest.approx(zeta, rel=0.1)
-        assert mode.mass_kg is None
+    check_modes(found, [(hertz, zeta) for _, hertz, zeta in MODES], within)
 
 
 @pytest.mark.parametrize("step_um", [0.1, 1.0])

@@ -37,15 +37,9 @@ class Judged:
 
 
 def machine_and_control(name: str, time_constant_s: float | None, max_change: float | None) -> tuple[Machine, Control]:
-    machine = Machine.load(name)
-    text = machine.to_toml()
+    machine = Machine.load(name).with_values("feed_control.max_change_mm_per_min", max_change)
     if time_constant_s is not None:
-        old = f"\ntime_constant_s = {machine.controller.time_constant_s}"
-        assert old in text
-        text = text.replace(old, f"\ntime_constant_s = {time_constant_s}")
-    if max_change is not None:
-        text = text.replace("\ninterval_mm = 0.6", f"\ninterval_mm = 0.6\nmax_change_mm_per_min = {max_change}")
-    machine = Machine.from_toml(text)
+        machine = machine.with_values("controller.time_constant_s", time_constant_s)
     controller = machine.controller
     after = controller.motion == "after_interpolation"
     return machine, Control(

@@ -18,6 +18,7 @@ from shapegcode.io.record import FrequencyResponse, Quantity, ReadOptions, ratio
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from tap_truth import TrueMode, random_modes
+from test_tap_files import dataset
 
 ComplexArray = npt.NDArray[np.complex128]
 MODES = (TrueMode(46.0, 0.03, 120.0), TrueMode(121.0, 0.02, 60.0), TrueMode(263.0, 0.025, 30.0))
@@ -54,13 +55,10 @@ def check(found: Identification, axis: str | None = None, share: float = 3e-3) -
 
 def write_uff(path: Path, **how: Any) -> Path:
     header = {
-        "binary": 0, "func_type": 4, "rsp_node": 1, "rsp_dir": 1, "ref_node": 1, "ref_dir": 1, "data": noisy(HZ),
-        "x": HZ, "id1": "tap", "rsp_ent_name": "a", "ref_ent_name": "a", "abscissa_spacing": 1,
-        "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13,
-        "ordinate_axis_units_lab": "m/s^2",
-        "orddenom_axis_units_lab": "N", "abscissa_axis_units_lab": "Hz",
+        "func_type": 4, "data": noisy(HZ), "x": HZ, "abscissa_spec_data_type": 18, "orddenom_spec_data_type": 13,
+        "ordinate_axis_units_lab": "m/s^2", "orddenom_axis_units_lab": "N", "abscissa_axis_units_lab": "Hz",
     }  # fmt: skip
-    pyuff.UFF(str(path))._write_set(pyuff.prepare_58(**(header | how)), "add")
+    pyuff.UFF(str(path)).write_sets([dataset(HZ, 12, **(header | how))], mode="add")
     return path
 
 

@@ -89,14 +89,11 @@ def _uff(folder: Path, binary: int) -> bytes:
     import numpy as np
     import pyuff
 
+    from test_tap_files import dataset
+
     path = folder / "seed.uff"
     path.unlink(missing_ok=True)
-    time = np.arange(64) / 1000.0
-    data = {
-        "type": 58, "binary": binary, "func_type": 1, "rsp_node": 1, "rsp_dir": 1, "ref_node": 1, "ref_dir": 1,
-        "id1": "NONE", "x": time, "data": np.sin(time * 99.0), "abscissa_spacing": 1, "abscissa_spec_data_type": 17,
-        "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 0,
-    }  # fmt: skip
+    data = dataset(np.sin(np.arange(64) * 0.099), 12, binary=binary)
     pyuff.UFF(str(path)).write_sets([data], mode="add")
     return path.read_bytes()
 

@@ -24,16 +24,8 @@ def zig_zag(strokes: int, depth_mm: float, head: str = "G00 X0 Y0 Z0") -> bytes:
 
 def fine_machine(contour: str = "off") -> sg.Machine:
     """The machine with words so fine that their rounding leaves nothing, and no forced stops."""
-    text = machine_with(OVER_Z).to_toml()
-    for old, new in (
-        ("least_increment_mm = 0.001", "least_increment_mm = 0.00001"),
-        ("feed_decimals_mm = 1", "feed_decimals_mm = 4"),
-        ('contour = "response"', f'contour = "{contour}"'),
-        ("plunge_angle_deg = 15.0", "plunge_angle_deg = 0.0"),
-    ):
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    return sg.Machine.from_toml(text)
+    fine = {"controller.least_increment_mm": 0.00001, "controller.feed_decimals_mm": 4, "shaping.plunge_angle_deg": 0.0}
+    return machine_with(OVER_Z).with_values({**fine, "shaping.contour": contour})
 
 
 def command(path: _core.Path, grid: Grid, machine: sg.Machine, offset: Offset) -> np.ndarray:
@@ -77,7 +69,7 @@ def test_following_leaves_a_fraction_of_what_one_shaper_leaves(contour: str) -> 
     was = followed.to_dict()["residual_vibration_um"]["original"]["x"]
     left = followed.to_dict()["residual_vibration_um"]["emitted"]["x"]
     # The same program with one shaper for the nominal frequency, simulated by the same plant.
-    fixed_machine = sg.Machine.from_toml(machine.to_toml().replace("frequency_over = ", "# frequency_over = ", 1))
+    fixed_machine = machine.with_values("axes.x.modes.1.frequency_over", None)
     fixed = sg.convert(Program.from_text(zig_zag(21, 40.0), fixed_machine), fixed_machine)
     blocks = fixed.emitted.core.cutting_path(fixed.placed[0].first_line, fixed.placed[0].last_line)
     one_left = MachineModel(machine).simulate_emitted(blocks, program.regions[0].path).residual_mm[0] * 1e3
@@ -111,11 +103,8 @@ def test_a_rapid_vibrates_with_the_modes_at_its_position(system: str) -> None:
         program = Program.from_text((head + "\n".join([*lines, "M30", "%", ""])).encode(), machine)
         return rapid_vibration_um(program, MachineModel(machine)).x
 
-    def fixed(frequency_hz: int) -> sg.Machine:
-        text = sg.Machine.builtin_text("vx500").replace("frequency_hz = 46.0", f"frequency_hz = {frequency_hz}.0", 1)
-        return sg.Machine.from_toml(text)
-
-    low, high = rapids(0.0, machine=fixed(52)), rapids(400.0, machine=fixed(41))
+    at_0, at_400 = (sg.Machine.load("vx500").with_values("axes.x.modes.1.frequency_hz", hz) for hz in (52.0, 41.0))
+    low, high = rapids(0.0, machine=at_0), rapids(400.0, machine=at_400)
     assert abs(low - high) > 0.1 * high
     assert rapids(0.0) == pytest.approx(low, rel=1e-9)
     assert rapids(400.0) == pytest.approx(high, rel=1e-9)

@@ -95,12 +95,7 @@ def test_a_mass_fixes_the_mode_for_the_whole_program() -> None:
 
 
 def test_position_tables_go_to_the_plant_shifted_and_in_program_coordinates() -> None:
-    text = (
-        machine_with(OVER_Z)
-        .to_toml()
-        .replace("# frequency_uncertainty_percent = ...", "frequency_uncertainty_percent = 10", 1)
-    )
-    machine = Machine.from_toml(text)
+    machine = machine_with(OVER_Z).with_values("axes.x.modes.1.frequency_uncertainty_percent", 10)
     assert moving_axis(machine) == 2
     table = MachineModel(machine).options(shift=-1.0, offset=(0.0, 0.0, 150.0)).mode_tables[0][0]
     assert table.axis == 2
@@ -123,10 +118,8 @@ def test_what_the_user_is_told() -> None:
 
 
 def test_positions_of_a_program_are_those_of_the_machine() -> None:
-    text = machine_with(OVER_Z).to_toml()
-    text = text.replace("work_offsets = {}", "work_offsets = { G55 = [1, 2, 300] }")
-    text = text.replace("tool_length_mm = {}", 'tool_length_mm = { "3" = 70 }')
-    machine = Machine.from_toml(text)
+    offsets = {"input.work_offsets": {"G55": [1, 2, 300]}, "input.tool_length_mm": {"3": 70}}
+    machine = machine_with(OVER_Z).with_values(offsets)
     body = b"G21 G90 G55 G00 X0 Y0 Z50.\nG43 H3 Z40.\nG01 X10. F1000\nX0 Z-20.\nG49\nM30\n"
     program = Program.from_text(b"%\nO0001\n" + body + b"%\n", machine)
     (region,) = program.regions
@@ -141,9 +134,8 @@ def test_positions_of_a_program_are_those_of_the_machine() -> None:
 
 
 def test_modes_over_two_axes_are_refused() -> None:
-    text = machine_with(OVER_Z).to_toml()
-    over_x = 'frequency_over = { axis = "x", position_mm = [0, 400], frequency_hz = [140, 120] }'
-    machine = Machine.from_toml(text.replace("# frequency_over = ...", over_x, 1))
+    over_x = {"axis": "x", "position_mm": [0, 400], "frequency_hz": [140, 120]}
+    machine = machine_with(OVER_Z).with_values("axes.y.modes.1.frequency_over", over_x)
     with pytest.raises(ArgumentError, match="positions of X and Z"):
         moving_axis(machine)
     with pytest.raises(ArgumentError, match="no mode of the machine file varies"):
@@ -328,7 +320,7 @@ def test_a_zig_zag_along_z_leaves_next_to_nothing_at_its_stops() -> None:
 def test_the_verdict_sees_the_mode_that_moves() -> None:
     """A stop at Z 400 oscillates at 41 Hz: the simulation of a machine with a table says what one with 41 Hz says."""
     machine, slow = machine_with(OVER_Z), machine_with(OVER_Z, nominal=41.0)
-    plain = Machine.from_toml(slow.to_toml().replace("frequency_over =", "# frequency_over =", 1))
+    plain = slow.with_values("axes.x.modes.1.frequency_over", None)
     path = _core.Path([_core.Segment.line([0.0, 0.0, 100.0], [30.0, 0.0, 100.0], 100.0)])
     deep = MachineModel(machine).simulate_original(path, offset=(0.0, 0.0, 300.0)).residual_mm[0]
     assert deep == pytest.approx(MachineModel(plain).simulate_original(path).residual_mm[0], rel=1e-4)

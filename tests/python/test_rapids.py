@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 from pathlib import Path
 from typing import Any
 
@@ -56,14 +55,12 @@ CUT_BETWEEN = (
 )
 
 
-def with_tables(machine: Machine, **tables: dict[str, Any]) -> Machine:
-    return machine.with_values(
-        {f"{table}.{key}": value for table, keys in tables.items() for key, value in keys.items()}
-    )
+VX500 = Machine.load("vx500")
+PLAIN = VX500.with_values("emission.header", False)
 
 
-def converted(text: str, machine: Machine | None = None, **options: Any) -> Conversion:
-    machine = with_tables(machine or Machine.load("vx500"), shaping={"rapids": True}, emission={"header": False})
+def converted(text: str, machine: Machine = VX500, **options: Any) -> Conversion:
+    machine = machine.with_values({"shaping.rapids": True, "emission.header": False})
     return convert(Program.from_text(text, machine), machine, **({"shape_all": True} | options))
 
 
@@ -205,8 +202,7 @@ def test_the_table_is_settled_sooner_and_rings_less_at_the_next_cut() -> None:
 
 
 def test_it_is_off_by_default_and_changes_nothing_else() -> None:
-    machine = with_tables(Machine.load("vx500"), emission={"header": False})
-    plain = convert(Program.from_text(PROGRAM, machine), machine, shape_all=True)
+    plain = convert(PROGRAM, PLAIN, shape_all=True)
     assert "rapids" not in plain.to_dict()
     shaped = converted(PROGRAM)
     assert plain.to_dict()["regions"] != [] and len(plain.to_dict()["regions"]) == len(shaped.to_dict()["regions"])
@@ -237,11 +233,10 @@ def test_every_rapid_is_accounted_for() -> None:
 
 @pytest.mark.parametrize("damping_ratio", [0.02, 0.5])
 def test_where_nothing_is_gained_the_text_stays(damping_ratio: float) -> None:
-    toml = re.sub(r"(?m)^damping_ratio = [0-9.]+", f"damping_ratio = {damping_ratio}", Machine.load("vx500").to_toml())
     # A Z move on a machine without a mode in Z, and a short move of well damped modes.
     moves = {0.02: "Z20.\nZ2.\n", 0.5: "X21.\n"}[damping_ratio]
     text = f"G90 G21 G17 G40\nG00 X0. Y0. Z2.\nG01 Z1. F500\nX20.\nG00 Z2.\n{moves}G01 Z1. F500\nX40.\nM30\n"
-    machine = with_tables(Machine.from_toml(toml), emission={"header": False})
+    machine = PLAIN.with_values({f"axes.{axis}.modes.1.damping_ratio": damping_ratio for axis in "xy"})
     conversion = converted(text, machine)
     plain = convert(Program.from_text(text, machine), machine, shape_all=True)
     assert conversion.to_dict()["rapids"]["shaped"] == 0
@@ -333,14 +328,12 @@ def test_a_rapid_that_is_no_plain_one_stays(text: str, reason: str) -> None:
     assert rapids["left_unchanged"].get(reason, 0) >= 1, rapids
     assert rapids["found"] == rapids["shaped"] + sum(rapids["left_unchanged"].values())
     assert rapids["shaped"] == 0
-    off = with_tables(Machine.load("vx500"), emission={"header": False})
-    assert conversion.text == convert(Program.from_text(text, off), off, shape_all=True).text
+    assert conversion.text == convert(text, PLAIN, shape_all=True).text
 
 
 def test_compensated_rapids_stay() -> None:
     text = one_rapid("G00 X80.", before="G41 D1\n", after="G40\n")
-    machine = with_tables(Machine.load("vx500"), input={"compensation": "keep"}, emission={"header": False},
-                          shaping={"rapids": True})  # fmt: skip
+    machine = PLAIN.with_values({"input.compensation": "keep", "shaping.rapids": True})
     rapids = convert(Program.from_text(text, machine, expand_compensation=False), machine, shape_all=True).to_dict()[
         "rapids"
     ]
@@ -391,12 +384,12 @@ def test_the_warnings_say_what_is_different() -> None:
     assert "parameters 1422, 1430" in warnings
     assert "15000" in warnings
     assert "straight" not in warnings
-    dogleg = with_tables(Machine.load("vx500"), controller={"rapid_path": "non_linear"})
+    dogleg = VX500.with_values("controller.rapid_path", "non_linear")
     conversion = converted(text, dogleg)
     assert conversion.to_dict()["rapids"]["shaped"] == 1
     assert "check that the straight path is free" in " ".join(conversion.to_dict()["warnings"])
     check_straight(conversion)
-    per_axis = converted(text, with_tables(Machine.load("vx500"), shaping={"per_axis": True}))
+    per_axis = converted(text, VX500.with_values("shaping.per_axis", True))
     assert per_axis.to_dict()["rapids"]["shaped"] == 1
     check_straight(per_axis)
 
@@ -412,7 +405,7 @@ def check_straight(conversion: Conversion) -> None:
 
 
 def test_the_wait_behind_a_command_is_the_one_of_the_servo_lag() -> None:
-    model = fanuc_model(Machine.load("vx500"))
+    model = fanuc_model(VX500)
     model.in_position = InPosition.servo_lag
     # e exp(-K t) = w: K = 30 1/s, w = 20 um of vx500.
     wait_s = in_position_wait_behind_s([0.4, 5.0, 0.0], [True, False, True], model)
@@ -430,7 +423,7 @@ def test_the_wait_behind_a_command_is_the_one_of_the_servo_lag() -> None:
 )
 def test_other_controllers(controller: dict[str, Any]) -> None:
     text = one_rapid("G00 X80.")
-    conversion = converted(text, with_tables(Machine.load("vx500"), controller=controller))
+    conversion = converted(text, VX500.with_values({f"controller.{key}": value for key, value in controller.items()}))
     rapids = conversion.to_dict()["rapids"]
     check_text(conversion, text)
     assert rapids["found"] == rapids["shaped"] + sum(rapids["left_unchanged"].values())
@@ -441,12 +434,11 @@ def test_other_controllers(controller: dict[str, Any]) -> None:
 
 def test_modes_that_vary_with_position_are_looked_up_where_the_rapid_is() -> None:
     # 46 Hz in the middle of the table, but 10 Hz lower where this program works.
-    table = 'frequency_over = { axis = "x", position_mm = [0, 150, 500, 900], frequency_hz = [36, 36, 46, 46] }'
-    toml = re.sub(r"(?m)^# frequency_over = .*$", table, Machine.load("vx500").to_toml(), count=1)
-    machine = Machine.from_toml(toml)
+    table = {"axis": "x", "position_mm": [0, 150, 500, 900], "frequency_hz": [36, 36, 46, 46]}
+    machine = VX500.with_values("axes.x.modes.1.frequency_over", table)
     (here,) = converted(one_rapid("G00 X80."), machine).to_dict()["rapids"]["moves"]
-    plain = re.sub(r"(?m)^frequency_hz = 46.0", "frequency_hz = 36.0", Machine.load("vx500").to_toml())
-    (same,) = converted(one_rapid("G00 X80."), Machine.from_toml(plain)).to_dict()["rapids"]["moves"]
+    plain = VX500.with_values("axes.x.modes.1.frequency_hz", 36.0)
+    (same,) = converted(one_rapid("G00 X80."), plain).to_dict()["rapids"]["moves"]
     assert here["settling_s"]["original"] == pytest.approx(same["settling_s"]["original"], abs=0.002)
     assert here["residual_vibration_um"]["original"]["x"] == pytest.approx(
         same["residual_vibration_um"]["original"]["x"], rel=0.01
@@ -457,8 +449,7 @@ def test_a_budget_comes_first() -> None:
     text = one_rapid("G00 X80.")
     full = converted(text)
     assert full.to_dict()["rapids"]["shaped"] == 1
-    off = with_tables(Machine.load("vx500"), emission={"header": False})
-    plain = convert(Program.from_text(text, off), off, shape_all=True)
+    plain = convert(text, PLAIN, shape_all=True)
     tight = converted(text, budget=Budget(max_bytes=len(full.text) - 1))
     assert tight.text == plain.text
     assert tight.to_dict()["rapids"]["left_unchanged"]["budget"] == 1
@@ -469,7 +460,7 @@ def test_a_budget_comes_first() -> None:
 
 
 def test_a_band_of_zero_is_refused() -> None:
-    machine = with_tables(Machine.load("vx500"), tolerance={"residual_floor_um": 0.0})
+    machine = VX500.with_values("tolerance.residual_floor_um", 0.0)
     with pytest.raises(ArgumentError, match="residual_floor_um is 0"):
         converted(one_rapid("G00 X80."), machine)
 

@@ -306,9 +306,8 @@ def test_settling_time_is_that_of_a_long_rest() -> None:
     swing = 1.0 / min(mode.frequency_hz for mode in machine.axes.x.modes)
     # Between samples it may leave the band once more.
     assert (outside[-1] + 1) * TICK_S <= simulation.settling_time_s.x <= outside[-1] * TICK_S + swing
-    data = machine.model_dump(exclude_none=True)
-    data["tolerance"]["residual_floor_um"] = 0.0
-    assert sg.simulate(program, sg.Machine.from_data(data, "no band")).settling_time_s.x is None
+    no_band = machine.with_values("tolerance.residual_floor_um", 0.0)
+    assert sg.simulate(program, no_band).settling_time_s.x is None
 
 
 def test_lag_along_the_path_is_no_contour_error() -> None:
