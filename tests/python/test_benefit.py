@@ -31,7 +31,7 @@ def test_a_program_that_gains_nothing_is_left_as_it_is() -> None:
     assert conversion.answer.startswith("no benefit: run the original: shaping would gain ")
     assert conversion.kept
     # What is there to gain is what playing the original shows.
-    simulated = sg.simulate(sg.Program.from_text(part(SLOW, SLOW), MACHINE), MACHINE)
+    simulated = sg.simulate(part(SLOW, SLOW), MACHINE)
     most = max(region.gain_um for region in conversion.kept)
     shown = max(simulated.contour_error_um.response.max, *simulated.residual_vibration_um)
     assert most == pytest.approx(shown, rel=0.02, abs=0.02)

@@ -352,10 +352,7 @@ def test_command(tmp_path: Path) -> None:
     assert budget["limits"] == limits
     assert budget["left_unchanged"]
     assert "effect of the budget" in done.stdout
-    assert (
-        text
-        == sg.convert(sg.Program.from_text(PART, MACHINE), MACHINE, budget=sg.Budget(**limits), shape_all=True).text
-    )
+    assert text == sg.convert(PART, MACHINE, budget=sg.Budget(**limits), shape_all=True).text
 
 
 def test_command_with_an_impossible_budget_writes_nothing(tmp_path: Path) -> None:

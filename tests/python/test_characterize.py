@@ -342,8 +342,7 @@ def test_the_command_writes_once_and_fits(tmp_path: Path) -> None:
     assert sum_of_both["key"] == "controller.time_constant_s"
     assert sum_of_both["assumed"] == MACHINE.controller.time_constant_s
     assert sum_of_both["low"] < sum_of_both["value"] < sum_of_both["high"]
-    machine = sg.Machine.load(tmp_path / "m.toml")
-    assert machine.controller.time_constant_s == pytest.approx(0.05, rel=0.05)
+    assert sg.Machine.load(tmp_path / "m.toml").controller.time_constant_s == pytest.approx(0.05, rel=0.05)
     assert "measured (stopwatch)" in (tmp_path / "m.toml").read_text()
 
 

@@ -283,8 +283,7 @@ def test_program_without_cutting_moves_stays_as_it_is(text: str) -> None:
 def test_bytes_of_a_comment_are_kept() -> None:
     """Whatever code page a shop's comments are in: their bytes are not the converter's."""
     text = part("G1X10.F600(\xe9)\n(\xfc\xb5)\nX0\n").encode("latin-1")
-    machine = machine_with()
-    lines = sg.convert(sg.Program.from_text(text, machine), machine, shape_all=True).text.split(b"\n")
+    lines = sg.convert(text, machine_with(), shape_all=True).text.split(b"\n")
     assert b"(\xe9)" in lines
     assert b"(\xfc\xb5)" in lines
 
@@ -319,7 +318,7 @@ def test_expanded_compensation_says_so_and_guards_its_radius(guard: str) -> None
             "emission.compensation_guard": guard,
         }
     )
-    converted = sg.convert(sg.Program.from_text(COMPENSATED, machine), machine)
+    converted = sg.convert(COMPENSATED, machine)
     text = converted.text.decode()
     assert converted.to_dict()["expanded_radii_mm"] == {"D1": 2.98}
     assert "(D1 RADIUS 2.98 MM EXPANDED - OFFSET DOES NOT ACT)\n" in text
@@ -337,7 +336,7 @@ def test_expanded_compensation_says_so_and_guards_its_radius(guard: str) -> None
 def test_a_radius_that_is_not_known_cannot_be_expanded() -> None:
     machine = machine_with({"input.compensation": "expand"})
     with pytest.raises(sg.ProgramError, match=r"radius of offset D1 is not known"):
-        sg.convert(sg.Program.from_text(COMPENSATED, machine), machine)
+        sg.convert(COMPENSATED, machine)
 
 
 def test_inserted_lines_stand_at_every_region() -> None:

@@ -34,8 +34,7 @@ def skewed(machine: sg.Machine, **keys: Any) -> sg.Machine:
 
 def test_the_response_is_scipys() -> None:
     command = a_command()
-    machine = skewed(sg.Machine.load("vx500"))
-    found = sg.plant_response(command, machine, PERIOD_S)
+    found = sg.plant_response(command, skewed(sg.Machine.load("vx500")), PERIOD_S)
     rocking = 0.8 * deflection(command @ [0.3, 1.0, 0.0], 41.0, 0.03)
     expected = command.copy()
     expected[:, 0] += deflection(command[:, 0], 46.0, 0.02)
@@ -120,7 +119,7 @@ def test_rocking_in_z_from_y_is_shaped_and_fed_forward() -> None:
 
 def emitted(machine: sg.Machine, contour: str) -> str:
     machine = machine.with_values("shaping.contour", contour)
-    found = sg.convert(sg.Program.from_text(ZIGZAG, machine), machine)
+    found = sg.convert(ZIGZAG, machine)
     assert found.ok
     assert max(found.residual_vibration_um.emitted) < 0.2
     assert found.residual_vibration_um.original.z > 3.0

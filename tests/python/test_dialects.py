@@ -536,7 +536,7 @@ def test_what_is_assumed_is_said(dialect: str) -> None:
 
 
 def test_fanuc_stays_as_it_is() -> None:
-    conversion = sg.convert(sg.Program.from_text(TEXT, machine_with(READING)), machine_with(READING), shape_all=True)
+    conversion = sg.convert(TEXT, machine_with(READING), shape_all=True)
     assert conversion.dialect is None and "dialect" not in conversion.to_dict()
     assert conversion.text == conversion.emitted.text
 

@@ -25,7 +25,7 @@ FEED_DROP = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X20.F3000.\nX40.F300.\nX60.F3000.\
 def converted(text: str, **keys: object) -> tuple[sg.Conversion, Haste]:
     """A conversion, and where its set-points run fastest against the program as the judge has it."""
     machine = machine_with({key.replace("__", "."): value for key, value in keys.items()})
-    conversion = sg.convert(sg.Program.from_text(text, machine), machine, shape_all=True)
+    conversion = sg.convert(text, machine, shape_all=True)
     (region,) = conversion.to_dict()["regions"]
     programmed = cuts(text, region["lines"])
     found = []

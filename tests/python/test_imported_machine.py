@@ -77,8 +77,7 @@ LOOP = "%\nO0001\nG21G90G17\nG0X0Y0\n#1=0\nWHILE[#1LT3]DO1\nG1X[#1*10.]F500\n#1=
 def test_a_loop_is_an_alarm_only_where_programs_come_over_a_serial_line(channel: int, alarm: bool) -> None:
     """A dump holds 0103 whether the line is used or not; 0020 says where programs come from."""
     text = DUMP.format(ms=24, bits="00000001").replace("N00020Q1P4", f"N00020Q1P{channel}")
-    machine = sg.import_parameters(text.encode(), source="HM2.TXT").machine
-    found = sg.check(sg.Program.from_text(LOOP, machine), machine)
+    found = sg.check(LOOP, sg.import_parameters(text.encode(), source="HM2.TXT").machine)
     assert ("macro_in_dnc" in [each.code for each in found.findings]) == alarm
 
 

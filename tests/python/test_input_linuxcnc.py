@@ -167,8 +167,7 @@ def test_rapids_without_a_feed_are_many() -> None:
 
 def test_m98_m99_and_m70_m72() -> None:
     assert ends(read("M98 P100 L2\nM2\nO100\nG91 G1 X1\nG90\nM99"))[-1][0] == 2.0
-    program = read("M70\nG91 G20\nG1 X1\nM72\nG1 X3")
-    assert ends(program)[-2:] == [[25.4, 0.0, 5.0], [3.0, 0.0, 5.0]]
+    assert ends(read("M70\nG91 G20\nG1 X1\nM72\nG1 X3"))[-2:] == [[25.4, 0.0, 5.0], [3.0, 0.0, 5.0]]
 
 
 # ---- words with a unit -----------------------------------------------------------------------------------------------
@@ -442,7 +441,7 @@ def test_restart_points_name_the_lines_of_the_source() -> None:
         "  #1 = [#1 + 1]\n  G1 Y#1\no1 endwhile\nG0 Z50\nM2\n"
     )
     keys = {"emission.restart_interval_s": 5.0}
-    conversion = sg.convert(sg.Program.from_text(text, machine_with(keys)), machine_with(keys), shape_all=True)
+    conversion = sg.convert(text, machine_with(keys), shape_all=True)
     assert conversion.restart_points and {point.lines for point in conversion.restart_points} == {(3, 10)}
 
 

@@ -131,7 +131,7 @@ ROUND = "G21G90\nG00X0.Y0.Z0.\nG01X20.F12000.\nG03X40.Y20.R20.\nG01Y40.\nG00Z10.
 
 
 def test_shaped_arcs_meet_at_less_than_half_of_what_the_kink_rule_allows() -> None:
-    conversion = sg.convert(sg.Program.from_text(ROUND, linuxcnc()), linuxcnc(), shape_all=True)
+    conversion = sg.convert(ROUND, linuxcnc(), shape_all=True)
     text = conversion.text.decode()
     assert re.search(r"^G0[23]X-?[\d.]*\.\d{5}", text, re.MULTILINE)  # five decimals
     for place in conversion.placed:
@@ -148,16 +148,14 @@ def test_shaped_arcs_meet_at_less_than_half_of_what_the_kink_rule_allows() -> No
     assert not any("KINK_RATIO" in each for each in conversion.warnings)
     assert any("ARC_BLEND_RAMP_FREQ = 10000" in each for each in conversion.warnings)
     both = linuxcnc(ramp_frequency_hz=10_000.0)
-    assert not any(
-        "INI file" in each for each in sg.convert(sg.Program.from_text(ROUND, both), both, shape_all=True).warnings
-    )
+    assert not any("INI file" in each for each in sg.convert(ROUND, both, shape_all=True).warnings)
 
 
 def test_check_says_which_lines_and_why(tmp_path: Path) -> None:
     machine = linuxcnc().with_values({"emission.dialect": "fanuc"})
     zigzag = "".join(f"X{0.7 * k:.3f}Y{3.0 * math.sin(0.07 * k):.3f}\n" for k in range(1, 120))
     text = f"G21G90\nG00X0.Y0.Z0.\nG01F6000.\n{zigzag}G00Z10.\nM30\n"
-    shaped = sg.convert(sg.Program.from_text(text, machine), machine, shape_all=True).text
+    shaped = sg.convert(text, machine, shape_all=True).text
     (tmp_path / "shaped.nc").write_bytes(shaped)
     found = {each.code: each for each in sg.check(tmp_path / "shaped.nc", machine).findings}
     assert (

@@ -21,8 +21,7 @@ LINES = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X20.F12000\nG3X40.Y20.R20.\nG1Y40.\nG0
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "part.nc").write_text(LINES)
-    machine = machine_with({"tolerance.contour_um": 50.0})
-    (tmp_path / "shaped.nc").write_bytes(sg.convert(sg.Program.from_text(LINES, machine), machine).text)
+    (tmp_path / "shaped.nc").write_bytes(sg.convert(LINES, machine_with({"tolerance.contour_um": 50.0})).text)
     return tmp_path
 
 

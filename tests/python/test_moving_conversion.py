@@ -16,10 +16,10 @@ from test_moving_modes import OVER_MASS, OVER_Z, machine_with
 HEAD = "%\nO0001\nG21 G90 G94 G17 G54\n"
 
 
-def zig_zag(strokes: int, depth_mm: float, head: str = "G00 X0 Y0 Z0") -> bytes:
+def zig_zag(strokes: int, depth_mm: float, head: str = "G00 X0 Y0 Z0") -> str:
     """X to and fro by 30 mm with a stop at every turn, while Z travels `depth_mm`."""
     lines = [f"G01 X{30.0 * (k % 2):.3f} Z{depth_mm * k / strokes:.3f} F6000" for k in range(1, strokes + 1)]
-    return (HEAD + "\n".join([head, *lines, "M30", "%"]) + "\n").encode()
+    return HEAD + "\n".join([head, *lines, "M30", "%"]) + "\n"
 
 
 def fine_machine(contour: str = "off") -> sg.Machine:
@@ -70,7 +70,7 @@ def test_following_leaves_a_fraction_of_what_one_shaper_leaves(contour: str) -> 
     left = followed.to_dict()["residual_vibration_um"]["emitted"]["x"]
     # The same program with one shaper for the nominal frequency, simulated by the same plant.
     fixed_machine = machine.with_values("axes.x.modes.1.frequency_over", None)
-    fixed = sg.convert(Program.from_text(zig_zag(21, 40.0), fixed_machine), fixed_machine)
+    fixed = sg.convert(zig_zag(21, 40.0), fixed_machine)
     blocks = fixed.emitted.core.cutting_path(fixed.placed[0].first_line, fixed.placed[0].last_line)
     one_left = MachineModel(machine).simulate_emitted(blocks, program.regions[0].path).residual_mm[0] * 1e3
     assert was > 20.0
@@ -81,7 +81,7 @@ def test_following_leaves_a_fraction_of_what_one_shaper_leaves(contour: str) -> 
 
 def test_an_unknown_position_is_shaped_for_the_nominal_frequency() -> None:
     machine = fine_machine()
-    program = Program.from_text(HEAD.encode() + b"G00 X0 Y0\nG01 X30. F6000\nX0\nX30.\nM30\n%\n", machine)
+    program = Program.from_text(HEAD + "G00 X0 Y0\nG01 X30. F6000\nX0\nX30.\nM30\n%\n", machine)
     grid = choose_grid(machine)
     offset = region_offset(program.regions[0], machine)
     model = MachineModel(machine)
@@ -100,7 +100,7 @@ def test_a_rapid_vibrates_with_the_modes_at_its_position(system: str) -> None:
 
     def rapids(*heights_mm: float, machine: sg.Machine = moving) -> float:
         lines = [f"G00 X0 Y0 Z{z - offset_mm:g}\nG04 X2.\nG00 X30.\nG01 Y1. F600\nG00 Y0\nG04 X2." for z in heights_mm]
-        program = Program.from_text((head + "\n".join([*lines, "M30", "%", ""])).encode(), machine)
+        program = Program.from_text((head + "\n".join([*lines, "M30", "%", ""])), machine)
         return rapid_vibration_um(program, MachineModel(machine)).x
 
     at_0, at_400 = (sg.Machine.load("vx500").with_values("axes.x.modes.1.frequency_hz", hz) for hz in (52.0, 41.0))
@@ -112,12 +112,11 @@ def test_a_rapid_vibrates_with_the_modes_at_its_position(system: str) -> None:
 
 
 def test_warnings_and_modes_reach_the_report_and_the_header() -> None:
-    machine = machine_with(OVER_MASS, more="part_mass_kg = 100")
-    conversion = sg.convert(Program.from_text(zig_zag(4, 4.0), machine), machine)
+    conversion = sg.convert(zig_zag(4, 4.0), machine_with(OVER_MASS, more="part_mass_kg = 100"))
     assert b"(MODE X 46 HZ 0.03)" in conversion.text
     heavy = machine_with(OVER_MASS, more="part_mass_kg = 400")
     program = Program.from_text(zig_zag(4, 4.0), heavy)
     for warnings in (sg.convert(program, heavy).warnings, sg.simulate(program, heavy).warnings):
         assert any("lies outside the table" in warning for warning in warnings)
     moving = machine_with(OVER_Z)
-    assert b"(SHAPER CHANGES WITH Z POSITION)" in sg.convert(Program.from_text(zig_zag(4, 4.0), moving), moving).text
+    assert b"(SHAPER CHANGES WITH Z POSITION)" in sg.convert(zig_zag(4, 4.0), moving).text

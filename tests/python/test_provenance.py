@@ -428,8 +428,7 @@ def replayed(judged: Judged, modes: list[list[Mode]], filter_ms: int) -> tuple[f
 
 def test_verdict_rests_on_a_filter_that_nobody_measured() -> None:
     """1622 unknown: 24 ms of it would take the circle inwards, by what a second simulation finds."""
-    machine = unmeasured_machine({}, {"controller.shaped_time_constant_s": "assumed"})
-    judged = convert(CIRCLE, machine)
+    judged = convert(CIRCLE, unmeasured_machine({}, {"controller.shaped_time_constant_s": "assumed"}))
     rows = [row for row in judged.conversion.parameter_sensitivity if row.key == "controller.shaped_time_constant_s"]
     (row,) = rows
     assert (row.origin, row.value, row.tested_value) == ("assumed", "0.0 s", "0.024 s")

@@ -59,7 +59,7 @@ def toml_file(folder: Path, machine: sg.Machine) -> str:
 
 def streamed(text: str, machine: sg.Machine, **options: Any) -> Chunk:
     """The whole motion in one piece."""
-    chunks = list(sg.stream(sg.Program.from_text(text, machine), machine, chunk_samples=10_000_000, **options))
+    chunks = list(sg.stream(text, machine, chunk_samples=10_000_000, **options))
     assert len(chunks) == 1
     return chunks[0]
 
@@ -93,7 +93,7 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 def test_motion_takes_the_cycle_time(motion: str) -> None:
     machine = machine_with(controller={"motion": motion}, times={"tool_change_s": 2.5, "m_function_s": 0.125})
     simulated = streamed(WHOLE, machine)
-    time = sg.cycle_time(sg.Program.from_text(WHOLE, machine), machine, per_block=True)
+    time = sg.cycle_time(WHOLE, machine, per_block=True)
     assert simulated.time_s[-1] == pytest.approx(time.cycle_time_s + REST_S, abs=1e-9)
     assert simulated.time_s[-1] == pytest.approx(time.full_interpolation_s + REST_S, abs=1e-9)
     # What `time` says of each kind of block is what happens there.
@@ -138,7 +138,7 @@ def test_motion_ends_where_the_program_ends_and_keeps_its_speeds() -> None:
 
 def test_shaped_program_moves_block_by_block() -> None:
     machine = sg.Machine.load("vx500")
-    conversion = sg.convert(sg.Program.from_text(WHOLE, machine), machine)
+    conversion = sg.convert(WHOLE, machine)
     emitted = sg.Program.from_text(conversion.text, machine, source="emitted")
     # Cutting blocks at their feed, and what the filter adds to each region.
     figures = [run.figures for run in sg.simulate(emitted, machine, shaped=True, record_samples=0).regions]
@@ -160,8 +160,7 @@ def read_csv(file: Path) -> dict[str, Any]:
 def test_csv_and_npz_hold_the_same_motion_as_the_api(folder: Path) -> None:
     assert main(["simulate", "part.nc", "-m", "vx500", "--csv", "m.csv", "--npz", "m.npz", "--json", "r.json"]) == 0
     csv, npz = read_csv(folder / "m.csv"), np.load(folder / "m.npz")
-    machine = sg.Machine.load("vx500")
-    simulated = streamed(WHOLE, machine)
+    simulated = streamed(WHOLE, sg.Machine.load("vx500"))
     assert list(csv) == ["kind", *simulated.columns()]
     assert set(npz) == {*csv, "kind_names"}
     for name, column in simulated.columns().items():
@@ -338,7 +337,7 @@ def test_contour_error_of_a_drive_is_that_of_its_track() -> None:
 def test_orbit_error_of_the_response_is_the_area_of_its_track() -> None:
     machine = machine_with()
     text = "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\nG01 X20. F12000.\nG03 X40. Y20. R20.\nG01 Y40.\nM30\n%\n"
-    simulation = sg.simulate(sg.Program.from_text(text, machine), machine)
+    simulation = sg.simulate(text, machine)
     x, y = streamed(text, machine).response_mm[:, :2].T
     angle = np.arctan2(y - 20.0, x - 20.0)
     gap = np.abs(20.0**2 - (x - 20.0) ** 2 - (y - 20.0) ** 2)
@@ -367,7 +366,7 @@ def test_picture_of_the_motion(tmp_path: Path) -> None:
 def test_the_motion_is_drawn_into_the_callers_axes() -> None:
     """A short one is drawn sample by sample: the curves are those of the whole motion."""
     machine = sg.Machine.load("vx500")
-    motion = sg.simulate_motion(sg.Program.from_text(SHORT, machine), machine)
+    motion = sg.simulate_motion(SHORT, machine)
     figure = plot.figure(12, 12)
     places = figure.subplots(2, 1)
     panel = sg.plot_motion(motion, places[1])
@@ -381,9 +380,9 @@ def test_the_motion_is_drawn_into_the_callers_axes() -> None:
 
 def test_a_simulation_draws_what_was_asked_for() -> None:
     machine = sg.Machine.load("vx500")
-    simulation = sg.simulate(sg.Program.from_text(CORNER, machine), machine)
+    simulation = sg.simulate(CORNER, machine)
     assert list(simulation.plots()) == ["path", "feed", "vibration"]
-    motion = sg.simulate_motion(sg.Program.from_text(CORNER, machine), machine)
+    motion = sg.simulate_motion(CORNER, machine)
     assert list(dataclasses.replace(simulation, motion=motion).plots()) == ["motion", "path", "feed", "vibration"]
     assert list(dataclasses.replace(simulation, regions=()).plots()) == []
 

@@ -425,8 +425,7 @@ def test_a_record_as_planned_passes() -> None:
 
 
 def test_the_plan_speaks_of_the_machine() -> None:
-    machine = Machine.load("vx500")
-    plan = tap_plan(machine)
+    plan = tap_plan(Machine.load("vx500"))
     assert "tap test of VX500" in plan.answer
     assert [(row.axis, row.modes_hz) for row in plan.recordings] == [("X", (46.0,)), ("Y", (131.0,)), ("Z", ())]
     assert [stop.axis for stop in plan.stops] == ["X", "Y", "Z"]
@@ -448,8 +447,7 @@ def test_the_plan_speaks_of_the_machine() -> None:
 def test_the_program_of_rapid_stops_runs_and_comes_back(axis: str) -> None:
     machine = Machine.load("vx500")
     text = rapid_stop_program(axis, 120.0, 4.0)
-    program = Program.from_text(text, machine)
-    time = cycle_time(program, machine)
+    time = cycle_time(Program.from_text(text, machine), machine)
     assert time.warnings == ()
     assert time.dwell_s == pytest.approx(40.0)
     assert time.rapid_s == pytest.approx(10 * 120.0 / 400.0), "ten rapids of 120 mm at 24 m/min"

@@ -50,7 +50,7 @@ def paper_004() -> dict[str, Any]:
 
 def timed(text: str, machine: sg.Machine | None = None, **options: Any) -> sg.CycleTime:
     machine = machine or sg.Machine.load("kimm004")
-    return sg.cycle_time(sg.Program.from_text(text, machine), machine, **options)
+    return sg.cycle_time(text, machine, **options)
 
 
 def ticks(seconds: float) -> float:

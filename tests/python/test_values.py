@@ -24,9 +24,7 @@ INCH = METRIC.with_values({UNITS: "G20", "name": "inch"})
 
 ENTRIES: dict[str, Callable[[sg.Program, sg.Machine], object]] = {
     "simulate": lambda program, machine: sg.simulate(program, machine, record_samples=0),
-    "against": lambda program, machine: sg.simulate(
-        sg.Program.from_text(NO_UNIT, machine), machine, against=program, record_samples=0
-    ),
+    "against": lambda program, machine: sg.simulate(NO_UNIT, machine, against=program, record_samples=0),
     "convert": lambda program, machine: sg.convert(program, machine, tolerance_curve=False),
     "check": sg.check,
     "cycle_time": sg.cycle_time,
@@ -72,10 +70,10 @@ def test_every_setting_of_the_reader_counts(key: str, value: object, shown: str)
 def test_settings_that_read_alike_change_nothing() -> None:
     program = sg.Program.from_text(NO_UNIT)
     stiffer = METRIC.with_values({"axes.x.modes.1.frequency_hz": 60.0, "tolerance.contour_um": 50.0, "name": "other"})
-    assert sg.cycle_time(program, stiffer) == sg.cycle_time(sg.Program.from_text(NO_UNIT, stiffer), stiffer)
+    assert sg.cycle_time(program, stiffer) == sg.cycle_time(NO_UNIT, stiffer)
     # What shapegcode wrote has FANUC's arcs, whatever those of the original were.
     absolute = METRIC.with_values("input.arc_centre", "absolute")
-    emitted = sg.convert(sg.Program.from_text(NO_UNIT, absolute), absolute, tolerance_curve=False).emitted
+    emitted = sg.convert(NO_UNIT, absolute, tolerance_curve=False).emitted
     assert sg.cycle_time(emitted, METRIC).blocks == sg.cycle_time(emitted, absolute).blocks
 
 

@@ -63,4 +63,4 @@ def test_drives_must_be_known() -> None:
         {"verdict.plant": "feed-drive", "axes.x.modes": [{"frequency_hz": 40.0, "damping_ratio": 0.02}]}
     )
     with pytest.raises(sg.MachineError, match=r"axes\.x\.drive"):
-        sg.convert(sg.Program.from_text(PART, machine), machine)
+        sg.convert(PART, machine)

@@ -399,7 +399,7 @@ def test_rounding_by_the_control_is_told_apart_from_vibration() -> None:
     expected_um = math.hypot(1000.0, 800.0) / 60.0 * 0.048 / 8.0 * 1e3
     assert advice.rounding_um == pytest.approx(expected_um, rel=0.05)
     smaller = machine.with_values(advice.key, advice.enough_s)
-    assert sg.convert(sg.Program.from_text(part(slow_square), smaller), smaller).recommendation == WITHIN
+    assert sg.convert(part(slow_square), smaller).recommendation == WITHIN
     # Where vibration is the cause there is no such advice.
     assert converted(part(SQUARE), machine_with({"tolerance.contour_um": 15.0})).advice is None
 

@@ -191,7 +191,7 @@ def test_a_region_too_long_for_one_piece_keeps_its_text_and_is_named(monkeypatch
 
     monkeypatch.setattr(whole_text, "_MAX_PERIODS", 1000)
     text = f"{HEAD}G01 X200. F2000\nY100.\nX0\nG00 Z50.\nX0 Y0\nG01 X10. F2000\nY20.\n{END}"
-    converted = sg.convert(sg.Program.from_text(text, "vx500"), "vx500", shape_all=True)
+    converted = sg.convert(text, "vx500", shape_all=True)
     assert b"\nG01 X200. F2000\nY100.\nX0\n" in converted.text
     assert any("exceed what can be shaped at a time" in warning for warning in converted.warnings)
     assert len(converted.placed) == 1
@@ -201,11 +201,11 @@ def test_a_region_whose_blocks_have_no_room_keeps_its_text_and_is_named() -> Non
     zigzag = "".join(f"X{5 * (k % 2)}.Y{k}.\n" for k in range(60))
     text = f"{HEAD}G01 X5. F3000\nX0\nG00 Z50.\nG00 Z5.\nG01 F3000\n{zigzag}{END}"
     free = sg.Machine.load("vx500")
-    whole = sg.convert(sg.Program.from_text(text, free), free, shape_all=True)
+    whole = sg.convert(text, free, shape_all=True)
     assert len(whole.placed) == 2
     for key, of_whole in (("max_program_bytes", len(whole.text)), ("max_program_moves", whole.blocks.emitted)):
         machine = free.with_values({f"controller.{key}": of_whole // 2})
-        converted = sg.convert(sg.Program.from_text(text, machine), machine, shape_all=True)
+        converted = sg.convert(text, machine, shape_all=True)
         assert len(converted.placed) == 1
         assert zigzag.encode() in converted.text
         assert any(f"controller.{key}" in warning for warning in converted.warnings)

@@ -374,8 +374,7 @@ def test_keys_of_a_case_are_stable(judged: Judged) -> None:
 
 
 def test_nothing_shaped_has_no_cases() -> None:
-    machine = machine_with()
-    conversion = sg.convert(sg.Program.from_text("%\nO1\nG21G90\nG00X1.\nM30\n%\n", machine), machine)
+    conversion = sg.convert("%\nO1\nG21G90\nG00X1.\nM30\n%\n", machine_with())
     assert (conversion.cases, conversion.worst_case, conversion.tables()) == ((), None, [])
 
 
