@@ -29,12 +29,14 @@ if TYPE_CHECKING:
 FEED = Path(__file__).parents[1] / "golden" / "feed"
 
 
+def scheduled(machine: Machine) -> FeedSchedule:
+    tool, stock = Tool.load(FEED / "pocket_tool.toml"), Stock.load(FEED / "pocket_stock.toml")
+    return schedule_feed(FEED / "POCKET.NC", machine, tool, stock, resolution_mm=0.16)
+
+
 @pytest.fixture(scope="module")
 def pocket() -> FeedSchedule:
-    return schedule_feed(
-        FEED / "POCKET.NC", Machine.load("vx500"), Tool.load(FEED / "pocket_tool.toml"),
-        Stock.load(FEED / "pocket_stock.toml"), resolution_mm=0.16,
-    )  # fmt: skip
+    return scheduled(Machine.load("vx500"))
 
 
 def test_groups_hold_every_station_once_and_envelopes_lose_nothing() -> None:
@@ -75,11 +77,7 @@ def test_traces_are_those_of_the_regions_in_a_row(pocket: FeedSchedule) -> None:
 def test_limits_of_the_spindle_are_drawn_as_they_are_kept(pocket: FeedSchedule) -> None:
     """The tool file limits the resultant alone; torque and power are the machine's."""
     limits = {"feed_control.spindle_torque_nm": 0.4, "feed_control.spindle_power_w": 150.0}
-    machine = Machine.load("vx500").with_values(limits)
-    schedule = schedule_feed(
-        FEED / "POCKET.NC", machine, Tool.load(FEED / "pocket_tool.toml"),
-        Stock.load(FEED / "pocket_stock.toml"), resolution_mm=0.16,
-    )  # fmt: skip
+    schedule = scheduled(Machine.load("vx500").with_values(limits))
     assert schedule.peak.mean_power_w.emitted <= 150.0 < schedule.peak.mean_power_w.original
     assert (schedule.traces.limit["mean_power_w"] == 150.0).all()
     assert (schedule.traces.limit["peak_torque_nm"] == 0.4).all()

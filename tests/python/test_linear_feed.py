@@ -12,14 +12,14 @@ from scipy.optimize import brentq
 
 import shapegcode as sg
 from acceptance import machine_with, moves_of
-from judge import Mode, residual_um
+from judge import residual_um
 from linear_feed_reader import command, cuts_with_flin
 from shapegcode import _core
 from shapegcode.machine.programs import ANY_PRICE
 from shapegcode.program.foreign.siemens import read_siemens
+from test_planner_models import MODES
 
 PATH = "G21G90\nG00X0.Y0.Z0.\nG01X20.F10000.\nG03X40.Y20.R20.\nG01Y40.\nG04P500\nM30\n"  # paper 000's
-MODES = [[Mode(46.0, 0.02)], [Mode(131.0, 0.02)], []]
 KEYS = {
     **ANY_PRICE,
     "axes.x.modes": [{"frequency_hz": 46.0, "damping_ratio": 0.02}],

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,8 +33,7 @@ SLOW = "G1X20.F200.\nY5.\n"
 DENSE = "".join(f"G1X{0.5 * (i % 2) + 0.3 * i:.3f}Y{0.4 * (i % 3):.3f}F4000.\n" for i in range(60))
 
 
-def machine_with(keys: Mapping[str, object]) -> sg.Machine:
-    return sg.Machine.load("vx500").with_values(dict(keys))
+VX500 = sg.Machine.load("vx500")
 
 
 def part(*cuts: str) -> str:
@@ -56,7 +55,7 @@ def converted(text: str, machine: sg.Machine, **options: object) -> sg.Conversio
 def test_simulate_against_the_original_gives_the_figures_of_convert(
     tolerance_um: float, keys: dict[str, object]
 ) -> None:
-    machine = machine_with({"tolerance.contour_um": tolerance_um, **keys})
+    machine = VX500.with_values({"tolerance.contour_um": tolerance_um, **keys})
     conversion = converted(MIXED, machine, leave=[(9, 9)])
     assert conversion.regions
     assert conversion.unchanged
@@ -75,7 +74,7 @@ def test_simulate_against_the_original_gives_the_figures_of_convert(
 
 
 def test_a_program_against_itself_has_one_contour_error() -> None:
-    machine = machine_with({})
+    machine = VX500
     program = sg.Program.read(PROGRAMS / "PARALLEL.NC", machine)
     simulation = sg.simulate(program, machine, against=program, record_samples=0)
     assert simulation.contour_error_um.command.max == simulation.verdict.contour_error_um.command.emitted.max == 0.0
@@ -86,7 +85,7 @@ def test_figures_of_the_original_do_not_depend_on_what_is_asked_for() -> None:
         {"tolerance.contour_um": 5.0}, {"tolerance.contour_um": 40.0}, {"shaping.family": "zvd"},
         {"emission.block_period_s": 0.008}, {"emission.rounding": "nearest", "emission.override": "any"},
     ]  # fmt: skip
-    found = [converted(MIXED, machine_with(keys)) for keys in asked]
+    found = [converted(MIXED, VX500.with_values(keys)) for keys in asked]
     for other in found[1:]:
         for name in ("residual_vibration_um", "peak_vibration_um", "rapid_vibration_um"):
             assert getattr(other, name).original == getattr(found[0], name).original
@@ -94,7 +93,7 @@ def test_figures_of_the_original_do_not_depend_on_what_is_asked_for() -> None:
 
 
 def test_a_cut_left_unchanged_that_misses_a_limit_is_in_the_first_three_lines() -> None:
-    machine = machine_with({"tolerance.contour_um": 15.0})
+    machine = VX500.with_values({"tolerance.contour_um": 15.0})
     free = converted(MIXED, machine)
     facets = free.cuts[0].lines
     conversion = converted(MIXED, machine, leave=[facets])
@@ -114,7 +113,7 @@ def test_a_cut_left_unchanged_that_misses_a_limit_is_in_the_first_three_lines() 
 def test_whole_program_figures_are_the_independent_players() -> None:
     """Shaped cuts and cuts left unchanged, by an interpreter, a player and a plant that share no code with ours."""
     # Without acceleration ramps before interpolation an original is simulated block by block, smoothed.
-    machine = machine_with({"controller.motion": "after_interpolation", "controller.time_constant_s": 0.024,
+    machine = VX500.with_values({"controller.motion": "after_interpolation", "controller.time_constant_s": 0.024,
                             "controller.block_end": "carry", "tolerance.contour_um": 60.0})  # fmt: skip
     text = part(SQUARE, SLOW, SQUARE)
     first = converted(text, machine, shape_all=True, max_cut_time_increase_percent=1e4, max_time_increase_percent=1e4)
@@ -156,7 +155,7 @@ def test_whole_program_figures_are_the_independent_players() -> None:
 )
 def test_nothing_costs_more_than_its_price(program_percent: float, cut_percent: float, tolerance_um: float) -> None:
     conversion = converted(
-        MIXED, machine_with({"tolerance.contour_um": tolerance_um}), max_time_increase_percent=program_percent,
+        MIXED, VX500.with_values({"tolerance.contour_um": tolerance_um}), max_time_increase_percent=program_percent,
         max_cut_time_increase_percent=cut_percent,
     )  # fmt: skip
     whole = conversion.cycle_time_s
@@ -170,7 +169,7 @@ def test_nothing_costs_more_than_its_price(program_percent: float, cut_percent: 
 
 
 def test_a_larger_price_brings_a_tighter_contour() -> None:
-    machine = machine_with({"tolerance.contour_um": 2.0})
+    machine = VX500.with_values({"tolerance.contour_um": 2.0})
     reached = [
         converted(MIXED, machine, max_time_increase_percent=percent, max_cut_time_increase_percent=percent)
         .cuts[0].contour_um.emitted
@@ -183,7 +182,7 @@ def test_a_larger_price_brings_a_tighter_contour() -> None:
 def test_the_curve_says_what_conversions_at_other_tolerances_take() -> None:
     """Each point beside a conversion of its own with that tolerance, at any price."""
     prices = {"max_time_increase_percent": 1e5, "max_cut_time_increase_percent": 1e5}
-    asked = converted(MIXED, machine_with({"tolerance.contour_um": 6.0}), **prices)
+    asked = converted(MIXED, VX500.with_values({"tolerance.contour_um": 6.0}), **prices)
     curve = asked.tolerance_curve
     names = [point.name for point in curve.points]
     assert {"as asked", "1.25 times", "1.5 times", "2 times", "the original's contour error"} < {*names}
@@ -193,13 +192,13 @@ def test_the_curve_says_what_conversions_at_other_tolerances_take() -> None:
     assert increases == sorted(increases, reverse=True)
     for point in curve.points:
         if point.tolerance_um < 16.0:
-            other = converted(MIXED, machine_with({"tolerance.contour_um": point.tolerance_um}), **prices)
+            other = converted(MIXED, VX500.with_values({"tolerance.contour_um": point.tolerance_um}), **prices)
             assert point.time_s == pytest.approx(other.cycle_time_s.emitted, rel=0.05), point
 
 
 def test_planned_times_are_those_of_the_shaped_command() -> None:
     """Each tolerance planned after another one beside the shaper that gives every block out, from a cold start."""
-    machine = machine_with({})
+    machine = VX500
     program = sg.Program.from_text(part(FACETS), machine)
     (region,) = program.regions
     model, grid = MachineModel(machine), choose_grid(machine)
@@ -222,7 +221,7 @@ def test_planned_times_are_those_of_the_shaped_command() -> None:
 
 def test_the_same_motion_is_recognised_whatever_its_lines() -> None:
     one, other, faster = (
-        sg.Program.from_text(part(cut), machine_with({})).regions[0].path
+        sg.Program.from_text(part(cut), VX500).regions[0].path
         for cut in (SQUARE, SQUARE.replace("Y20.", "(A COMMENT)\nY20."), SQUARE.replace("F5000.", "F5001."))
     )
     assert one.moves_as(other) and other.moves_as(one)
@@ -240,7 +239,7 @@ def test_the_knee_is_where_the_curve_bends() -> None:
 
 
 def test_only_and_leave_choose_cuts_by_their_lines(tmp_path: Path) -> None:
-    machine = machine_with({"tolerance.contour_um": 15.0})
+    machine = VX500.with_values({"tolerance.contour_um": 15.0})
     free = converted(MIXED, machine)
     first, _, square, _ = (cut.lines for cut in free.cuts)
     only = converted(MIXED, machine, only=[square])
@@ -330,7 +329,7 @@ ANSWERS: dict[str, tuple[str, dict[str, object], dict[str, object], str]] = {
 @pytest.mark.parametrize("name", ANSWERS)
 def test_the_answer_of_a_program(name: str) -> None:
     text, keys, options, grade = ANSWERS[name]
-    conversion = converted(text, machine_with(keys), **options)
+    conversion = converted(text, VX500.with_values(keys), **options)
     assert conversion.recommendation == grade
     assert conversion.exit_code == (1 if grade in (BETTER, NOT) else 0)
     assert conversion.is_written_as_output == (grade != NOT)
@@ -345,7 +344,7 @@ def test_restart_points_are_no_change_of_the_program() -> None:
     """The modal line of a restart point names what is in force: neither an offset nor the end of a cut."""
     long = FACETS.replace("F6000.", "F600.")
     conversion = converted(
-        part(long), machine_with({"tolerance.contour_um": 4.0, "shaping.least_gain_um": 0.1,
+        part(long), VX500.with_values({"tolerance.contour_um": 4.0, "shaping.least_gain_um": 0.1,
                                   "emission.restart_interval_s": 2.0, "emission.restart_stops": True}),
         shape_all=True, max_time_increase_percent=1e4, max_cut_time_increase_percent=1e4,
     )  # fmt: skip
@@ -355,7 +354,7 @@ def test_restart_points_are_no_change_of_the_program() -> None:
 
 
 def test_shaped_rapids_stay_within_the_price_too() -> None:
-    machine = machine_with({"tolerance.contour_um": 15.0, "shaping.rapids": True})
+    machine = VX500.with_values({"tolerance.contour_um": 15.0, "shaping.rapids": True})
     dear = converted(MIXED, machine, max_time_increase_percent=1e4, max_cut_time_increase_percent=1e4)
     assert dear.rapids is not None
     for percent in (0.5, 1.0, 2.0, 4.0):
@@ -366,7 +365,7 @@ def test_shaped_rapids_stay_within_the_price_too() -> None:
 
 def test_a_cut_that_is_chosen_and_left_is_refused() -> None:
     with pytest.raises(sg.ShapegcodeError, match="--only and --leave both contain the cut in lines 8 to"):
-        converted(MIXED, machine_with({}), only=[(8, 20)], leave=[(10, 12)])
+        converted(MIXED, VX500, only=[(8, 20)], leave=[(10, 12)])
 
 
 def test_what_is_not_shaped_is_written_as_it_was() -> None:
@@ -374,7 +373,7 @@ def test_what_is_not_shaped_is_written_as_it_was() -> None:
     alone = "%\nO1\nG21G17G90G94G54\nG0X0Y0Z5.\n#1=2.\nG68X0Y0R30.\nG1X[#1*10.]F30.\nG69\nG0Z5.\nM30\n%\n"
     called = "%\nO1\nG21G17G90G94G54\nG0X0Y0Z5.\nM98P100\nG0Z5.\nM30\nO100\nG1X20.F30.\nX0\nM99\n%\n"
     for text in (alone, called):
-        conversion = converted(text, machine_with({}))
+        conversion = converted(text, VX500)
         assert conversion.expanded
         assert conversion.recommendation == NONE
         assert conversion.text == text.encode()
@@ -389,7 +388,7 @@ def test_rounding_by_the_control_is_told_apart_from_vibration() -> None:
         "tolerance.contour_um": 60.0,
     }
     slow_square = SQUARE.replace("F5000.", "F800.")
-    machine = machine_with(keys)
+    machine = VX500.with_values(keys)
     conversion = converted(part(slow_square), machine)
     advice = conversion.advice
     assert advice.key == "controller.time_constant_s"
@@ -401,13 +400,13 @@ def test_rounding_by_the_control_is_told_apart_from_vibration() -> None:
     smaller = machine.with_values(advice.key, advice.enough_s)
     assert sg.convert(part(slow_square), smaller).recommendation == WITHIN
     # Where vibration is the cause there is no such advice.
-    assert converted(part(SQUARE), machine_with({"tolerance.contour_um": 15.0})).advice is None
+    assert converted(part(SQUARE), VX500.with_values({"tolerance.contour_um": 15.0})).advice is None
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["PARALLEL.NC", "PROGRAM2.NC", "TEST_G90.NC", "TEST_G91.NC"])
 def test_real_programs_stay_within_their_price(name: str) -> None:
-    machine = machine_with({"tolerance.contour_um": 8.0})
+    machine = VX500.with_values({"tolerance.contour_um": 8.0})
     conversion = sg.convert(PROGRAMS / name, machine)
     assert conversion.cycle_time_s.emitted <= 1.1 * conversion.cycle_time_s.original + 1e-9
     assert all(cut.time_s.emitted <= 1.25 * cut.time_s.original + 1e-9 for cut in conversion.cuts)
