@@ -14,6 +14,7 @@ import pytest
 
 import cut_reference as reference
 import shapegcode as sg
+from judge.interpreter import interpret
 from shapegcode import _core
 from shapegcode.cli import main
 from shapegcode.cutting.tool import Tool
@@ -56,22 +57,14 @@ def write(folder: Path, kind: str, *options: str, tool: str = TOOL) -> dict[str,
 
 def moves(text: str) -> list[list[tuple[float, float, float, float]]]:
     """Lines that are cut at depth, as x, y to x, y; a new list begins at each M00."""
-    x = y = z = 0.0
-    g = 0
     parts: list[list[tuple[float, float, float, float]]] = [[]]
-    for line in text.splitlines():
-        words = dict(re.findall(r"([A-Z])(-?[\d.]+)", re.sub(r"\(.*?\)", "", line)))
-        if words.get("M") == "00":
+    for record in interpret(text).lines:
+        if record.text.startswith("M00"):
             parts.append([])
-        if "G" in words and float(words["G"]) in (0.0, 1.0):
-            g = int(words["G"])
-        if not {"X", "Y", "Z"} & set(words) or words.get("G") == "04":
-            continue
-        new = (float(words.get("X", x)), float(words.get("Y", y)), float(words.get("Z", z)))
-        if z < 0.0 and new[2] < 0.0:
-            assert g == 1, f"rapid in the material: {line}"
-            parts[-1].append((x, y, new[0], new[1]))
-        x, y, z = new
+        for move in record.moves:
+            if move.start[2] < 0.0 and move.end[2] < 0.0:
+                assert move.is_cut, f"rapid in the material: {record.text}"
+                parts[-1].append((*move.start[:2], *move.end[:2]))
     return parts
 
 
