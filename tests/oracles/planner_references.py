@@ -162,8 +162,8 @@ def table_off_path_um(cut: Vector, path: Vector, modes: Sequence[AxisModes]) -> 
     along_path, along = _travel(path), _travel(command)[::5]
     along *= along_path[-1] / along[-1]
     table = table[::5]
-    there = distance_to_polyline(table, along, path, along_path)
-    back = distance_to_polyline(path, along_path, table, along)
+    there = distances_from_polyline(table, along, path, along_path)
+    back = distances_from_polyline(path, along_path, table, along)
     return 1e3 * there, 1e3 * max(there, back)
 
 
@@ -172,7 +172,7 @@ def _travel(points: Vector) -> Vector:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
-def distance_to_polyline(points: Vector, at: Vector, line: Vector, along: Vector) -> float:
+def distances_from_polyline(points: Vector, at: Vector, line: Vector, along: Vector) -> float:
     """Largest distance of points, by the travel at which each stands, from the stretch of a polyline about them.
 
     `along`: travel at each vertex. A path may cross itself elsewhere.

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
-from scipy.spatial import cKDTree
 
 import shapegcode as sg
 from acceptance import SAMPLE_KEYS, SAMPLES, machine_with, read_sample
@@ -14,6 +13,7 @@ from command import run
 from judge import interpret
 from judge.draws import draw
 from judge.generate import programs
+from judge.plant import distances_from_polyline
 from judge.samples import PROGRAMS
 from random_verdict import convert
 from rs274_tool import canonical_moves, run_rs274
@@ -145,20 +145,6 @@ def test_a_cut_that_is_gone_and_cuts_that_change_places() -> None:
     assert compared(PART.replace(first, small), PART.replace(first, other_way)).path_um > 90.0
 
 
-def nearest_mm(points: np.ndarray, line: np.ndarray) -> float:
-    """Largest distance of points from a polyline, by the pieces at the nearest of its corners."""
-    _, near = cKDTree(line).query(points, k=min(4, len(line)))
-    best = np.full(len(points), np.inf)
-    for corner in near.T:
-        for first, last in ((corner - 1, corner), (corner, corner + 1)):
-            a, b = line[np.clip(first, 0, len(line) - 1)], line[np.clip(last, 0, len(line) - 1)]
-            along = b - a
-            share = np.einsum("ij,ij->i", points - a, along) / np.maximum(np.einsum("ij,ij->i", along, along), 1e-30)
-            foot = a + np.clip(share, 0.0, 1.0)[:, None] * along
-            best = np.minimum(best, np.linalg.norm(points - foot, axis=1))
-    return float(best.max())
-
-
 def judged_cuts(text: str, machine: sg.Machine, centre: str) -> tuple[int, list[np.ndarray]]:
     """Rapids outside of cycles, and points of each run of cuts between them, as the judge reads them."""
     rapids, runs, open_run = 0, [], False
@@ -198,7 +184,10 @@ def test_a_shaped_program_is_as_near_as_the_judge_finds_it(name: str, tmp_path: 
     _, ours = judged_cuts(read_sample(name), machine, centre)
     _, theirs = judged_cuts(conversion.text.decode("ascii"), machine, "incremental")
     ours = [run for run in ours if len(run) > 1]
-    worst_um = max(1e3 * max(nearest_mm(a, b), nearest_mm(b, a)) for a, b in zip(ours, theirs, strict=True))
+    worst_um = max(
+        1e3 * max(distances_from_polyline(a, b).max(), distances_from_polyline(b, a).max())
+        for a, b in zip(ours, theirs, strict=True)
+    )
     # The judge takes the nearest place of the whole cut, also where that is another pass.
     assert worst_um - 0.05 <= result.path_um <= worst_um * 1.2 + 0.2
 

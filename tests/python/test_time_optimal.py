@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import shapegcode as sg
+from judge.plant import distances_from_polyline
 from shapegcode.io.units import FloatArray
 from time_optimal import Limits, rounded_polyline, time_optimal
 
@@ -23,14 +24,6 @@ def differences(points: FloatArray, order: int) -> FloatArray:
     return np.asarray(np.diff(whole, order, axis=0) / PERIOD_S**order)
 
 
-def off_polyline(points: FloatArray, corners: FloatArray) -> float:
-    """Largest distance of any point from the polyline."""
-    begin, leg = corners[:-1], np.diff(corners, axis=0)
-    share = ((points[:, None] - begin) * leg).sum(axis=2) / (leg**2).sum(axis=1)
-    foot = begin + np.clip(share, 0.0, 1.0)[:, :, None] * leg
-    return float(np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1).max())
-
-
 def polyline(seed: int, corners: int, size: float) -> FloatArray:
     steps = np.random.default_rng(seed).normal(0.0, size, (corners, 3))
     return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
@@ -43,7 +36,7 @@ def test_limits_and_tolerance_are_kept_and_the_end_is_reached(seed: int) -> None
     for order, name in enumerate(LIMITS, start=1):
         assert (np.abs(differences(points, order)).max(axis=0) <= 1.001 * np.array(LIMITS[name])).all()
     assert np.linalg.norm(differences(points, 1), axis=1).max() <= 90.0 * 1.001
-    assert off_polyline(np.asarray(points), corners) <= tolerance_mm * (1 + 1e-6)
+    assert distances_from_polyline(np.asarray(points), corners).max() <= tolerance_mm * (1 + 1e-6)
     assert (points[0] == corners[0]).all()
     assert (points[-1] == corners[-1]).all()
 
@@ -97,7 +90,7 @@ def test_lines_and_arcs_of_a_program_are_planned_with_their_feeds(tmp_path: Any)
     points = sg.time_optimal_trajectory(path, contour_tolerance_mm=0.02, **LIMITS)
     for order, name in enumerate(LIMITS, start=1):
         assert (np.abs(differences(points, order)).max(axis=0) <= 1.001 * np.array(LIMITS[name])).all()
-    assert off_polyline(np.asarray(points), path.polyline(0.005)) <= 0.02 + 1e-3
+    assert distances_from_polyline(np.asarray(points), np.asarray(path.polyline(0.005))).max() <= 0.02 + 1e-3
     assert (points[-1] == path.end_mm).all()
 
 

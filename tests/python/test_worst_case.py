@@ -4,7 +4,6 @@ import cmath
 import json
 import math
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ import shapegcode as sg
 from acceptance import Judged, close, convert, machine_with
 from command import run
 from judge import Mode, Move, contour_error_um, durations, play, residual_um, response, starts
+from judge.plant import distances_from_polyline
 from judge.player import BlockEnd, moving_average
 from shapegcode.cli import main
 from shapegcode.io.units import FloatArray
@@ -150,11 +150,8 @@ def test_the_contour_at_other_overrides_and_of_a_mode_that_is_off_is_the_judges_
         over = (len(moved) - 1) // (len(points) - 1)
         for name, track in (("command", points), ("response", moved[::over])):
             # How near the track comes to the one corner and to the end counts too.
-            missed = [
-                min(distance(np.array(point), *leg) for leg in pairwise(track))
-                for point in ((40.0, 40.0, 0.0), (60.0, 50.0, 0.0))
-            ]
-            theirs = max(contour_error_um(track, programmed).max_um, *(1e3 * each for each in missed))
+            missed = distances_from_polyline(np.array([[40.0, 40.0, 0.0], [60.0, 50.0, 0.0]]), track)
+            theirs = max(contour_error_um(track, programmed).max_um, 1e3 * missed.max())
             assert close(case["contour_error_um"][name], theirs, relative=0.01, absolute_um=0.05), (case, name)
         compared += 1
     assert compared == 7 + 6
@@ -177,14 +174,6 @@ def test_a_stated_uncertainty_is_part_of_the_feed_search(judged: Judged) -> None
     assert judged.conversion.ok
     assert report["worst_case"]["mode"] is not None
     assert report["worst_case"]["contour_error_um"]["response"] > report["cases"][0]["contour_error_um"]["response"]
-
-
-def distance(point: FloatArray, begin: FloatArray, end: FloatArray) -> float:
-    """From a point to a straight leg."""
-    along, offset = end - begin, point - begin
-    square = float(along @ along)
-    share = min(max(float(offset @ along) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    return float(np.linalg.norm(offset - share * along))
 
 
 def starved_points(cuts: list[Move], after: int, wait_s: float, rule: BlockEnd) -> tuple[FloatArray, int, int]:
