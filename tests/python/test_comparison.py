@@ -5,16 +5,17 @@ import re
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import acceptance
 import shapegcode as sg
 from judge import residual_um, response
 from shapegcode.shaping import design, machine_bands
+from test_judge_player import paper_path
 
 TABLES = Path(__file__).parents[2] / "docs" / "evidence" / "comparison.md"
 PAPER_PATH = Path(sg.__file__).parent / "data" / "paper_path.nc"
+UNSHAPED = np.pad(paper_path(200.0, 0.0, 1e-3), ((0, 0), (0, 1)))  # as programmed
 WIDE_UM = 1000.0  # contour tolerance that slows nothing
 
 
@@ -31,24 +32,6 @@ def judged(run: acceptance.Judged) -> acceptance.Figures:
     return acceptance.figures(run, blocks, programmed, "ceil")
 
 
-def unshaped() -> npt.NDArray[np.float64]:
-    """Set-points of the path as programmed: 50 ms to 200 mm/s and back, line, quarter of a circle, line."""
-    speed, ramp, radius = 200.0, 0.05, 20.0
-    length = 40.0 + radius * np.pi / 2
-    stop = length / speed
-    t = np.arange(0.0, stop + ramp + 1e-3, 1e-3)
-
-    def ramped(t: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        inside = np.clip(t, 0.0, ramp)
-        return np.asarray(speed / ramp * inside**2 / 2 + speed * np.clip(t - ramp, 0.0, None))
-
-    s = ramped(t) - ramped(t - stop)
-    angle = np.clip((s - 20.0) / radius, 0.0, np.pi / 2)
-    x = np.minimum(s, 20.0) + radius * np.sin(angle)
-    y = radius * (1.0 - np.cos(angle)) + np.clip(s - 20.0 - radius * np.pi / 2, 0.0, None)
-    return np.stack([x, y, np.zeros_like(x)], axis=1)
-
-
 def row(name: str) -> list[list[float]]:
     """The figures of a row of the first table, cell by cell."""
     text = TABLES.read_text(encoding="utf-8").split("PARALLEL.NC**")[0]
@@ -59,7 +42,7 @@ def row(name: str) -> list[list[float]]:
 @pytest.mark.parametrize(("contour", "share"), [("off", 0.05), ("response", 0.1)])
 def test_exact_shapers_leave_next_to_nothing_of_the_vibration_of_the_path(contour: str, share: float) -> None:
     run = converted("non-negative", contour)
-    before = residual_um(unshaped(), run.modes, 1e-3)
+    before = residual_um(UNSHAPED, run.modes, 1e-3)
     assert before[:2] == pytest.approx([row("as programmed")[2][0], row("as programmed")[3][0]], rel=0.02)
     assert (judged(run).residual[:2] < share * before[:2]).all()
 
@@ -67,7 +50,7 @@ def test_exact_shapers_leave_next_to_nothing_of_the_vibration_of_the_path(contou
 @pytest.mark.parametrize("family", ["smooth-zv", "mirrored"])
 def test_so_do_kernels_and_mirrored_taps(family: str) -> None:
     run = converted(family)
-    before = residual_um(unshaped(), run.modes, 1e-3)
+    before = residual_um(UNSHAPED, run.modes, 1e-3)
     assert (judged(run).residual[:2] < 0.05 * before[:2]).all()
 
 
@@ -99,6 +82,6 @@ def test_the_minimal_shaper_loses_its_zeros_on_the_block_grid() -> None:
 
 
 def test_the_judge_finds_the_vibration_of_the_path_as_programmed() -> None:
-    _, command, table = response(unshaped(), [(46.0, 0.02), (131.0, 0.02), None], 1e-3)
+    _, command, table = response(UNSHAPED, [(46.0, 0.02), (131.0, 0.02), None], 1e-3)
     peak = 1e3 * np.abs(table - command).max(axis=0)
     assert peak[:2] == pytest.approx(row("as programmed")[4], rel=0.02)

@@ -10,7 +10,6 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from scipy.signal import lsim
 
 import shapegcode as sg
 from shapegcode.cli import main
@@ -19,6 +18,7 @@ from shapegcode.results import plot as canvas
 from shapegcode.results.json import schema
 from shapegcode.shaping.bands import machine_bands
 from shapegcode.verdict.figures import stated_cases
+from tap_truth import TrueMode, acceleration
 
 PERIOD_S = 1.0 / 2048.0
 TWO = ((46.0, 0.02, 120.0), (131.0, 0.03, 60.0))
@@ -36,15 +36,8 @@ def pulse(samples: int, newton: float = 500.0) -> FloatArray:
 
 
 def response(force: FloatArray, modes: Sequence[tuple[float, float, float]], snr_db: float, seed: int) -> FloatArray:
-    """Acceleration by SciPy, fine enough that its way between samples does not matter, with white noise."""
-    fine = 8
-    t = np.arange(len(force) * fine) * PERIOD_S / fine
-    forces = np.interp(t, np.arange(len(force)) * PERIOD_S, force)
-    total = np.zeros(len(t))
-    for hertz, zeta, mass in modes:
-        omega = 2.0 * math.pi * hertz
-        total += lsim(([1.0 / mass, 0.0, 0.0], [1.0, 2.0 * zeta * omega, omega**2]), forces, t)[1]
-    sampled = total[::fine]
+    """Acceleration with white noise."""
+    sampled = acceleration([TrueMode(*mode) for mode in modes], force, PERIOD_S)
     noise = np.random.default_rng(seed).normal(size=len(sampled))
     return np.asarray(sampled + noise * np.sqrt(np.mean(sampled**2)) * 10.0 ** (-snr_db / 20.0))
 
@@ -262,8 +255,8 @@ def test_bad_input_is_told_in_the_json_too(
 
 def test_what_the_user_says_of_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     force = pulse(2048)
-    acceleration = response(force, TWO, 40.0, 1)
-    values = np.column_stack([acceleration / 9.80665, np.arange(2048) * PERIOD_S * 1e3, force / 1e3])
+    answer = response(force, TWO, 40.0, 1)
+    values = np.column_stack([answer / 9.80665, np.arange(2048) * PERIOD_S * 1e3, force / 1e3])
     file = tmp_path / "columns.csv"
     np.savetxt(file, values, delimiter=";", header="a;b;c", comments="", fmt="%.9g")
     result = asked(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+import tap_truth
 from shapegcode.errors import RecordError
 from shapegcode.identification.checks import Prepared, excited_hz, find_hits, is_clipped, prepare, split_hits
 from shapegcode.identification.plan import TapPlan, rapid_stop_program, recording_for, tap_plan
@@ -32,19 +33,7 @@ def half_sine(count: int, at: int, width: int, peak_n: float) -> FloatArray:
 
 
 def acceleration(force: FloatArray, modes: Modes = MODES, rate: float = RATE) -> FloatArray:
-    """Response of masses on springs, by SciPy."""
-    found = np.zeros(len(force))
-    for frequency, damping, mass in modes:
-        found += shaken(force, frequency, damping, rate) / mass
-    return found
-
-
-def shaken(push: FloatArray, frequency: float, damping: float, rate: float) -> FloatArray:
-    """Acceleration of a mass of 1 kg on a spring; the push is straight between the samples."""
-    omega = 2.0 * np.pi * frequency
-    system = ([1.0, 0.0, 0.0], [1.0, 2.0 * damping * omega, omega**2])
-    numerator, denominator, _ = signal.cont2discrete(system, 1.0 / rate, method="foh")
-    return np.asarray(signal.lfilter(numerator.ravel(), denominator, push))
+    return tap_truth.acceleration([tap_truth.TrueMode(*mode) for mode in modes], force, 1.0 / rate)
 
 
 def tap(
@@ -273,9 +262,7 @@ def rapid_stop(noise: float, seed: int, *, ramp_s: float = 0.1, rate: float = 40
     edges = [round(each * rate) for each in (0.2, 0.2 + ramp_s, 0.5, 0.5 + ramp_s)]
     command[edges[0] : edges[1]] = 4.0
     command[edges[2] : edges[3]] = -4.0
-    sensed = command.copy()
-    for frequency in (46.0, 131.0):
-        sensed -= 0.7 * shaken(command, frequency, 0.02, rate)
+    sensed = command - 0.7 * acceleration(command, ((46.0, 0.02, 1.0), (131.0, 0.02, 1.0)), rate)
     sensed += noise * np.random.default_rng(seed).normal(size=count)
     return Record("stop", 1.0 / rate, sensed), 0.5 + ramp_s
 
