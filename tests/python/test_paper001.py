@@ -8,6 +8,7 @@ import pytest
 from page_code import run_page
 from scipy.optimize import brentq
 
+from milling_brute_force import Cutter, turn
 from shapegcode.io.units import FloatArray
 
 
@@ -16,28 +17,13 @@ def corners() -> dict[int, Any]:
     return found
 
 
+TOOL = Cutter(8.0, 6, math.radians(50.0), 22.57 * 9.80665, -0.153, 0.41, -0.0775, local=False)
+
+
 def resultant_n(radial_depth_mm: float, feed_mm_per_min: float, rev_per_min: float) -> FloatArray:
-    """Resultant over one tooth pitch by discs of 0.05 mm: eq. 1 to 5, 8 and 9, k1 and k2 at the mean chip."""
-    radius, teeth, helix, depth = 4.0, 6, math.radians(50.0), 15.0
-    per_tooth = feed_mm_per_min / (teeth * rev_per_min)
-    begin, end = -0.5 * math.pi, math.asin(radial_depth_mm / radius - 1.0)
-    mean = per_tooth * (math.sin(end) - math.sin(begin)) / (end - begin)
-    k1, k2 = 22.57 * 9.80665 * mean**-0.153, 0.41 * mean**-0.0775
-    disc = 0.05
-    heights = np.arange(0.5 * disc, depth, disc)
-    pitch = 2.0 * math.pi / teeth
-    turned = pitch * np.arange(120) / 120
-    azimuth = (
-        heights[:, None, None] * math.tan(helix) / radius
-        - turned[None, :, None]
-        - pitch * np.arange(teeth)[None, None, :]
-    )
-    azimuth = (azimuth + math.pi) % (2.0 * math.pi) - math.pi
-    cutting = (azimuth >= begin) & (azimuth <= end)
-    tangential = np.where(cutting, k1 * per_tooth * np.cos(azimuth) * disc, 0.0)
-    x = (-tangential * np.sin(azimuth) - k2 * tangential * np.cos(azimuth)).sum(axis=(0, 2))
-    y = (tangential * np.cos(azimuth) - k2 * tangential * np.sin(azimuth)).sum(axis=(0, 2))
-    return np.asarray(np.hypot(x, y))
+    """Resultant over a revolution: eq. 1 to 5, 8 and 9, k1 and k2 at the mean chip."""
+    arc = np.array([[-0.5 * math.pi, math.asin(radial_depth_mm / 4.0 - 1.0), 0.0, 15.0]])
+    return np.hypot(*turn(TOOL, arc, feed_mm_per_min / (6 * rev_per_min)).force.T)
 
 
 def test_case_1_geometry() -> None:
