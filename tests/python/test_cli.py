@@ -13,7 +13,7 @@ import pytest
 import shapegcode as sg
 from acceptance import PROGRAMS
 from command import run, run_process
-from shapegcode.cli import COMMANDS, convert, interface_of
+from shapegcode.cli import COMMANDS, convert
 from shapegcode.cli.options import load_machine, overridden
 from shapegcode.results.json import schema
 
@@ -157,27 +157,6 @@ def test_options_that_stand_for_a_key_of_the_machine(words: str, key: str, value
     machine = sg.Machine.load("vx500")
     assert overridden(load_machine(args), args, convert.MACHINE_KEYS) == machine.with_values(key, value)
     assert key in {word for action in parser._actions for word in (action.help or "").split()}
-
-
-def test_an_option_has_one_name_and_one_unit_on_every_command() -> None:
-    found: dict[str, set[tuple[object, object]]] = {}
-
-    def look(parser: argparse.ArgumentParser) -> None:
-        for action in parser._actions:
-            if isinstance(action, argparse._SubParsersAction):
-                for each in action.choices.values():
-                    look(each)
-            elif action.option_strings and action.nargs != 0 and not action.choices:
-                found.setdefault(action.option_strings[-1], set()).add((action.metavar, action.type))
-
-    for command in COMMANDS:
-        parser = argparse.ArgumentParser()
-        interface_of(command).declare(parser)
-        look(parser)
-    # What is written has the name of what it is, and the program of a test cut its number.
-    written = {"--html", "--output", "--program"}
-    several = {option: rules for option, rules in found.items() if len(rules) > 1 and option not in written}
-    assert several == {}
 
 
 @pytest.mark.slow

@@ -64,7 +64,7 @@ def test_options_stand_in_groups() -> None:
 
 
 def test_a_name_means_the_same_everywhere() -> None:
-    by_option, by_dest = defaultdict(set), defaultdict(set)
+    by_option, by_dest, units = defaultdict(set), defaultdict(set), defaultdict(set)
     for _, parser in parsers():
         for action in parser._actions:
             for option in action.option_strings:
@@ -72,8 +72,12 @@ def test_a_name_means_the_same_everywhere() -> None:
                     by_option[option].add(action.dest)
             if action.option_strings:
                 by_dest[action.dest].add(next(o for o in action.option_strings if o.startswith("--")))
+                if action.nargs != 0 and not action.choices:
+                    units[action.option_strings[-1]].add((action.metavar, action.type))
     assert not {option: dests for option, dests in by_option.items() if len(dests) > 1}
     assert not {dest: options for dest, options in by_dest.items() if len(options) > 1}
+    # What is written has the name of what it is, and the program of a test cut its number.
+    assert {option for option, each in units.items() if len(each) > 1} <= {"--html", "--output", "--program"}
 
 
 def test_quiet_says_the_answer_and_verbose_everything(tmp_path: Path) -> None:
