@@ -169,9 +169,6 @@ def _listed(found: Iterable[Finding], source: str) -> tuple[Finding, ...]:
     return tuple(listed)
 
 
-# ---- the text, and findings of the reader --------------------------------------------------------------------
-
-
 def _own_text(data: bytes, wanted: int | str | None, source: str) -> tuple[bytes, int]:
     """The requested program of a multi-program file, and the number of lines before it; else the whole file."""
     try:
@@ -225,9 +222,6 @@ def _reader_findings(program: Program) -> Iterator[Finding]:
     for line, column, alarm, message, file in program.core.warnings:
         severity = "warning" if _NOT_AS_WRITTEN.search(message) else "note"
         yield _finding(severity, "reader", alarm, file or program.source, line, column, message)
-
-
-# ---- execution of an accepted program -------------------------------------------------------------------------
 
 
 def _feed_findings(program: Program, machine: Machine, table: BlockTable) -> Iterator[Finding]:

@@ -31,7 +31,6 @@ _RESOLUTION_S = _PERIOD_S * _SLOW_MOTION
 _NO_LIMIT = 1e12
 _ROUNDING = 1e-6
 _PERIOD_SLACK = 1e-5
-_MAX_LINES = 20
 
 # Effects of a stop between two cutting moves, worst first.
 _STOPS = "the control stops reading ahead, and the tool stops in the cut"
@@ -146,7 +145,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
                 int(line[short_at[first_short]]) if shorts else 0,
             )
         )  # fmt: skip
-    firsts = tuple(line[short_at[:_MAX_LINES]].tolist())
+    firsts = tuple(line[short_at[:20]].tolist())
     return BlockTable(tuple(runs), lines, lines_of[_RAPID], lines_of[_DWELL], firsts, clamped)
 
 
@@ -161,15 +160,12 @@ def _shaper_s(program: Program, machine: Machine) -> float:
 
 def _clamped_feeds(line: npt.NDArray[np.int64], feed: FloatArray, ratio: FloatArray) -> Iterator[ClampedFeed]:
     feeds, group = np.unique(feed.round(3), return_inverse=True)
-    if feeds.size == 0:
-        return
     least = np.full(feeds.size, np.inf)
     np.minimum.at(least, group, ratio)
     first = np.full(feeds.size, np.iinfo(np.int64).max)
     np.minimum.at(first, group, line)
-    blocks = np.bincount(group)
-    for k in range(feeds.size):
-        yield ClampedFeed(float(feeds[k]), int(first[k]), int(blocks[k]), float(feeds[k] * least[k]))
+    columns = feeds, first, np.bincount(group), feeds * least
+    yield from (ClampedFeed(*row) for row in zip(*(column.tolist() for column in columns), strict=True))
 
 
 def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDArray[Any]:

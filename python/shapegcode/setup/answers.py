@@ -33,10 +33,8 @@ _LIKELY = {
     "max_acceleration_mm_s2": (50.0, 100_000.0, "unit: mm/s²; 3 m/s² are 3000, 1 g is 9810"),
 }
 """Plausible range of an axis value: outside of it the unit is wrong."""
-_MODE = re.compile(r"\s*\d+(\.\d*)?\s*(:\s*\d*\.?\d+)?\s*")
-
-
 _NOT_A_MODE = ' (nor "FREQUENCY:DAMPING", "rigid" or "unknown")'
+_MODE = re.compile(r"\s*\d+(\.\d*)?\s*(:\s*\d*\.?\d+)?\s*")
 
 
 class AnswersError(FileError):

@@ -16,8 +16,6 @@ from shapegcode.setup.result import MachineSetup, OpenQuestion
 
 _ANSWERED = "answered"
 _IN_WORDS = {"name": "name", "control": "description"}
-_ASSUMED_RAPID_MM_PER_MIN = 24_000.0
-_ASSUMED_MM_S2 = 3000.0
 _LOOK_AHEAD = {"G05.1": (["G05.1 Q0"], ["G05.1 Q1"]), "G08": (["G08 P0"], ["G08 P1"])}
 _LIMITS = ("max_feed_mm_per_min", "rapid_mm_per_min", "max_acceleration_mm_s2")
 
@@ -137,11 +135,11 @@ def _plain(answers: Answers) -> Machine:
     axes: dict[str, Any] = {}
     remarks = {}
     for axis in "xyz":
-        own = _ASSUMED_RAPID_MM_PER_MIN if rapid is None else getattr(rapid, axis)
+        own = 24_000.0 if rapid is None else getattr(rapid, axis)
         limits = {
             "max_feed_mm_per_min": (feed, own, "the rapid rate"),
             "rapid_mm_per_min": (rapid, own, "24 m/min, usual for a machining centre"),
-            "max_acceleration_mm_s2": (acceleration, _ASSUMED_MM_S2, "0.3 g, usual for a machining centre"),
+            "max_acceleration_mm_s2": (acceleration, 3000.0, "0.3 g, usual for a machining centre"),
         }
         axes[axis] = {}
         for name, (answer, assumed, why) in limits.items():

@@ -20,13 +20,11 @@ from shapegcode.model.stream import KINDS, Chunk
 from shapegcode.results.outcome import Xyz
 from shapegcode.simulation.result import Motion
 
-_BUCKETS = 4000
-
 
 class MotionEnvelope:
     """Minimum and maximum of several curves over equal intervals, as short as the limit of their number allows."""
 
-    def __init__(self, most: int = _BUCKETS) -> None:
+    def __init__(self, most: int = 4000) -> None:
         """Create an envelope of at most *most* whole intervals, 2 or more; the last samples may form one more."""
         self._most = most
         self._low = self._high = self._rest = np.empty((0, 0))
@@ -134,10 +132,6 @@ class MotionRecorder:
         )
 
 
-_COPY_BYTES = 1 << 20
-_ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # equal motions give equal bytes
-
-
 WriteMotion = Callable[[Chunk], None]  # appends the rows of a chunk to a file
 
 
@@ -156,48 +150,6 @@ def _csv(stream: BinaryIO) -> WriteMotion:
     return write
 
 
-class _Npz:
-    """One temporary file per column, joined at the end, as an archive stores columns one after the other."""
-
-    def __init__(self, folder: Path | None, files: contextlib.ExitStack) -> None:
-        self._folder = folder
-        self._files = files
-        self._columns: dict[str, tuple[BinaryIO, np.dtype[np.generic]]] = {}
-        self._rows = 0
-
-    def write(self, chunk: Chunk) -> None:
-        for name, column in {**chunk.columns(), "kind": chunk.kind}.items():
-            if name not in self._columns:
-                # Deleted when the stack closes it.
-                file = self._files.enter_context(tempfile.TemporaryFile(dir=self._folder))  # noqa: SIM115
-                self._columns[name] = (file, column.dtype)
-            self._columns[name][0].write(np.ascontiguousarray(column).data)
-        self._rows += len(chunk)
-
-    def finish(self, stream: BinaryIO) -> None:
-        with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
-            for name, (file, dtype) in self._columns.items():
-                file.seek(0)
-                with archive.open(_member(name), "w", force_zip64=True) as member:
-                    _header(member, dtype, (self._rows,))
-                    shutil.copyfileobj(file, member, _COPY_BYTES)
-            names = np.array(KINDS)
-            with archive.open(_member("kind_names"), "w") as member:
-                _header(member, names.dtype, names.shape)
-                member.write(names.tobytes())
-
-
-def _member(name: str) -> zipfile.ZipInfo:
-    return zipfile.ZipInfo(f"{name}.npy", date_time=_ZIP_DATE)
-
-
-def _header(stream: object, dtype: np.dtype[np.generic], shape: tuple[int, ...]) -> None:
-    description: dict[str, object] = {
-        "descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape,
-    }  # fmt: skip
-    np.lib.format.write_array_header_1_0(stream, description)  # type: ignore[arg-type]
-
-
 @contextlib.contextmanager
 def csv_file(path: str | Path) -> Iterator[WriteMotion]:
     """Open a CSV file for `kind` and `Chunk.columns`, with a header; ``-`` is standard output."""
@@ -213,8 +165,32 @@ def csv_file(path: str | Path) -> Iterator[WriteMotion]:
 def npz_file(path: str | Path) -> Iterator[WriteMotion]:
     """Open a NumPy archive for `Chunk.columns` and `kind`; until it is closed, it uses disk space of twice its size."""
     target = Path(path).resolve()
+    # Temporary files are in the folder of the archive, which has space, unless the path is that of a device.
+    folder = target.parent if target.is_file() or not target.exists() else None
+    # One file per column, joined at the end, as an archive stores columns one after the other.
+    parts: dict[str, tuple[BinaryIO, np.dtype[np.generic]]] = {}
+    rows = 0
+
     with named_errors(path), contextlib.ExitStack() as files, replaced_file(path) as stream:
-        # Temporary files are in the folder of the archive, which has space, unless the path is that of a device.
-        npz = _Npz(target.parent if target.is_file() or not target.exists() else None, files)
-        yield npz.write
-        npz.finish(stream)
+
+        def write(chunk: Chunk) -> None:
+            nonlocal rows
+            for name, column in {**chunk.columns(), "kind": chunk.kind}.items():
+                if name not in parts:
+                    # Deleted when the stack closes it.
+                    parts[name] = files.enter_context(tempfile.TemporaryFile(dir=folder)), column.dtype
+                parts[name][0].write(np.ascontiguousarray(column).data)
+            rows += len(chunk)
+
+        yield write
+        with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
+            for name, (file, dtype) in parts.items():
+                file.seek(0)
+                # A ZipInfo without a time: equal motions give equal bytes.
+                with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as member:
+                    descr = np.lib.format.dtype_to_descr(dtype)
+                    header = {"descr": descr, "fortran_order": False, "shape": (rows,)}
+                    np.lib.format.write_array_header_1_0(member, header)
+                    shutil.copyfileobj(file, member)
+            with archive.open(zipfile.ZipInfo("kind_names.npy"), "w") as member:
+                np.lib.format.write_array(member, np.array(KINDS))

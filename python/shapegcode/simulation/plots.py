@@ -10,6 +10,7 @@ import numpy as np
 
 from shapegcode.io.units import FloatArray
 from shapegcode.results import plot
+from shapegcode.results.motion_plots import MOVES_MM
 from shapegcode.results.outcome import Plot
 from shapegcode.results.path_plots import RECORD_SAMPLES, SimulatedRegion, motion_pictures
 from shapegcode.simulation.result import Motion, Simulation
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 
 _COMMAND, _RESPONSE = plot.COLOURS[1], plot.COLOURS[0]
-_MOVES_MM = 1e-9
 _DENSE = 0.2  # median width of a dense band, relative to the range of its curve
 # Label of the axis, factor from the curve's own unit, and curves: number, colour, name.
 _Row = tuple[str, float, tuple[tuple[int, str, str], ...]]
@@ -63,7 +63,7 @@ def plot_motion(motion: Motion, ax: Axes | None = None) -> Axes:
     """
     low, high = motion.low, motion.high
     travel = high[:, 0].max(axis=0) - low[:, 0].min(axis=0)
-    moving = [axis for axis in range(3) if travel[axis] > _MOVES_MM] or [0]
+    moving = [axis for axis in range(3) if travel[axis] > MOVES_MM] or [0]
     shown = _ROWS if motion.largest_motor_force_n is not None else _ROWS[:-1]
     part = Path(motion.program).name + ("" if motion.lines is None else ", lines {} to {}".format(*motion.lines))
     size_inch = (3.4 + 3.6 * len(moving), 1.6 + 1.7 * len(shown))
