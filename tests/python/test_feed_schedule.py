@@ -104,7 +104,7 @@ def test_the_feed_that_the_machine_runs_keeps_the_limit(time_constant_s: float) 
     window = 1  # 12000 rev/min, six teeth: 0.83 ms
     speed = (travelled[window:] - travelled[:-window]) / (window * period) * 60.0
     plan = result.plans[0]
-    track = plan.surveyed.track
+    track = result.survey.regions[0].track
     down = float(track.s_mm[np.flatnonzero(np.asarray(track.segment) > 0)[0] - 1])
     stations = np.asarray(track.s_mm) - down
     at = np.clip(np.searchsorted(stations, travelled[window:]), 0, len(stations) - 1)

@@ -56,8 +56,7 @@ class PathLoad(Pair[Load]):
 def region_load(
     part: SurveyedRegion, plan: FeedPlan | None, written: _core.Path, *, before: Mover, after: Mover
 ) -> PathLoad | None:
-    """Load along a cut for the original and the emitted program; None if engagement or spindle speed is not
-    known."""
+    """Load along a cut for the original and the emitted program; None if engagement or spindle speed is unknown."""
     if part.track is None or part.tool is None or not part.spindle_rev_per_min > 0.0 or len(part.track) == 0:
         return None
     stations = np.asarray(part.track.s_mm)
@@ -100,8 +99,7 @@ def exceeded(tool: Tool, load: Load, machine: Machine) -> Iterator[tuple[str, st
 
 @dataclass(frozen=True)
 class FeedTraces:
-    """A schedule along the cutting path, all cuts in sequence; each value applies to the interval before its
-    station."""
+    """A schedule along the path, all cuts in sequence; each value applies to the interval before its station."""
 
     distance_mm: Vector  # end of each interval, (n,)
     length_mm: Vector  # of each interval, (n,)
@@ -201,9 +199,8 @@ def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTrac
     bands = [np.asarray(part.track.arcs)[:, 2:] for part in parts if part.track is not None]
     cut = np.concatenate([*bands, np.empty((0, 2))])
     # Between the lowest and the highest engagement above the tip.
-    height = (
-        np.linspace(float(cut[:, 0].min()), float(cut[:, 1].max()), _ROWS) if len(cut) else np.linspace(0, 1, _ROWS)
-    )
+    lowest, highest = (cut[:, 0].min(), cut[:, 1].max()) if len(cut) else (0.0, 1.0)
+    height = np.linspace(lowest, highest, _ROWS)
     maps = [(each, np.full((len(chosen), _ROWS), np.nan)) for each in (traces.load.original, traces.load.emitted)]
     owner = np.searchsorted(traces.begins, chosen, side="right") - 1
     for number, part in enumerate(parts):

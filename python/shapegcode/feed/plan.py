@@ -90,13 +90,10 @@ def travel_emitted(
 class FeedPlan:
     """Feeds of a region."""
 
-    surveyed: SurveyedRegion  # the region with its engagement
     limit_mm_per_min: Vector  # largest feed allowed on the interval before each station, (n,)
     holds: npt.NDArray[np.str_]  # reason of that feed, (n,) names
     kept: tuple[str, ...]  # why each segment's feed stays; empty if it may change
     stretches: tuple[_core.FeedStretch, ...]  # the feeds to write
-    # stations where even the lowest feed exceeds the limits, (n,) of bool
-    held_at_minimum: npt.NDArray[np.bool_]
 
 
 def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:
@@ -139,7 +136,6 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
     lowest = (feed_unit_mm_per_min * np.ceil(slowest / feed_unit_mm_per_min - 1e-9))[segment]  # to the resolution of F
     limit, holds, load = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
     frozen = np.array([bool(reason) for reason in kept])
-    at_minimum = (holds == MINIMUM) & ~frozen[segment]
     limit = np.where(frozen[segment], programmed[segment], limit)
     holds[frozen[segment]] = KEPT
     # Plan, simulate the travel, and slow down earlier or more where it is still too fast.
@@ -165,7 +161,7 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divis
         if attempt >= _LOWERING:
             planned[over] *= np.maximum(load[over] / run[over], _MIN_SHARE)
             planned = np.maximum(planned, floor)
-    return FeedPlan(surveyed, limit, holds, kept, tuple(stretches), at_minimum)
+    return FeedPlan(limit, holds, kept, tuple(stretches))
 
 
 def _kept_segments(surveyed: SurveyedRegion, programmed: Vector, lowest: float) -> tuple[str, ...]:
@@ -184,8 +180,7 @@ def _kept_segments(surveyed: SurveyedRegion, programmed: Vector, lowest: float) 
 def _limits_along(
     surveyed: SurveyedRegion, programmed: Vector, lowest: Vector, machine: Machine, margin: float
 ) -> tuple[Vector, npt.NDArray[np.str_], Vector]:
-    """Desired feed in the interval before each station, the limit that determines it, and the feed that the load
-    allows."""
+    """Desired feed in the interval before each station, its limit, and the feed that the load allows."""
     tool, track = surveyed.tool, surveyed.track
     assert tool is not None and track is not None
     axes = machine.axes

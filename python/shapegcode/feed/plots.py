@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode._core import Region
 from shapegcode.feed.load import LOADS, FeedTraces, envelope, groups
+from shapegcode.feed.plan import Vector
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.results import plot
 from shapegcode.results.outcome import Plot
@@ -23,11 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
 
-Vector = npt.NDArray[np.float64]
 _BEFORE, _AFTER = plot.COLOURS[0], plot.COLOURS[1]
-_LIMIT = "#000000"
-_BEYOND = plot.COLOURS[0]
-_BANDS = 1500
 _PIECES = 20000
 _LOGARITHMIC = 8.0  # ratio of largest to lowest feed from which the axis is logarithmic
 _MINOR = "235"  # first digits of labels between powers of ten on a logarithmic axis
@@ -36,7 +32,6 @@ _STACKED = 1.9  # width over height of the part from which the two paths are sta
 _MARGIN = 0.03  # around the part, of its longer side
 _GROUND = 300  # cells of the background along the longer side
 _ALWAYS = ("peak_resultant_n", "mean_resultant_n")
-_NO_WALL = "#c9c9c9"
 _ALONG_PATH = "distance along the cutting path in mm"
 
 
@@ -87,7 +82,7 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
         ax, 3 + len(loads), size_inch=(11.0, 1.2 + 1.55 * (3 + len(loads))),
         title="Feed and force along the cutting path", part=_summary(schedule), xlabel=_ALONG_PATH,
     )  # fmt: skip
-    along = _Along(traces, groups(traces.distance_mm, _BANDS))
+    along = _Along(traces, groups(traces.distance_mm, 1500))
     along.draw(panels[0], traces.radial_depth_mm, plot.COLOURS[2], "radial depth", filled=True)
     along.draw(panels[1], traces.section_mm2, plot.COLOURS[2], "section of the cut", filled=True)
     panels[0].set_ylabel("radial depth\nin mm")
@@ -104,7 +99,7 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
         limit = traces.limit[name]
         if len(values := np.unique(limit[np.isfinite(limit)])):
             label = f"limit {plot.number(values[0], 4)} {unit}" if len(values) == 1 else "limit"
-            along.draw(panel, np.where(np.isfinite(limit), limit, np.nan), _LIMIT, label, dashed=True)
+            along.draw(panel, np.where(np.isfinite(limit), limit, np.nan), "#000000", label, dashed=True)
         panel.set_ylim(bottom=0.0)
         panel.set_ylabel(f"{words}\nin {unit}")
         plot.legend_above(panel)
@@ -139,7 +134,7 @@ class _Along:
     ) -> None:  # fmt: skip
         low, high = envelope(values, self._starts)
         if self._bands and not dashed:
-            band = np.concatenate([low, low[-1:]]), np.concatenate([high, high[-1:]])
+            band = np.append(low, low[-1]), np.append(high, high[-1])
             panel.fill_between(self._edges, *band, step="post", color=colour, linewidth=0, alpha=0.55)
         if filled:
             panel.fill_between(
@@ -208,7 +203,7 @@ def _coloured_path(panel: Axes, traces: FeedTraces, force_n: Vector, norm: Any) 
     order, empty = order[force[order] >= 0.0], order[force[order] < 0.0]
     panel.add_collection(LineCollection(list(lines[empty]), colors=plot.GREY, linewidths=0.7, rasterized=True))
     coloured = LineCollection(
-        list(lines[order]), array=force[order], cmap=colormaps["YlGnBu"].with_extremes(over=_BEYOND), norm=norm,
+        list(lines[order]), array=force[order], cmap=colormaps["YlGnBu"].with_extremes(over=plot.COLOURS[0]), norm=norm,
         linewidths=2.2, rasterized=True, capstyle="round",
     )  # fmt: skip
     panel.add_collection(coloured)
@@ -268,7 +263,7 @@ def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     for panel, (name, values) in zip(panels, maps.items(), strict=False):
         panel.grid(False)
         panel.spines[["top", "right"]].set_visible(True)
-        panel.set_facecolor(_NO_WALL)
+        panel.set_facecolor("#c9c9c9")
         mesh = panel.pcolormesh(
             walls.edges_mm, levels, np.ma.masked_invalid(values.T), cmap=both, vmin=low, vmax=high, rasterized=True,
         )  # fmt: skip
@@ -316,7 +311,7 @@ def with_forces(scene: Scene, schedule: FeedSchedule) -> Scene:
     return replace(scene, variants=tuple(variants))
 
 
-def _along(variant: Variant, known: Sequence[tuple[Region, Vector, Vector]]) -> Vector:
+def _along(variant: Variant, known: Sequence[tuple[_core.Region, Vector, Vector]]) -> Vector:
     force = np.zeros(len(variant.sample))
     travel = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(variant.command_mm, axis=0), axis=1))])
     for region, stations_mm, values_n in known:

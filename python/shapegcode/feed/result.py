@@ -20,7 +20,6 @@ from shapegcode.results.page.scene import Scene
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
-_SHOWN_RANGES = 24
 _SHOWN_MISSES = 3
 _LIMIT_WORDS = {
     "resultant": "resultant force",
@@ -248,7 +247,7 @@ class FeedSchedule(Result):
         return Table(title, columns, rows, sections=(len(LOADS) + 1,))
 
     def _limit_table(self) -> Table:
-        slowest = sorted(self.limits, key=lambda entry: entry.feed_mm_per_min.min)[:_SHOWN_RANGES]
+        slowest = sorted(self.limits, key=lambda entry: entry.feed_mm_per_min.min)[:24]
         title = "what limits the feed"
         if len(self.limits) > len(slowest):
             title += f" (the {len(slowest)} slowest of {len(self.limits)} ranges; --json has all)"

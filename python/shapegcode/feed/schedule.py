@@ -33,7 +33,6 @@ MARGIN = 0.015  # safety margin to each limit of the load, for errors of the mod
 
 _SWEEPING = 0.5  # fraction of the progress bar
 _PLANNING = 0.7  # fraction of the rest
-_SAME_PLACE_INCREMENTS = 1.0
 _NEEDS_FEED = re.compile(rb"F|G0*[123](?!\d)|G\s*[78]\d|G\s*6[56]|M\s*\d*9[789]|[#<]")  # cuts, cycles, calls
 
 Progress = Callable[[float], None]
@@ -76,15 +75,14 @@ def schedule_feed(
     machine = Machine.of(machine)
     program = program_for_conversion(program, machine)
     program.refuse_shaped("other feeds would undo that; take the original, convert --feed-schedule does both")
-
-    def swept(done: int, total: int) -> None:
-        on_progress(_SWEEPING * done / max(total, 1))
-
-    def scheduled(done: float) -> None:
-        on_progress(_SWEEPING + (1.0 - _SWEEPING) * done)
-
-    surveyed = survey(program, machine, tools, stock, resolution_mm=resolution_mm, on_progress=swept)
-    return schedule_survey(surveyed, machine, motion=motion, margin=margin, on_progress=scheduled)
+    surveyed = survey(
+        program, machine, tools, stock, resolution_mm=resolution_mm,
+        on_progress=lambda done, total: on_progress(_SWEEPING * done / total),
+    )  # fmt: skip
+    return schedule_survey(
+        surveyed, machine, motion=motion, margin=margin,
+        on_progress=lambda done: on_progress(_SWEEPING + (1.0 - _SWEEPING) * done),
+    )  # fmt: skip
 
 
 def schedule_survey(
@@ -209,7 +207,7 @@ def _read_back(text: bytes, program: Program, first_lines: Sequence[int], machin
         increment = least_increment_mm(machine, before.exit.units)
         off = max(abs(float(d)) for d in before.path[-1].end_mm - after.path[-1].end_mm)
         longer = abs(before.path.length_mm - after.path.length_mm)
-        if after.first_line != line or off > 1e-6 or longer > _SAME_PLACE_INCREMENTS * increment * len(after.path):
+        if after.first_line != line or off > 1e-6 or longer > increment * len(after.path):
             raise RoundTripError(
                 f"{program.lines(before)}: written from line {line}, read back from line {after.first_line}; ends "
                 f"{off:g} mm apart, lengths differ by {longer:g} mm"
@@ -232,8 +230,9 @@ def feed_figures(
     program = surveyed.program
     moves = tuple(_move(move, machine) for move in surveyed.moves)
     parts = list(zip(surveyed.regions, plans, loads, strict=True))
-    placed = [(_places(program, part), load) for part, _, load in parts if load is not None]
-    placed += [(_place(move.place), move.load) for move in moves if move.load is not None]
+    placed: list[tuple[SurveyedRegion | result.KeptMove, PathLoad]]
+    placed = [(part, load) for part, _, load in parts if load is not None]
+    placed += [(move, move.load) for move in moves if move.load is not None]
     known = [load for _, load in placed]
     excess = max((share for part, plan, load in parts for _, share in _misses(part, plan, load, machine)), default=0.0)
     return FeedSchedule(
@@ -243,7 +242,7 @@ def feed_figures(
         margin=margin,
         feed_mm_per_min=_feeds(surveyed, plans),
         resultant_force_n=_resultants(known),
-        peak=result.PeakLoads(**{column: _peak(column, placed) for column in LOADS}),
+        peak=result.PeakLoads(**{column: _peak(column, placed, program) for column in LOADS}),
         cycle_time_s=cycle_time_s,
         air_time_s=Pair(
             sum(_air_time(load.original) for load in known), sum(_air_time(load.emitted) for load in known)
@@ -315,9 +314,6 @@ def _misses(
         yield message, float(values[helped].max(initial=0.0)) / limit - 1.0
 
 
-# --- loads ------------------------------------------------------------------------------------------------------------
-
-
 def _resultants(loads: Sequence[PathLoad]) -> Pair[result.ResultantForce]:
     return Pair(_resultant([load.original for load in loads]), _resultant([load.emitted for load in loads]))
 
@@ -332,32 +328,28 @@ def _resultant(loads: Sequence[Load]) -> result.ResultantForce:
     return result.ResultantForce(impulse / time if time > 0.0 else 0.0, largest)
 
 
-def _peak(column: str, loads: Sequence[tuple[Callable[[int], str], PathLoad]]) -> result.PeakLoad:
-    """Largest value of a column before and after, and where; *loads*: each with a function that locates a station."""
+def _peak(
+    column: str, loads: Sequence[tuple[SurveyedRegion | result.KeptMove, PathLoad]], program: Program
+) -> result.PeakLoad:
+    """Largest value of a column before and after, and where."""
     original, emitted, place = 0.0, 0.0, ""
-    for place_of, load in loads:
+    for part, load in loads:
         was, now = getattr(load.original, column), getattr(load.emitted, column)
         original = max(original, float(was.max(initial=0.0)))
         if len(now) and float(now.max()) > emitted:
-            emitted, place = float(now.max()), place_of(int(np.argmax(now)))
+            emitted, place = float(now.max()), _place(program, part, int(np.argmax(now)))
     return result.PeakLoad(original, emitted, place)
 
 
-def _places(program: Program, part: SurveyedRegion) -> Callable[[int], str]:
+def _place(program: Program, part: SurveyedRegion | result.KeptMove, station: int) -> str:
+    if isinstance(part, result.KeptMove):
+        return part.place
     assert part.track is not None
-    lines, segment = part.region.path.segment_lines, part.track.segment
-    return lambda station: program.place(int(lines[segment[station]]))
-
-
-def _place(place: str) -> Callable[[int], str]:
-    return lambda _station: place
+    return program.place(int(part.region.path.segment_lines[part.track.segment[station]]))
 
 
 def _air_time(load: Load) -> float:
     return float(load.time_s[load.peak_resultant_n <= _AIR_N].sum())
-
-
-# --- feeds ------------------------------------------------------------------------------------------------------------
 
 
 def _feeds(surveyed: Survey, plans: Plans) -> result.FeedRange:
@@ -410,9 +402,6 @@ def _feeds_of_segments(plan: FeedPlan, path: _core.Path) -> list[list[float]]:
     return [feeds[min(a, most) : min(b, most) + 1] for a, b in zip(first, last, strict=True)]
 
 
-# --- warnings ---------------------------------------------------------------------------------------------------------
-
-
 def _warnings(surveyed: Survey, plans: Plans, moves: Sequence[result.KeptMove], machine: Machine) -> Iterator[str]:
     program = surveyed.program
     yield from program.warnings
@@ -430,7 +419,7 @@ def _warnings(surveyed: Survey, plans: Plans, moves: Sequence[result.KeptMove], 
             yield f"{place} keep their feeds: {part.kept}"
         if plan is not None:
             yield from _kept_blocks(program.place, part, plan)
-            if plan.held_at_minimum.any():
+            if (plan.holds == MINIMUM).any():
                 yield (
                     f"{place}: the limits need a feed below the lowest feed, which is written instead: reduce "
                     "the depth of cut"

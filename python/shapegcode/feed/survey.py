@@ -21,7 +21,6 @@ from shapegcode.program.compensation import program_for_conversion
 
 _COARSEST = 0.1  # coarsest resolution, relative to the smallest tool's radius
 _RESOLUTION_RATIO = 0.01  # default resolution, relative to the smallest tool's diameter
-Progress = Callable[[int, int], None]
 _SHOWN_COLLISIONS = 5
 _SLACK_MM = 1e-6
 _TOOL_CHANGE, _CLOCKWISE, _COUNTER_CLOCKWISE, _STOP = 6, 3, 4, 5
@@ -57,7 +56,7 @@ def survey(
     stock: Stock,
     *,
     resolution_mm: float | None = None,
-    on_progress: Progress = lambda _done, _total: None,
+    on_progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Survey:
     """Compute the tool engagement along a program.
 
@@ -136,7 +135,6 @@ class SurveyedRegion:
     """A sequence of cutting moves between two stops, with its engagement."""
 
     region: _core.Region  # region of the program
-    index: int  # index of the region
     tool: Tool | None  # the tool that cuts it; None: without a tool file, or not known
     track: _core.EngagementTrack | None  # engagement; None if unknown
     spindle_rev_per_min: float  # speed of the spindle, 0 if unknown
@@ -354,7 +352,7 @@ class Walk:
             elif not _core.feeds_per_minute(self._program.core, region):
                 kept = "not all of its feeds are per minute (G94) in one unit"
         sense = _core.SpindleSense.clockwise if tool is None else tool.sense(self._sense)
-        return SurveyedRegion(region, index, tool, track, speed, sense, kept, clear)
+        return SurveyedRegion(region, tool, track, speed, sense, kept, clear)
 
 
 class ZeroPoints:
