@@ -190,23 +190,17 @@ class _Choosing:
 Choices = Mapping[str, Sequence[object]]  # values to choose from, by key of the machine file
 Ranks = tuple[int, ...]
 
-_FAMILIES = ("auto", "zv", "mzv", "zvd", "ei", "ei2")
-_SHARES = (1.0, 0.75, 0.5)
-_ARC_FEEDS = (1.0, 0.9, 0.8)
-_POPULATION = 12
-_WHOLE = 1e-6
-
 
 def usual_choices(machine: Machine) -> dict[str, tuple[object, ...]]:
     """Default choices: block period, family, planned tolerance, and arc feed."""
     controller = machine.controller
-    least = max(1, math.ceil(controller.block_time_s / controller.interpolation_period_s - _WHOLE))
+    least = max(1, math.ceil(controller.block_time_s / controller.interpolation_period_s - 1e-6))
     ticks = sorted({least, least + 1, least + 2, math.ceil(1.5 * least), 2 * least})
     return {
         "emission.block_period_s": tuple(round(each * controller.interpolation_period_s, 12) for each in ticks),
-        "shaping.family": _FAMILIES,
-        "tolerance.contour_um": tuple(share * machine.tolerance.contour_um for share in _SHARES),
-        "shaping.arc_feed_ratio": _ARC_FEEDS,
+        "shaping.family": ("auto", "zv", "mzv", "zvd", "ei", "ei2"),
+        "tolerance.contour_um": tuple(share * machine.tolerance.contour_um for share in (1.0, 0.75, 0.5)),
+        "shaping.arc_feed_ratio": (1.0, 0.9, 0.8),
     }
 
 
@@ -251,7 +245,7 @@ def search(choices: Choices, most: int, seed: int, cost: Callable[[Ranks], float
     bounds = Bounds(np.zeros(len(sizes)), np.array(sizes) - 1.0)
     with contextlib.suppress(_EnoughError):
         differential_evolution(
-            asked, bounds, integrality=np.ones(len(sizes), dtype=bool), popsize=_POPULATION, maxiter=most, tol=0.0,
+            asked, bounds, integrality=np.ones(len(sizes), dtype=bool), popsize=12, maxiter=most, tol=0.0,
             polish=False, rng=np.random.default_rng(seed), x0=np.zeros(len(sizes)),
         )  # fmt: skip
     yield from known

@@ -18,9 +18,6 @@ from shapegcode.studies.result import Bins, MachineStudy, Optimum
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_BARS = 12
-_PANELS = 3
-
 
 def plots_of(study: MachineStudy | Optimum) -> dict[str, Plot]:
     """Pictures of a study or an optimisation, by name."""
@@ -39,7 +36,7 @@ def plot_tornado(study: MachineStudy, ax: Axes | None = None) -> Axes:
     Returns:
         The panel.
     """
-    rows = study.parameter_sensitivity[:_BARS]
+    rows = study.parameter_sensitivity[:12]
     panel = plot.axes(
         ax,
         size_inch=(9.0, 1.6 + 0.4 * len(rows)),
@@ -102,7 +99,7 @@ def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
         The uppermost panel.
     """
     key = study.parameter_sensitivity[0].key
-    curves = [bins for bins in study.curves if bins.key == key and bins.measure != SHARE][:_PANELS]
+    curves = [bins for bins in study.curves if bins.key == key and bins.measure != SHARE][:3]
     curves = curves or [bins for bins in study.curves if bins.key == key]
     panels = plot.column(
         ax, len(curves), size_inch=(8.0, 1.0 + 2.1 * len(curves)), part="median, and the band that contains 90 %",

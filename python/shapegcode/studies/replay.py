@@ -45,7 +45,6 @@ DEFAULT_MEASURES = ("residual_um", "contour_um", "time_s")
 CONTOURS = frozenset({"contour_um", "command_um", "response_um"})
 """If none of these is measured, the ratio to the limit is that of the residual vibration alone."""
 _WHOLE_RUN = frozenset({*CONTOURS, "peak_um", "cutting_time_s"})
-_FULL = 1.0
 
 
 def checked_measures(measure: Sequence[str]) -> tuple[str, ...]:
@@ -79,7 +78,7 @@ class Replay:
         of the emitted program on the machine for which it was converted.
         """
         self.machine, self._original, self._emitted, self._extents = machine, original, emitted, tuple(parts)
-        self.time_s = time_s
+        self.limits, self.time_s = tuple(limits), time_s
         regions = [original.regions[index] for index, _, _ in parts]
         self._parts = [
             _SimulatedPart(region, emitted.core.cutting_path(first, last), _core.ContourTracker(region.path), limit)
@@ -112,23 +111,12 @@ class Replay:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as bytes and numbers, for another process."""
-        limits = [part.limits for part in self._parts]
-        numbers = tuple((tuple(each.residual_um.tolist()), each.contour_um, each.target) for each in limits)
+        numbers = tuple((tuple(each.residual_um.tolist()), each.contour_um, each.target) for each in self.limits)
         texts = self._original.source, self._original.expanded_text, self._emitted.text
         return _replay, (self.machine.to_toml(short=True), *texts, self._extents, numbers, self.time_s)
 
-    @property
-    def contour_limit_um(self) -> float:
-        """Smallest contour limit of all cuts, µm."""
-        return min(part.limits.contour_um for part in self._parts)
-
-    @property
-    def residual_limit_um(self) -> float:
-        """Smallest residual limit of any axis, µm."""
-        return min(float(part.limits.residual_um.min()) for part in self._parts)
-
     def simulate(
-        self, machine: Machine, wanted: Collection[str], *, override: float = _FULL, times: bool = True
+        self, machine: Machine, wanted: Collection[str], *, override: float = 1.0, times: bool = True
     ) -> dict[str, float]:
         """Simulate the program on a machine; return the measures by name."""
         model = MachineModel(machine)
@@ -138,7 +126,7 @@ class Replay:
                 found[name] = found[name] + value if name == "cutting_time_s" else max(found[name], value)
         if "time_s" in found:
             found["time_s"] = self.time_s
-            if times or override != _FULL:
+            if times or override != 1.0:
                 controller = model.ordinary.model
                 controller.feed_override = override
                 found["time_s"] = float(_core.time_program(self._emitted.core, controller).total_s) + self._beyond_s
@@ -182,7 +170,6 @@ OVERRIDE = "times.feed_override_percent"  # if varied, the blocks are simulated 
 
 _AT_ONCE = 64  # maximum number of samples per task
 _SIMULATED_S = 900.0  # of motion in a task: short enough for progress and stopping
-_KEPT_TEXTS = 4
 
 
 @dataclass(frozen=True)
@@ -232,7 +219,7 @@ def simulate_all(
     return found
 
 
-@functools.lru_cache(maxsize=_KEPT_TEXTS)
+@functools.lru_cache(maxsize=4)
 def _replay(
     toml: str, source: str, original: bytes, emitted: bytes, extents: tuple[tuple[int, int, int], ...],
     limits: tuple[tuple[tuple[float, ...], float, Any], ...], time_s: float,

@@ -208,7 +208,7 @@ def _result(
     warnings += ["no Sobol indices: they need every sample"] if indices else []
     alone = replays.CONTOURS.isdisjoint(run.wanted)
     alone_warnings = ["no contour is measured: within tolerance means residual vibration alone"] if alone else []
-    shaped = [text.replay for text in texts if text.replay is not None]
+    limits = [each for text in texts if text.replay is not None for each in text.replay.limits]
     return results.MachineStudy(
         program=run.program.source if isinstance(run.program, Program) else run.program,
         machine=run.machine.name,
@@ -233,17 +233,11 @@ def _result(
         refused=tuple(results.RefusedDraws(toml(dict(text.values)), len(text.draws), text.why) for text in refused),
         warnings=(*alone_warnings, *(warnings if refused else ())),
         limits_um={
-            "residual_um": min(replay.residual_limit_um for replay in shaped),
-            "contour_um": min(replay.contour_limit_um for replay in shaped),
+            "residual_um": min(float(each.residual_um.min()) for each in limits),
+            "contour_um": min(each.contour_um for each in limits),
         },
         draws={each.key: np.array(column) for each, column in zip(run.varied, columns, strict=True)} | measured,
     )
-
-
-_BINS = 10
-_MIN_IN_BIN = 5
-_WITHIN = 1.0 + 1e-9
-_CONFIDENCE = 0.95
 
 
 def check_probability(name: str, value: object) -> None:
@@ -260,17 +254,15 @@ def quantity(name: str, values: FloatArray, nominal: float) -> results.Quantity:
 
 def within(shares: FloatArray) -> npt.NDArray[np.bool_]:
     """Mask of the samples that keep every limit; *shares*: the largest ratio to a limit, of each sample."""
-    return shares <= _WITHIN
+    return shares <= 1.0 + 1e-9
 
 
 def interval_of(good: int, count: int) -> tuple[float, float]:
     """Clopper and Pearson's interval of a probability, at 95 %."""
-    from scipy.stats import beta
+    from scipy.stats import binomtest
 
-    tail = (1.0 - _CONFIDENCE) / 2.0
-    low = beta.ppf(tail, good, count - good + 1) if good else 0.0
-    high = beta.ppf(1.0 - tail, good + 1, count - good) if good < count else 1.0
-    return float(low), float(high)
+    interval = binomtest(good, count).proportion_ci(0.95)
+    return float(interval.low), float(interval.high)
 
 
 def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple[results.BinQuantiles, ...]:
@@ -283,7 +275,7 @@ def bins_of(each: Varied, column: Sequence[object], values: FloatArray) -> tuple
         return tuple(_bin(float(rank), name, values[chosen]) for rank, name, chosen in groups if chosen)
     numbers = np.asarray(column, dtype=float)
     order = np.argsort(numbers, kind="stable")
-    count = max(1, min(_BINS, len(order) // _MIN_IN_BIN))
+    count = max(1, min(10, len(order) // 5))
     parts = ((float(np.median(numbers[part])), part) for part in np.array_split(order, count))
     return tuple(_bin(middle, f"{middle:.4g}", values[part]) for middle, part in parts)
 

@@ -17,7 +17,7 @@ shaping.family = ["zv", "zvd", "ei"]
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_origin
 
@@ -26,15 +26,20 @@ from pydantic import BeforeValidator, ConfigDict, Field, Strict, model_validator
 from shapegcode.errors import ArgumentError, FileError, Problem
 from shapegcode.machine import Machine
 from shapegcode.settings.describe import keys_schema, toml_schema
-from shapegcode.settings.keys import Bool, Float, InlineTable, Positive, Text, TomlTable, item_type, key, table_type
-from shapegcode.settings.load import KeyProblem, parsed, read_text, validated
+from shapegcode.settings.keys import Bool, Float, InlineTable, Positive, Text, TomlTable, key, table_type
+from shapegcode.settings.load import KeyProblem, field_of, parsed, read_text, validated
 from shapegcode.studies.optimize import USUAL_CONVERSIONS, USUAL_DRAWS
 from shapegcode.studies.replay import DEFAULT_MEASURES, MEASURES
 from shapegcode.studies.varied import MAX_DRAWS, Distribution, listed, lognormal, normal, uniform
 
-_KINDS = (("mean", "sd"), ("mean", "percent"), ("median", "percent"), ("low", "high"), ("one_of",))
+_KINDS: dict[tuple[str, ...], Callable[..., Distribution]] = {
+    ("mean", "sd"): normal,
+    ("mean", "percent"): normal,
+    ("median", "percent"): lognormal,
+    ("low", "high"): uniform,
+    ("one_of",): lambda one_of, known=None: listed(one_of, known=known),
+}
 _GIVE = "give mean and sd (or percent), median and percent, low and high, or one_of"
-_MAX_CONVERSIONS = 100_000
 _DOTTED = re.compile(r"^(\s*)([\w-]+(?:\.[\w-]+)+)(\s*=)", re.MULTILINE)
 
 
@@ -83,27 +88,19 @@ class SampledValue(InlineTable):
 
     def distribution(self) -> Distribution:
         """The distribution of these parameters."""
-        if self.model_fields_set - {"known"} not in map(set, _KINDS):
-            raise ArgumentError(_GIVE)
-        if self.one_of is not None:
-            return listed(self.one_of, known=self.known)
-        if self.mean is not None:
-            return normal(self.mean, self.sd, percent=self.percent, known=self.known)
-        if self.median is not None and self.percent is not None:
-            return lognormal(self.median, self.percent, known=self.known)
-        if self.low is not None and self.high is not None:
-            return uniform(self.low, self.high, known=self.known)
+        given = {name: getattr(self, name) for name in self.model_fields_set}
+        for kind, make in _KINDS.items():
+            if given.keys() - {"known"} == set(kind):
+                return make(**given)
         raise ArgumentError(_GIVE)
-
-
-_LEAVES = frozenset(SampledValue.model_fields)
 
 
 def _flat(given: Mapping[str, object], above: tuple[str, ...] = ()) -> Iterator[tuple[str, object]]:
     """Flatten nested tables to dotted keys, except distributions and tables that are values of the machine file."""
+    leaves = SampledValue.model_fields.keys()
     for name, entry in given.items():
         parts = (*above, *name.split("."))
-        if isinstance(entry, dict) and entry and not entry.keys() & _LEAVES and not _is_value(parts):
+        if isinstance(entry, dict) and entry and not entry.keys() & leaves and not _is_value(parts):
             yield from _flat(entry, parts)
         else:
             yield ".".join((*above, name)), entry
@@ -111,19 +108,8 @@ def _flat(given: Mapping[str, object], above: tuple[str, ...] = ()) -> Iterator[
 
 def _is_value(parts: Sequence[str]) -> bool:
     """True if these are the parts of a key of the machine file that is not a table."""
-    table: type[TomlTable] | None = Machine
-    field = None
-    for part in parts:
-        if field is not None and item_type(field) is not None and part.isdigit():
-            field = None
-            continue
-        field = None if table is None else table.model_fields.get(part)
-        if field is None:
-            return False
-        table = table_type(field)
-        if table is None and get_origin(field.annotation) is dict:
-            return False
-    return table is None
+    field = field_of(Machine, [int(part) if part.isdigit() else part for part in parts])
+    return field is not None and table_type(field) is None and get_origin(field.annotation) is not dict
 
 
 Values = Annotated[dict[str, Annotated[SampledValue, BeforeValidator(_as_table)]], Field(min_length=1)]
@@ -147,7 +133,7 @@ class StudyFile(TomlTable):
     indices: Bool = key("Sobol indices of study; needs shapegcode[study]", default=False)
     at_least: Annotated[Positive, Field(le=1)] = key("required probability of staying within tolerance", default=0.95)
     shape_all: Bool = key("also shape cuts that gain little, as convert --shape-all", default=False)
-    most: Annotated[int, Strict(), Field(ge=1, le=_MAX_CONVERSIONS)] = key(
+    most: Annotated[int, Strict(), Field(ge=1, le=100_000)] = key(
         "maximum number of conversions of optimize", default=USUAL_CONVERSIONS
     )
     vary: Values = key("the distribution from which each key of the machine file is sampled")

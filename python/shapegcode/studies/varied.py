@@ -23,20 +23,18 @@ from shapegcode.machine import Machine
 from shapegcode.settings.keys import toml
 from shapegcode.settings.load import missing_row
 
-Unit = FloatArray
-
 
 @dataclass(frozen=True)
 class Distribution:
     """Distribution of a sampled value."""
 
     words: str  # as shown
-    quantile: Callable[[Unit], Unit] = field(compare=False)  # inverse distribution function
+    quantile: Callable[[FloatArray], FloatArray] = field(compare=False)  # inverse distribution function
     # True: the program is converted for each value; False: it is converted for the value of the machine file, and only
     # the simulated machine has the sampled one; None: False for values that the simulation reads
     known: bool | None = None
 
-    def at(self, shares: Unit) -> list[object]:
+    def at(self, shares: FloatArray) -> list[object]:
         """Quantiles at these probabilities."""
         return list(map(float, self.quantile(shares)))
 
@@ -47,13 +45,13 @@ class Listed(Distribution):
 
     values: tuple[object, ...] = ()
 
-    def at(self, shares: Unit) -> list[object]:
+    def at(self, shares: FloatArray) -> list[object]:
         """Quantiles at these probabilities."""
         count = len(self.values)
         return [self.values[min(int(share * count), count - 1)] for share in shares]
 
 
-def _normal_quantile(shares: Unit) -> Unit:
+def _normal_quantile(shares: FloatArray) -> FloatArray:
     from scipy.special import ndtri
 
     # A sequence may contain 0, whose quantile is infinite.
