@@ -21,8 +21,7 @@ from shapegcode.model.machine_model import fanuc_model
 from shapegcode.model.stream import cuts_of_lines
 from shapegcode.program import Program
 
-_KIND = _core.BlockKind
-_CUTTING, _RAPID, _DWELL = (kind.value for kind in (_KIND.cutting, _KIND.rapid, _KIND.dwell))
+_CUTTING, _RAPID, _DWELL = (getattr(_core.BlockKind, name).value for name in ("cutting", "rapid", "dwell"))
 # The time model rounds the end of a run up to a period, which has a minimum. The program is therefore timed at a
 # tiny feed override: relative to the times at full feed, the period is then a nanosecond.
 _PERIOD_S = 1e-5

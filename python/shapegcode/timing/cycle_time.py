@@ -10,7 +10,7 @@ import math
 from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -172,20 +172,13 @@ def _blocks(rows: npt.NDArray[Any], program: Program) -> Iterator[BlockTime]:
 def _moves(program: Program) -> dict[tuple[int, bool], deque[tuple[float, float]]]:
     """Length and programmed feed of the moves of each line, separately for rapids, in order."""
     found: dict[tuple[int, bool], deque[tuple[float, float]]] = defaultdict(deque)
-
-    def note(segments: Iterable[_core.Segment]) -> None:
-        for segment in segments:
-            rapid = segment.kind == _core.SegmentKind.rapid
-            found[segment.line_number, rapid].append((segment.length_mm, segment.feed_mm_per_s))
-
-    for region in program.regions:
-        path = region.path
-        note(path[index] for index in range(len(path)))
-    note(segment for segment, dwell_s in program.core.other_moves if dwell_s <= 0.0)
+    cuts = (region.path[index] for region in program.regions for index in range(len(region.path)))
+    others = (segment for segment, dwell_s in program.core.other_moves if dwell_s <= 0.0)
+    for segment in chain(cuts, others):
+        rapid = segment.kind == _core.SegmentKind.rapid
+        found[segment.line_number, rapid].append((segment.length_mm, segment.feed_mm_per_s))
     return found
 
-
-# --- the 95 % interval: uncertainty of calibrated parameters, and unexplained scatter ---------------------------------
 
 _DEVIATIONS = 1.96  # standard deviations of a 95 % interval
 _KIND = "kind of look-ahead"
@@ -236,10 +229,8 @@ class TimeInterval:
     def narrowed_by(self) -> str:
         """Kind of program whose log would narrow the interval most; scatter between cuts or runs is left aside."""
         name = next((part.name for part in self.parts() if part.name not in (BETWEEN, RUNS)), CUTS)
-        text = next(
-            (text for word, text in _REMEDIES.items() if word in name), f"a program in which {name} occurs alone"
-        )
-        return text.format(move=self.mean_move_mm)
+        alone = f"a program in which {name} occurs alone"
+        return next((text for word, text in _REMEDIES.items() if word in name), alone).format(move=self.mean_move_mm)
 
     def after_logging(self, other: TimeInterval) -> float:
         """Half of the interval, s, once a run of another program is logged, with its own scatter (least squares)."""

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 _COLOURED = ("acceleration_s", "cutting_s", "dwell_s", "in_position_s", "rapid_s", "tool_change_s", "function_s")
 _COLOUR = dict(zip(_COLOURED, plot.COLOURS, strict=True))
-_REGIONS = 10
-_TOOLS = 16
 
 
 def plots_of(time: CycleTime) -> dict[str, Plot]:
@@ -37,9 +35,9 @@ def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
     Returns:
         The upper panel.
     """
-    longest = sorted(time.tools, key=lambda tool: -tool.duration_s)[:_TOOLS]
+    longest = sorted(time.tools, key=lambda tool: -tool.duration_s)[:16]
     tools = [tool for tool in time.tools if tool in longest]
-    regions = time.slowest_regions(_REGIONS)
+    regions = time.slowest_regions(10)
     heights = [max(len(tools), 1), *([len(regions)] if regions else [])]
     panels = plot.column(
         ax, len(heights), sharex=False, height_ratios=heights,

@@ -246,10 +246,19 @@ class CycleTime(TimeParts, Result):
         if self.regions or self.blocks:
             found.append(self._slowest_table())
         if self.interval_parts:
-            found.append(Table("components of the interval", _INTERVAL, self.interval_parts[:_SLOWEST]))
+            found.append(self._interval_table())
         if self.log_next:
-            found.append(Table("remaining interval if logged next", _LOG_NEXT, self.log_next))
+            columns = (Column("program", text=True), Column("± s", value="half_width_s", digits=2))
+            found.append(Table("remaining interval if logged next", columns, self.log_next))
         return found
+
+    def _interval_table(self) -> Table:
+        columns = (
+            Column("source", value="name", text=True),
+            Column("± s by itself", value="half_width_s", digits=2),
+            Column("of the variance", value=lambda part: share_percent(part.share, 1.0)),
+        )
+        return Table("components of the interval", columns, self.interval_parts[:_SLOWEST])
 
     def _parts_table(self) -> Table:
         whole = self.cycle_time_s
@@ -303,14 +312,6 @@ class CycleTime(TimeParts, Result):
         for block in self.blocks:
             cells = astuple(block)
             yield ",".join("" if c is None else f"{c:.6f}" if isinstance(c, float) else str(c) for c in cells) + "\n"
-
-
-_INTERVAL = (
-    Column("source", value="name", text=True),
-    Column("± s by itself", value="half_width_s", digits=2),
-    Column("of the variance", value=lambda part: share_percent(part.share, 1.0)),
-)
-_LOG_NEXT = (Column("program", value="program", text=True), Column("± s", value="half_width_s", digits=2))
 
 
 def tool_name(tool: int | None) -> str:

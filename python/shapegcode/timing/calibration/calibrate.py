@@ -85,8 +85,7 @@ def calibrate_cycle_time(
     if not fitted:
         raise ArgumentError(f'{file.path}: no run has use = "fit": there is nothing to calibrate with')
     folds = _folds(fitted)
-    meter = _Meter(on_progress, len(tried) * (1 + len(folds)))
-    fits, scores = _tried(tried, fitted, folds, machine, rate, meter)
+    fits, scores = _tried(tried, fitted, folds, machine, rate, on_progress)
     order = [score.cross_validated_s if score.cross_validated_s is not None else score.fitted_s for score in scores]
     best = 0
     for index, error in enumerate(order):
@@ -113,21 +112,6 @@ def calibrate_cycle_time(
         undetermined=tuple(undetermined),
         warnings=tuple(dict.fromkeys(warning for row in rows for warning in _warnings(row))),
     )
-
-
-class _Meter:
-    """Progress: the number of completed fits, and the steps of the current one."""
-
-    def __init__(self, on_progress: Callable[[float], None], fits: int) -> None:
-        self._on_progress, self._fits, self._done, self._steps = on_progress, fits, 0, 0
-
-    def step(self) -> None:
-        self._steps += 20
-        within = min(0.99, self._steps / _CALLS)
-        self._on_progress(0.97 * (self._done + within) / self._fits)
-
-    def next(self) -> None:
-        self._done, self._steps = min(self._done + 1, self._fits - 1), 0
 
 
 def _families(names: Sequence[str] | None) -> list[fitting.LookAhead]:
@@ -168,23 +152,31 @@ def _tried(
     folds: Sequence[Sequence[logs.ObservedRun]],
     machine: Machine,
     rate: float,
-    meter: _Meter,
+    on_progress: Callable[[float], None],
 ) -> tuple[list[fitting.MotionFit], list[result.FamilyScore]]:
     sections = fitting.sections_of(runs)
     if not sections:
         raise ArgumentError(
             "no log reports lines of a section of cuts often enough (10 readings): there is nothing to calibrate with"
         )
+    count = len(tried) * (1 + len(folds))
+    done = steps = 0
+
+    def on_step() -> None:
+        nonlocal steps
+        steps += 20
+        on_progress(0.97 * (done + min(0.99, steps / _CALLS)) / count)
+
     fits, scores = [], []
     for family in tried:
-        fit = fitting.fit_motion(runs, family, machine, rate, on_step=meter.step)
-        meter.next()
+        fit = fitting.fit_motion(runs, family, machine, rate, on_step=on_step)
+        done, steps = done + 1, 0
         left_out = []
         for fold in folds:
             rest = [run for run in runs if run not in fold]
-            part = fitting.fit_motion(rest, family, machine, rate, on_step=meter.step, thorough=False)
+            part = fitting.fit_motion(rest, family, machine, rate, on_step=on_step, thorough=False)
             left_out.append(fitting.misfit(fitting.sections_of(fold), part.model(machine)))
-            meter.next()
+            done, steps = done + 1, 0
         fits.append(fit)
         score = fitting.misfit(sections, fit.model(machine))
         scores.append(
@@ -267,8 +259,6 @@ def _with_interval(row: result.CalibrationRun, run: logs.ObservedRun, machine: M
     half = interval.half_width_s * row.predicted_s / interval.total_s if interval and interval.total_s > 0.0 else 0.0
     return replace(row, low_s=row.predicted_s - half, high_s=row.predicted_s + half)
 
-
-# --- start of each line in a model, and holds ---------------------------------------------
 
 _MIN_HOLD_S = 2.0
 _READING_S = 0.35  # a time between two readings may be longer by this, as each may be late
@@ -375,8 +365,6 @@ def _shares(
 def _held(holds: list[_Hold], begin_s: float, end_s: float) -> float:
     return sum(max(0.0, min(begin + length, end_s) - max(begin, begin_s)) for begin, length, _ in holds)
 
-
-# --- the numbers of the machine file ----------------------------------------------------------------------------------
 
 _USUAL = 0.75  # fraction of the time
 _MAX_MOVE_S = 10.0  # limit of times.unknown_move_s

@@ -47,12 +47,13 @@ class LookAhead:
 
 _ACCELERATION = "axes.{axis}.max_acceleration_mm_s2"
 _SPEED_STEP = "controller.corner_speed_difference_mm_per_min.{axis}"
-_ARC = "controller.centripetal_acceleration_mm_s2"
 _PER_MINUTE, _DEGREES = 60.0, 180.0 / math.pi
 # fmt: off
 _ACROSS = Parameter("acceleration_xy", _ACCELERATION, "mm/s²", 1000.0, 20.0, 3e4, "acceleration of X and Y", axes="xy")
 _ALONG_Z = Parameter("acceleration_z", _ACCELERATION, "mm/s²", 1000.0, 20.0, 3e4, "acceleration of Z", axes="z")
-_ARCS = Parameter("arc_acceleration", _ARC, "mm/s²", 1000.0, 5.0, 3e4, "acceleration across the path in arcs")
+_ARCS = Parameter(
+    "arc_acceleration", "controller.centripetal_acceleration_mm_s2", "mm/s²", 1000.0, 5.0, 3e4,
+    "acceleration across the path in arcs")
 _CORNER = Parameter(
     "corner_xy", _SPEED_STEP, "mm/min", 8.0, 0.05, 300.0, "speed step of X and Y at a corner", _PER_MINUTE, "xy")
 _CORNER_Z = Parameter(
@@ -72,7 +73,6 @@ _BLOCK_TIME = Parameter(
     "block_time", "controller.look_ahead_block_time_s", "s", 0.002, 1e-4, 0.05, "time in which a block is read")
 # fmt: on
 _BOTH = (_RAPID_TIME, _ARRIVAL)
-
 _SPEED = (_ACROSS, _ALONG_Z, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS)
 
 FAMILIES = (
@@ -251,8 +251,7 @@ def section_residuals(sections: Sequence[SeenSection], model: _core.FanucModel) 
 
 
 def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
-    """Error of a model in the times of sections: every program has the same weight, outliers (holds) a limited
-    influence."""
+    """Error of a model in the times of sections: equal weight for every program, limited influence of outliers."""
     # Sum of squares and count, by program
     found: dict[int, FloatArray] = defaultdict(lambda: np.zeros((2, len(_SCALES) + 1)))
     for section, residual in zip(sections, section_residuals(sections, model), strict=True):
@@ -270,8 +269,6 @@ def misfit(sections: Sequence[SeenSection], model: _core.FanucModel) -> float:
     means = [(np.sqrt(sums / np.maximum(counts, 1.0)) * weight).sum() for sums, counts in found.values()]
     return float(np.mean(means)) if means else 0.0
 
-
-# --- the search, and the intervals ------------------------------------------------------------------------------------
 
 _STEP = 0.3  # step of the first simplex, in the logarithm
 _WINDOW_S = 6.0
@@ -423,7 +420,7 @@ _USUAL_S, _USUAL_KRPM = 2.0, 5.0  # standard deviation over usual machines: of a
 _MAX_S = 60.0
 _UNSEEN = 1e-3  # least sum of derivatives, relative to a reading's scatter
 _TOOL_CHANGE = 6
-_SPEEDS_KRPM = (0.0, 60.0)
+_MAX_KRPM = 60.0
 _TABLE_KRPM = 30.0  # range of a spindle's table above its first speed
 
 
@@ -535,7 +532,7 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     from scipy.optimize import least_squares
 
     seconds = np.array([span.seconds for span in spans])
-    scale = np.array([_MAX_S if not name.endswith("from") else _SPEEDS_KRPM[1] for name in names])
+    scale = np.array([_MAX_S if not name.endswith("from") else _MAX_KRPM for name in names])
     pull = np.array([0.0 if name.endswith("from") else _RIDGE for name in names]) / _READING_S
 
     def errors(point: FloatArray) -> FloatArray:

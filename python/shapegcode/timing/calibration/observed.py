@@ -116,8 +116,6 @@ def _radius_mm(segment: _core.Segment) -> float:
     return float(np.linalg.norm(np.asarray(segment.start_mm) - np.asarray(segment.centre_mm)))
 
 
-# --- unit and overrides from the feeds of a log ----------------------------------------------------------
-
 # units to try for a feed without unit, in mm/s
 _FEED_UNITS = {"mm/s": 1.0, "mm/min": 1.0 / 60.0, "in/min": MM_PER_INCH / 60.0}
 _MIN_READINGS = 4  # least readings of one value that are no coincidence
@@ -246,8 +244,6 @@ def to_whole_percent(ratio: float) -> float:
     whole = round(ratio, 2)
     return whole if abs(ratio - whole) < 0.002 else round(ratio, 4)
 
-
-# --- a log aligned with its program -----------------------------------------------------------------------------------
 
 _MIN_BLOCKS = 8
 _MISSING_S, _MISSING = 15.0, 0.15  # missing part of a program: more than a machine's own times explain
@@ -402,8 +398,6 @@ def _require_same(run: ObservedRun, starts: FloatArray) -> None:
             "belong together"
         )
 
-
-# --- directly from the feeds of all runs: rate of rapids, acceleration in arcs -----------------------------------
 
 _LIMITED = 0.9  # ratio to the programmed feed below which something else limits the speed
 _MIN_ARC_READINGS = 12

@@ -116,9 +116,6 @@ def _symmetric_root(covariance: FloatArray) -> FloatArray:
     return np.asarray(deviation[:, None] * ((vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T))
 
 
-# --- scatter that no parameter explains -------------------------------------------------------------------------------
-
-
 def cut_scatter(runs: Sequence[ObservedRun], fit: MotionFit, machine: Machine) -> float:
     """Relative standard deviation of a tool's cutting time; deviations of different tools are independent."""
     from scipy.stats import t as student

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _TOOL_PERCENT = 5.0
-_MAX_RUNS = 20
 
 
 def plots_of(found: CycleTimeCalibration) -> dict[str, Plot]:
@@ -34,7 +33,7 @@ def plot_cycle_time_calibration(found: CycleTimeCalibration, ax: Axes | None = N
     Returns:
         The axes of the plot.
     """
-    runs = [run for run in found.runs if run.measured_s is not None and run.measured_s > run.held_s][:_MAX_RUNS]
+    runs = [run for run in found.runs if run.measured_s is not None and run.measured_s > run.held_s][:20]
     title = f"Predicted against measured: {found.machine}, {found.family}"
     panel = plot.axes(ax, size_inch=(9.0, 1.6 + 0.42 * len(runs)), title=title)
     panel.axvspan(-_TOOL_PERCENT, _TOOL_PERCENT, color=plot.GREY, alpha=0.12, label="5 %, of a tool's share")
