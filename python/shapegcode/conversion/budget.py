@@ -125,7 +125,6 @@ class Spending:
         self._program = program
         self._period_s = machine.controller.interpolation_period_s
         self._max_periods = math.floor(machine.shaping.max_duration_s / self._period_s + _ROUNDING)
-        self._fixed_period = machine.emission.block_period_s is not None
         self._keepable = [keepable(region, program) for region in program.regions]
         self._unit_um = [residual_floor_um(region, machine) or 1.0 for region in program.regions]
         self._longer = False  # the block period is longer than it would be without the budget
@@ -138,11 +137,11 @@ class Spending:
         design: Callable[[float], Grid],
         write: Callable[[Grid], Written],
     ) -> Grid:
-        """Choose the block period of the largest `_worth`; the given one if fixed or if all its cuts keep the rates."""
+        """Choose the block period of the largest `_worth`; the given one if all its cuts keep the rates."""
         weights = [residual * 1e3 / unit for unit, residual in zip(self._unit_um, residuals_mm, strict=True)]
         written = write(grid)
         loads = written.loads
-        if self._fixed_period or not self._factors(loads):
+        if not self._factors(loads):
             return grid
         periods = measured = round(grid.block_period_s / self._period_s)
         best, best_loads = grid, loads

@@ -183,7 +183,7 @@ def write(plan: ConversionPlan, grid: Grid, stage: str = "") -> Written:
     written = plan.writer.write(plan.reasons, plan.aims.wanted(), unreported, on_progress)
     for index, reason in written.no_room.items():
         plan.reasons[index] = reason
-    plan.curves.note(written)
+    plan.note_curves(written)
     return written
 
 
@@ -249,7 +249,7 @@ def _without_what_gains_nothing(plan: ConversionPlan, shaped: Shaped) -> Shaped:
         gained = plan.gains_um[index] = figures.gain_um
         stays = not plan.is_keepable(index) or plan.choice.shape_all
         if not stays and (gained < least or verdict.worse):
-            plan.leave(index, verdict.worse[0] if verdict.worse else f"shaping gains {gained:.1f} µm", gained)
+            plan.leave(index, verdict.worse[0] if verdict.worse else f"shaping gains {gained:.1f} µm")
     return _rewritten(plan, shaped, chosen)
 
 
@@ -290,8 +290,4 @@ def shape_rapids(plan: ConversionPlan, shaped: Shaped) -> Shaped:
     outcome = replace(outcome, shaped=0, left_unchanged=left, time_saved_s=0.0, blocks=0, slowed_blocks=0, moves=())
     why = f"{count} rapids are left unchanged: as cutting moves they would add {added_s:.2f} s"
     warning = f"{why}, price {price_s:.2f} s (price.program_time_percent)"
-    written = replace(shaped.written, size=shaped.emitted.size)
-    found = replace(
-        found, emitted=shaped.emitted, placed=written.placed, outcome=outcome, extra_s=0.0, warnings=[warning]
-    )
-    return replace(shaped, written=written, rapids=found)
+    return replace(shaped, rapids=replace(found, outcome=outcome, extra_s=0.0, warnings=[warning]))

@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 
@@ -23,12 +22,11 @@ from shapegcode.program.stamp import FEED_HOLD, FIRST_RUN, OVERRIDES, RESTART, S
 from shapegcode.results.table import Column, Table
 from shapegcode.verdict.figures import Placed, ProgramFigures
 
-_NAMED_LINES = 4
 _SHOWN_POINTS = 12
 _SINGLE_BLOCKS = 200  # number of the fastest blocks that are simulated
 _PRESSES_PER_S = 2.0
 _FAST_RATIO, _FAST_BLOCKS = 0.5, 4000  # of fast blocks: least ratio to the highest feed; largest number
-_CHUNK = 1 << 16  # bytes
+_BEGIN = re.compile(rb"(?:\s*\([^\n]*\n)*\s*(N\d+)?")  # comment lines, and the N word of the line after them
 _TAPE_CHARACTERS_PER_M = 1000.0 / 2.54  # a row of holes every tenth of an inch
 
 
@@ -71,7 +69,7 @@ def at_the_control(
         ControlNote(override.topic, "; ".join([override.sentence, *elsewhere])),
         ControlNote(FEED_HOLD.topic, FEED_HOLD.sentence),
         ControlNote(SINGLE_BLOCK.topic, f"{SINGLE_BLOCK.sentence}; {_single_block(emitted, placed, figures, model)}"),
-        ControlNote(RESTART.topic, "; ".join([RESTART.sentence, *_restarts(program, emitted, written, machine)])),
+        ControlNote(RESTART.topic, "; ".join([RESTART.sentence, *_restarts(program, written, machine)])),
         ControlNote(FIRST_RUN.topic, FIRST_RUN.sentence),
     )
 
@@ -168,12 +166,12 @@ def _duration(time_s: float) -> str:
     return f"{time_s:.1f} s" if time_s < 10.0 else f"{time_s:.0f} s"
 
 
-def _restarts(program: Program, emitted: Program, written: Written, machine: Machine) -> Iterator[str]:
+def _restarts(program: Program, written: Written, machine: Machine) -> Iterator[str]:
     emission, placed, restarts = machine.emission, written.placed, written.restarts
     if (own := dialect_of(emission.dialect)) is not None:
         yield f"{own.control}: {own.facts['restart'].text}"
     else:
-        yield _restart_lines(emitted, placed)
+        yield _restart_lines(written)
     count = sum(len(each.marks) for each in restarts)
     if count:
         before = (*emission.prologue, *emission.around_cuts["LOCK"])
@@ -205,29 +203,13 @@ def _restarts(program: Program, emitted: Program, written: Written, machine: Mac
         )
 
 
-def _restart_lines(emitted: Program, placed: Sequence[Placed]) -> str:
-    named = []
-    for place in placed[:_NAMED_LINES]:
-        rows = range(place.first_line, place.last_line + 1)
-        lines = zip(rows, _lines_from(emitted, place.first_line), strict=False)
-        first = next(lines)
-        # After the comment: lines that lock the override or switch a mode belong to the cut.
-        at, line = next((each for each in chain([first], lines) if not each[1].lstrip().startswith(b"(")), first)
-        number = re.match(rb"N\d+", line.strip())
-        named.append(f"{number[0].decode()} (line {at})" if number else f"line {at}")
+def _restart_lines(written: Written) -> str:
+    placed, named = written.placed, []
+    for place, (text, _) in zip(placed[:4], written.texts, strict=False):
+        # After the comments: lines that lock the override or switch a mode belong to the cut.
+        begin = _BEGIN.match(text.parts()[0])
+        assert begin is not None
+        line = place.first_line + begin[0].count(b"\n")
+        named.append(f"{begin[1].decode()} (line {line})" if begin[1] else f"line {line}")
     more = f" and {len(placed) - len(named)} more" if len(placed) > len(named) else ""
     return f"cuts begin at {', '.join(named)}{more}"
-
-
-def _lines_from(emitted: Program, number: int) -> Iterator[bytes]:
-    """Yield the lines of a program from a line number on, chunk by chunk."""
-    passed, rest = 1, b""
-    for begin in range(0, emitted.size, _CHUNK):
-        chunk = emitted.text_slice(begin, min(begin + _CHUNK, emitted.size))
-        if passed + chunk.count(b"\n") < number:
-            passed += chunk.count(b"\n")
-            continue
-        *lines, rest = (rest + chunk).split(b"\n")
-        yield from lines[number - passed :]
-        passed = number
-    yield rest

@@ -145,21 +145,19 @@ def _unchanged(plan: ConversionPlan, shaped: Shaped) -> list[tuple[Placed, judgi
         return []
     spans = [(place.first_line, place.last_line) for place in shaped.written.placed]
     spans += [move.emitted_lines for move in shaped.rapids.outcome.moves] if shaped.rapids is not None else []
-    regions = judging.unshaped_regions(shaped.emitted, spans, [plan.program.regions[index] for index in left])
-    running = [
-        None if region.path.moves_as(plan.program.regions[index].path) and index in plan.originals_judged
-        else plan.pool.submit(
-            judging.simulate_unchanged, plan.judge, plan.model, region, plan.program.regions[index],
-            plan.originals[index].result(),
-        )
-        for index, region in zip(left, regions, strict=True)
-    ]  # fmt: skip
+    cuts = [plan.program.regions[index] for index in left]
+    found = [*zip(left, cuts, judging.unshaped_regions(shaped.emitted, spans, cuts), strict=True)]
+    running = {
+        index: plan.pool.submit(plan.judge.simulate_unchanged, mine, cut, plan.originals[index].result())
+        for index, cut, mine in found
+        if index not in plan.originals_judged or not mine.path.moves_as(cut.path)
+    }
     return [
         (
-            Placed(plan.program.regions[index], region.first_line, region.last_line),
-            plan.originals_judged[index] if run is None else run.result(),
+            Placed(cut, mine.first_line, mine.last_line),
+            running[index].result() if index in running else plan.originals_judged[index],
         )
-        for index, region, run in zip(left, regions, running, strict=True)
+        for index, cut, mine in found
     ]
 
 

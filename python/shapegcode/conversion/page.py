@@ -24,11 +24,7 @@ from shapegcode.verdict.figures import CaseVerdict
 
 N = TypeVar("N", int, float)
 
-_LONGEST_REGIONS = 8
-_SHOWN_CUTS = 12
 _MIN_SHOWN_UM = 0.05
-_SHOWN_KEYS = ("axes.", "tolerance.", "verdict.")
-_RUN_FIRST = ("first run",)
 
 
 def light_of(conversion: Conversion) -> tuple[model.Light, str]:
@@ -106,7 +102,7 @@ def _tried(pair: Pair[N], cut: CutOutcome) -> Pair[N | None]:
 def _price(conversion: Conversion, provenance: Provenance | None) -> Iterator[model.Section]:
     if len(conversion.cuts) > 1:
         how = "The command below shapes only the ticked cuts. Gain: the larger reduction of residual and contour."
-        parts, many = (_picker(conversion, provenance),), len(conversion.cuts) > _SHOWN_CUTS
+        parts, many = (_picker(conversion, provenance),), len(conversion.cuts) > 12
         yield model.Section("cuts", "Cut by cut", parts, how=how, folded=many, printed=False)
     if conversion.tolerance_curve is not None:
         sentence = conversion.tolerance_curve.sentence
@@ -145,7 +141,7 @@ def _figures(conversion: Conversion) -> Iterator[model.Figure]:
 
 def _further(conversion: Conversion) -> Iterator[model.NextStep]:
     for note in conversion.at_the_control:
-        if note.topic in ("look-ahead", "override") or "override" in note.topic:
+        if note.topic == "look-ahead" or "override" in note.topic:
             yield model.NextStep(f"At the control, {note.topic}: {note.text}.")
     if conversion.parameter_sensitivity:
         key = conversion.parameter_sensitivity[0].key
@@ -190,7 +186,7 @@ def _times(conversion: Conversion) -> model.Section:
     rest = Pair(whole.original - cutting.original, whole.emitted - cutting.emitted)
     times = [("whole program", whole, "cycle_time_s"), ("cuts together", cutting, "cutting_time_s")]
     times.append(("everything else", rest, ""))
-    longest = sorted(enumerate(conversion.regions), key=lambda ranked: -ranked[1].time_s.emitted)[:_LONGEST_REGIONS]
+    longest = sorted(enumerate(conversion.regions), key=lambda ranked: -ranked[1].time_s.emitted)[:8]
     for rank, region in longest if len(conversion.regions) > 1 else []:
         times.append(("cut in lines {} to {}".format(*region.lines), region.time_s, f"regions.{rank}.time_s"))
     rows = tuple((name, (pair.original, pair.emitted)) for name, pair, _ in times)
@@ -202,7 +198,8 @@ def _times(conversion: Conversion) -> model.Section:
 
 def _machine(machine: Machine) -> model.Section:
     """Machine data used: axes, tolerances, settings of the verdict, and all values that are assumed or inherited."""
-    values = [value for value in machine.values() if value.unmeasured or value.key.startswith(_SHOWN_KEYS)]
+    shown = ("axes.", "tolerance.", "verdict.")
+    values = [value for value in machine.values() if value.unmeasured or value.key.startswith(shown)]
     unmeasured = sum(value.unmeasured for value in values)
     columns = (
         Column("key", left=True),
@@ -229,7 +226,7 @@ def _sheet(conversion: Conversion, provenance: Provenance | None) -> model.Secti
         if provenance is not None and (file := provenance.file(role)) is not None:
             rows.append((name, f"{Path(file.name).name}, SHA-256 {file.sha256 or 'not known'}"))
     rows += [(note.topic, note.text) for note in conversion.at_the_control]
-    strong = frozenset(topic for topic, _ in rows if topic in _RUN_FIRST or "override" in topic)
+    strong = frozenset(topic for topic, _ in rows if topic == "first run" or "override" in topic)
     title = f"Run sheet: {conversion.recommendation}"
     how = "For the operator. Check it from top to bottom before cycle start."
     points = (restart_table(conversion.restart_points),) if conversion.restart_points else ()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, Future
-from dataclasses import dataclass, field, replace
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ from shapegcode.program import Program
 from shapegcode.results.table import Column, Table
 from shapegcode.shaping.grid import Grid, choose_grid
 from shapegcode.verdict.figures import Placed, RegionVerdict
-from shapegcode.verdict.judge import Judge, RegionFigures, max_gain_um, rapid_vibration_um, simulate_unchanged
+from shapegcode.verdict.judge import Judge, RegionFigures, max_gain_um, rapid_vibration_um
 
 if TYPE_CHECKING:
     from shapegcode.conversion.rapids.shape import ShapedRapids
@@ -32,7 +32,6 @@ _MIN_FEED_RATIO = 0.5  # of the programmed feed: below it, a too high speed has 
 _HELPED = 0.98  # ratio of errors: a tighter plan with less improvement is reverted
 _PRICE_MARGIN = 0.995  # ratio of the permitted time used for a plan
 _LOOSER = 1.05  # smallest factor on the deviation after a plan that was still too expensive
-_LEVELS = 40  # steps of a bisection
 
 
 @dataclass
@@ -80,7 +79,7 @@ class Aims:
         for place, region in zip(written.placed, figures, strict=True):
             index = self.index(place.region)
             self.original_s[index], self.emitted_s[index] = region.original.duration_s, region.emitted_s
-            self._blocks_s[index] = written.durations_s[index]
+            self._blocks_s[index] = written.shaped[index].duration_s
             if index not in self._priced:
                 self._asked_s[index] = region.emitted_s
 
@@ -122,7 +121,8 @@ class Aims:
                 before.helps = False
                 continue
             self._tried[index] = _Attempt(allowed_um[index], reached, overridden)
-            allowed_um[index] = min(allowed_um[index], written.planned_um.get(index, math.inf))
+            # 0: without a contour target nothing is planned.
+            allowed_um[index] = min(allowed_um[index], written.shaped[index].planned_um or math.inf)
             allowed_um[index] *= _MARGIN * limit / reached
         return tightened
 
@@ -235,9 +235,8 @@ class Aims:
         return self.emitted_s[index] - blocks_s + slowest_s + ratio * (then_s - min_s)
 
     def _loosen(self, index: int, allowed_um: float) -> None:
-        self.allowed_um[index] = max(
-            allowed_um, _LOOSER * self.allowed_um[index]
-        )  # more if the plan was too optimistic
+        # More if the plan was too optimistic.
+        self.allowed_um[index] = max(allowed_um, _LOOSER * self.allowed_um[index])
         self._priced.add(index)
 
     def _tightest_um(self, index: int, allowed_s: float) -> float | None:
@@ -254,7 +253,7 @@ class Aims:
 
 def _bisect(low: float, high: float, is_enough: Callable[[float], bool]) -> float:
     """Smallest sufficient value, by bisection on a logarithmic scale; the upper end if none is."""
-    for _ in range(_LEVELS):
+    for _ in range(40):
         middle = math.sqrt(low * high)
         low, high = (low, middle) if is_enough(middle) else (middle, high)
     return high
@@ -295,11 +294,6 @@ class TolerancePoint:
     time_increase_percent: float  # over the original
     is_within_price: bool  # the times of the program and of each cut are within the table [price]
     is_knee: bool = False  # a tighter tolerance costs disproportionately more time
-
-    @property
-    def remarks(self) -> str:
-        """Remarks for the table."""
-        return ", ".join(["knee"] * self.is_knee + ["above the price"] * (not self.is_within_price))
 
 
 @dataclass(frozen=True)
@@ -342,39 +336,6 @@ def plan_curve(
     return CutCurve(tuple(um for um, _ in ordered), tuple(time_s for _, time_s in ordered))
 
 
-@dataclass
-class CutCurves:
-    """The curve of each cut of a conversion on one grid, planned on first use."""
-
-    _writer: TextWriter
-    _program: Program
-    _machine: Machine
-    _originals: Sequence[Future[_core.SimulationFigures]]
-    _known: dict[int, CutCurve] = field(default_factory=dict)
-
-    def use(self, writer: TextWriter) -> None:
-        """Plan on another grid from now on."""
-        self._writer, self._known = writer, {}
-
-    def note(self, written: Written) -> None:
-        """Store the curves, of one point, of the cuts that the tolerance does not slow: they need no plan."""
-        for index in written.unslowed - self._known.keys():
-            planned_um = max(written.planned_um.get(index, 0.0), 1e-3)
-            self._known[index] = CutCurve((planned_um,), (written.durations_s[index],))
-
-    def of(self, index: int) -> CutCurve:
-        """The curve of a cut."""
-        if index in self._known:
-            return self._known[index]
-        asked_um = self._machine.tolerance.contour_um * _MARGIN
-        target = "command" if self._machine.shaping.contour != "response" else "response"
-        original_um = getattr(self._originals[index].result(), target).max_abs_mm * 1e3
-        path = self._program.regions[index].path
-        options = self._writer.options(index)
-        self._known[index] = plan_curve(path, self._writer.grid.fir, options, asked_um, original_um)
-        return self._known[index]
-
-
 def knee_of(tolerances_um: Sequence[float], times_s: Sequence[float]) -> int | None:
     """Index of the point furthest below the line from first to last, on logarithmic scales; None: no knee."""
     if len(times_s) < 3 or times_s[0] <= times_s[-1] * (1.0 + _FLAT):
@@ -389,12 +350,16 @@ def knee_of(tolerances_um: Sequence[float], times_s: Sequence[float]) -> int | N
 
 def curve_table(curve: ToleranceCurve) -> Table:
     """The curve as a table."""
+
+    def remarks(point: TolerancePoint) -> str:
+        return ", ".join(["knee"] * point.is_knee + ["above the price"] * (not point.is_within_price))
+
     columns = (
         Column("contour tolerance", value="name", text=True),
         Column("µm", value="tolerance_um", digits=1),
         Column("program s", value="time_s", digits=2),
         Column("increase %", value="time_increase_percent", digits=1),
-        Column("", value="remarks", text=True),
+        Column("", value=remarks, text=True),
     )
     caption = f"cuts in this table: {curve.cuts}"
     return Table("tolerance against time", columns, curve.points, caption)
@@ -441,7 +406,7 @@ class ConversionPlan:
     ) -> None:
         self.program, self.machine, self.budget, self.choice = program, machine, budget, choice
         self.pool, self.on_progress = pool, on_progress
-        self.fixed_period = block_period_s is not None
+        self.fixed_period = block_period_s is not None or machine.emission.block_period_s is not None
         self.model = MachineModel(machine)
         # Simulated while the shapers are designed.
         self.originals = [
@@ -453,17 +418,12 @@ class ConversionPlan:
         self.grid = self.grid_for(block_period_s)
         self.writer = TextWriter(program, self.model, self.grid, pool)
         self.judge = Judge(self.model)
-        self.curves = CutCurves(self.writer, program, machine, self.originals)
-        self.aims = Aims(
-            program,
-            machine,
-            [
-                choice.not_shaped.get(index) or why_kept(program, region, machine, self.grid)
-                for index, region in enumerate(program.regions)
-            ],
-            self.curves.of,
-        )
-        self.reasons = self.aims.reasons
+        self._curves: dict[int, CutCurve] = {}  # of cuts on this grid, planned on first use
+        self.reasons = [
+            choice.not_shaped.get(index) or why_kept(program, region, machine, self.grid)
+            for index, region in enumerate(program.regions)
+        ]
+        self.aims = Aims(program, machine, self.reasons, self.curve_of)
         self.gains_um: dict[int, float] = {}
         self.left: set[int] = set(choice.not_shaped)  # with a reason in the table of cuts
         self.simulated: dict[int, tuple[object, RegionFigures]] = {}
@@ -479,7 +439,23 @@ class ConversionPlan:
         """Write on this grid from now on."""
         if self.writer.grid is not grid:
             self.writer = TextWriter(self.program, self.model, grid, self.pool)
-            self.curves.use(self.writer)
+            self._curves.clear()
+
+    def note_curves(self, written: Written) -> None:
+        """Store the curves, of one point, of the cuts that the tolerance does not slow: they need no plan."""
+        for index, shaped in written.shaped.items():
+            if not shaped.is_slowed:
+                self._curves.setdefault(index, CutCurve((max(shaped.planned_um, 1e-3),), (shaped.duration_s,)))
+
+    def curve_of(self, index: int) -> CutCurve:
+        """The curve of a cut."""
+        if index not in self._curves:
+            original_um = getattr(self.originals[index].result(), self.judge.target).max_abs_mm * 1e3
+            self._curves[index] = plan_curve(
+                self.program.regions[index].path, self.writer.grid.fir, self.writer.options(index),
+                self.machine.tolerance.contour_um * _MARGIN, original_um,
+            )  # fmt: skip
+        return self._curves[index]
 
     def excess_s(self, shaped: Shaped) -> float:
         """Time by which the program exceeds its permitted increase of time (`price_s`), s; negative: below it."""
@@ -512,12 +488,10 @@ class ConversionPlan:
         """True if a cut can be left unchanged."""
         return keepable(self.program.regions[index], self.program)
 
-    def leave(self, index: int, reason: str, gained_um: float | None) -> None:
+    def leave(self, index: int, reason: str) -> None:
         """Leave a cut unchanged."""
         self.reasons[index] = reason
         self.left.add(index)
-        if gained_um is not None:
-            self.gains_um[index] = gained_um
 
     def leave_out(self) -> None:
         """Leave cuts unchanged without gain; all that can be if every cut keeps its limits (not with `shape_all`)."""
@@ -529,7 +503,8 @@ class ConversionPlan:
             if not reason and self.is_keepable(index):
                 most = max_gain_um(original.result())
                 if most < least:
-                    self.leave(index, f"nothing to gain: {most:.1f} µm", most)
+                    self.gains_um[index] = most
+                    self.leave(index, f"nothing to gain: {most:.1f} µm")
         if self.original_within:
             self.leave_everything("every cut of the original keeps its limits")
 
@@ -537,8 +512,7 @@ class ConversionPlan:
         """Leave every cut unchanged for which that is possible; a cut without a reason gets this one."""
         for index in self.chosen:
             if self.is_keepable(index):
-                gained = self.gains_um.get(index)
-                self.leave(index, reason or f"shaping gains {gained or 0.0:.1f} µm", gained)
+                self.leave(index, reason or f"shaping gains {self.gains_um.get(index, 0.0):.1f} µm")
 
     def _original_is_within(self) -> bool:
         """True if every cut of the original keeps its limits in every operating condition that counts."""
@@ -547,7 +521,7 @@ class ConversionPlan:
         nominal = Judge(self.model, [case for case in self.judge.cases if case.nominal])
         for judge in (nominal, self.judge):  # the first needs few simulations
             figures = [
-                simulate_unchanged(judge, self.model, region, region, original.result())
+                judge.simulate_unchanged(region, region, original.result())
                 for region, original in zip(regions, self.originals, strict=True)
             ]
             if any(verdict.misses for verdict in judge.verdicts(figures, placed, self.grid.block_period_s)):

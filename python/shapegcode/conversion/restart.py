@@ -9,7 +9,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import chain
 
 import numpy as np
@@ -25,7 +24,7 @@ from shapegcode.verdict.figures import Placed
 
 EXTRA_SYSTEM = 541  # G54.1 as the core counts it
 PLACEHOLDER = "N00000"  # N word of a restart point before the program is assembled
-_FIRST_NUMBER, _END_NUMBER = 10_000, 100_000  # five digits, as `PLACEHOLDER`
+FIRST_NUMBER, END_NUMBER = 10_000, 100_000  # five digits, as `PLACEHOLDER`
 _ROUND = 1000
 _N_WORD = re.compile(rb"N *0*([0-9]{1,8})")
 
@@ -71,31 +70,16 @@ class RestartPoint:
     spindle_rev_per_min: float | None = None  # in force; null: none programmed
 
 
-class FreeNumbers:
-    """Unused N numbers of a program, for its restart points."""
-
-    def __init__(self, program: Program) -> None:
-        self._program = program
-
-    def first(self, count: int) -> list[int]:
-        """N numbers that the program does not use, reproducible and, if possible, ascending."""
-        if count > len(self._free):
-            raise _core.ProgramError(
-                f"{self._program.source}:1:1: {count} restart points, but only {len(self._free)} N numbers from "
-                f"{_FIRST_NUMBER} to {_END_NUMBER - 1} are free: raise emission.restart_interval_s"
-            )
-        return self._free[:count]
-
-    @cached_property
-    def _free(self) -> list[int]:
-        used = np.zeros(_END_NUMBER, dtype=bool)
-        for lines in whole_lines(self._program.core):
-            numbers = np.array(_N_WORD.findall(lines.upper()), dtype="S8").astype(np.int64)
-            used[numbers[numbers < _END_NUMBER]] = True
-        last = int(np.flatnonzero(used)[-1]) if used.any() else 0
-        begin = max(_FIRST_NUMBER, math.ceil((last + 1) / _ROUND) * _ROUND)
-        free = np.flatnonzero(~used)
-        return [*map(int, free[free >= begin]), *map(int, free[(free >= _FIRST_NUMBER) & (free < begin)])]
+def free_numbers(program: Program) -> list[int]:
+    """N numbers for restart points that a program does not use, reproducible and, if possible, ascending."""
+    used = np.zeros(END_NUMBER, dtype=bool)
+    for lines in whole_lines(program.core):
+        numbers = np.array(_N_WORD.findall(lines.upper()), dtype="S8").astype(np.int64)
+        used[numbers[numbers < END_NUMBER]] = True
+    last = int(np.flatnonzero(used)[-1]) if used.any() else 0
+    begin = max(FIRST_NUMBER, math.ceil((last + 1) / _ROUND) * _ROUND)
+    free = np.flatnonzero(~used)
+    return [*map(int, free[free >= begin]), *map(int, free[(free >= FIRST_NUMBER) & (free < begin)])]
 
 
 def system_of(state: _core.ModalState) -> str:

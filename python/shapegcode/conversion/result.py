@@ -18,14 +18,13 @@ from shapegcode.conversion.tables import (
     before_after_table,
     change_percent,
     cut_table,
-    percent,
     sensitivity_table,
 )
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program import Program
 from shapegcode.program.comparison import KindCount, ProgramDifference
 from shapegcode.results.json import Provenance, exact, hidden, sparse
-from shapegcode.results.outcome import CONTOURS, ContourError, Pair, Plot, Xyz
+from shapegcode.results.outcome import CONTOURS, ContourError, Pair, Plot
 from shapegcode.results.result import Result
 from shapegcode.results.table import Table
 from shapegcode.verdict.figures import AppliedLimits, BlockCount, Placed, ProgramFigures, UsedShaper, case_table
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
     from shapegcode.results.page.model import Light, Section
     from shapegcode.results.page.scene import Scene
 
-_VIBRATIONS = {"residual_vibration_um": "residual vibration", "peak_vibration_um": "peak vibration"}
 _MIN_SHOWN_UM = 0.05
 _DEVIATIONS = {"max": "largest", "rms": "RMS", "gouge": "gouge", "excess": "excess"}
 
@@ -88,10 +86,9 @@ class FilterAdvice:
     def __str__(self) -> str:
         lower = f"with {self.enough_s * 1e3:.3g} ms" if self.enough_s > 0.0 else "switched off"
         return (
-            f"the control's {self.now_s * 1e3:.3g} ms filter rounds the path by {self.rounding_um:.0f} µm "
-            "(lines {} to {})".format(*self.lines)
-            + f": {lower} ({self.key}), or with contour control, the original "
-            "keeps every limit unshaped"
+            f"the control's {self.now_s * 1e3:.3g} ms filter rounds the path by {self.rounding_um:.0f} µm (lines "
+            f"{self.lines[0]} to {self.lines[1]}): {lower} ({self.key}), or with contour control, the original keeps "
+            "every limit unshaped"
         )
 
 
@@ -240,7 +237,6 @@ class Conversion(ProgramFigures, Result):
                 f"{verdict}: {why}; residual vibration {axis.upper()} {vibration.original[axis]:.1f} µm, contour "
                 f"{target.original.max:.1f} µm; {self._unchanged}"
             )
-        change = change_percent(self.cycle_time_s.original, self.cycle_time_s.emitted)
         worst_stay = target.original.max - target.emitted.max < _MIN_SHOWN_UM and (
             vibration.original[axis] - vibration.emitted[axis] < _MIN_SHOWN_UM
         )
@@ -256,8 +252,8 @@ class Conversion(ProgramFigures, Result):
         if shown.count(" 0.0 ") == 2:
             shown = ""  # the gain is in the contour
         return (
-            f"{verdict}: {shown}contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}"
-            f"{share}{beside}"
+            f"{verdict}: {shown}contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, "
+            f"time {change_percent(self.cycle_time_s.original, self.cycle_time_s.emitted)}{share}{beside}"
         )
 
     def _why_unchanged(self) -> str:
@@ -307,9 +303,8 @@ class Conversion(ProgramFigures, Result):
             return f"do not run it ({self.reason}): {remedy}."
         if not self.within_tolerance:
             return (
-                "decide whether the cuts that remain out of tolerance matter for this part (see the table of "
-                "cuts); then run the "
-                "emitted program above the workpiece, without a tool."
+                "decide whether the cuts that remain out of tolerance matter for this part (see the table of cuts); "
+                "then run the emitted program above the workpiece, without a tool."
             )
         if self.warnings:
             return "resolve the warnings, then run the emitted program above the workpiece, without a tool."
@@ -348,8 +343,10 @@ class Conversion(ProgramFigures, Result):
         return [times, *self._vibrations(), *self._contours(), *self._orbits_and_feeds(), self._sizes()]
 
     def _vibrations(self) -> Iterator[list[BeforeAfter]]:
-        for key, name in _VIBRATIONS.items():
-            both: Pair[Xyz[float]] = getattr(self, key)
+        for name, both in (
+            ("residual vibration", self.residual_vibration_um),
+            ("peak vibration", self.peak_vibration_um),
+        ):
             limits = {axis: self.residual_limit_um(axis) for axis in "xyz" if name.startswith("residual")}
             yield [
                 BeforeAfter(

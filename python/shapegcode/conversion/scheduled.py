@@ -97,9 +97,6 @@ class ScheduledConversion(Conversion):
 
 
 _ROUNDS = 4
-_MORE_MARGIN = 0.005  # added to the excess of the last round
-
-Progress = Callable[[float], None]
 
 
 def convert_scheduled(
@@ -113,7 +110,7 @@ def convert_scheduled(
     block_period_s: float | None = None,
     arc_feed_ratio: float | None = None,
     budget: Budget | None = None,
-    on_progress: Progress = lambda _done: None,
+    on_progress: Callable[[float], None] = lambda _done: None,
 ) -> ScheduledConversion:
     """Schedule the feeds of a program, shape it, and compute the force of the emitted program.
 
@@ -160,7 +157,7 @@ def convert_scheduled(
         excess = emitted.excess_ratio
         if excess <= 0.0:
             break
-        margin += excess + _MORE_MARGIN
+        margin += excess + 0.005  # a little more than the last round exceeded it
     warnings = tuple(dict.fromkeys([*emitted.warnings, *conversion.warnings]))
     changed: dict[str, object] = {"warnings": warnings}
     if not emitted.ok:
@@ -180,17 +177,14 @@ def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, m
     ordinary = OrdinaryMotion(machine)
     loads: list[PathLoad | None] = []
     for part, region, load in zip(planned.survey.regions, planned.written.regions, planned.loads, strict=True):
-        if load is None or part.tool is None:
-            loads.append(load)
+        if load is None:
+            loads.append(None)
             continue
-        window_s = part.window_s
-        along = part.region.path
-        place = placed.get(id(region))
-        if place is None:
+        along, window_s = part.region.path, part.window_s
+        if (place := placed.get(id(region))) is None:
             travelled = ordinary.travel(region.path, along, load.s_mm, window_s)
         else:
-            blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
-            travelled = travel_emitted(blocks, along, machine, load.s_mm, window_s)
+            travelled = travel_emitted(place.blocks(conversion.emitted), along, machine, load.s_mm, window_s)
         loads.append(replace(load, emitted=load_of(part, travelled)))
     return feed_figures(
         planned.survey, planned.plans, loads, machine, margin=margin, text=planned.text, written=planned.written,

@@ -23,7 +23,6 @@ from shapegcode.verdict.figures import Case, CaseFigures, Placed, case_figures, 
 from shapegcode.verdict.judge import Judge, RegionFigures
 
 _MIN_SHARE = 0.01  # of a limit: smaller effects do not matter
-_MAX_SHOWN = 8
 _FREE_S = 60.0  # total duration of motion that may always be simulated with contour error
 _FULL_RUNS = 2  # simulations of a whole region; the verdict needs about twice as many
 _FILTER_S = 0.024  # typical time constant (parameter 1769 or 1622) of a machining centre, if the file has none
@@ -161,7 +160,7 @@ def _ranked(rows: Sequence[Sensitivity]) -> tuple[Sensitivity, ...]:
         matters = row.share >= _MIN_SHARE or row.key.endswith(".modes")
         if matters and (row.key not in worst or row.share > worst[row.key].share):
             worst[row.key] = row
-    return tuple(sorted(worst.values(), key=lambda row: -row.share)[:_MAX_SHOWN])
+    return tuple(sorted(worst.values(), key=lambda row: -row.share)[:8])
 
 
 def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
@@ -272,17 +271,9 @@ def _key_of(case: Case) -> tuple[str, str]:
     return ("controller.block_end", case.name) if case.nominal else ("", "")
 
 
-# Percentages of smaller values would compare round-off errors.
-_MIN_COMPARED_UM = 1.0
-
-
-def change_percent(original: float, emitted: float) -> float:
-    """Change from original to emitted; the original is not zero."""
-    return (emitted - original) / abs(original) * 100
-
-
-def percent(change: float) -> str:
-    """A change in percent, as text."""
+def change_percent(original: float, emitted: float) -> str:
+    """Change from original to emitted in percent, as text; the original is not zero."""
+    change = (emitted - original) / abs(original) * 100
     return "0 %" if abs(change) < 0.05 else f"{change:+.1f} %"
 
 
@@ -300,31 +291,30 @@ class BeforeAfter:
     @property
     def change(self) -> str:
         """Change from original to emitted; empty if the original is missing or too small."""
-        least = _MIN_COMPARED_UM if self.unit == "µm" else 0.5 * 10.0**-self.digits
+        # Percentages of smaller values would compare round-off errors.
+        least = 1.0 if self.unit == "µm" else 0.5 * 10.0**-self.digits
         if self.original is None or abs(self.original) < least:
             return ""
-        return percent(change_percent(self.original, self.emitted))
+        return change_percent(self.original, self.emitted)
 
     def text(self, value: float | None) -> str:
         """Format one of its figures."""
         return "" if value is None else f"{float(value):z.{self.digits}f}"
 
 
-_BEFORE_AFTER = (
-    Column("figure", text=True),
-    Column("unit", text=True),
-    Column("original", value=lambda row: row.text(row.original)),
-    Column("emitted", value=lambda row: row.text(row.emitted)),
-    Column("change"),
-    Column("limit", value=lambda row: row.text(row.limit)),
-)
-
-
 def before_after_table(groups: Sequence[Sequence[BeforeAfter]]) -> Table:
     """Figures of original and emitted program, in groups."""
+    columns = (
+        Column("figure", text=True),
+        Column("unit", text=True),
+        Column("original", value=lambda row: row.text(row.original)),
+        Column("emitted", value=lambda row: row.text(row.emitted)),
+        Column("change"),
+        Column("limit", value=lambda row: row.text(row.limit)),
+    )
     filled = [group for group in groups if group]
     sections = [sum(len(group) for group in filled[:rank]) for rank in range(1, len(filled))]
-    return Table("", _BEFORE_AFTER, [row for group in filled for row in group], sections=sections)
+    return Table("", columns, [row for group in filled for row in group], sections=sections)
 
 
 def sensitivity_table(rows: Sequence[Sensitivity], tried: int) -> Table:
@@ -377,11 +367,6 @@ class CutOutcome(OldNames):
     misses: tuple[str, ...]  # limits that it misses, as text
     # remedy for limits missed by a cut left unchanged; empty: none missed, or the cut is shaped
     remedy: str = ""
-
-    @property
-    def cutting_s(self) -> float:
-        """Time of the original cut, s."""
-        return self.time_s.original
 
 
 def remedy_for(reason: str) -> str:

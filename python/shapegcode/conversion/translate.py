@@ -394,7 +394,7 @@ class _Translator:
         stated = any(_COORDINATE.search(self._own.get(code, "")) for code in codes)
         if "G04" in codes or stated or self._taken(codes) or (self._dialect.one_code and self.state.incremental):
             return
-        want = {letter: float(self._length(letter, value, self._dialect)) for letter, value in words if letter in "XYZ"}
+        want = {letter: float(self._length(letter, value)) for letter, value in words if letter in "XYZ"}
         have = {letter: float(value) for line in lines for letter, value in _COORDINATE.findall(line)}
         lost = [letter for letter, value in want.items() if not abs(have.get(letter, math.nan) - value) <= _SAME_MM]
         is_chords = self._dialect.one_code and self.state.motion in (2, 3)
@@ -450,7 +450,7 @@ class _Translator:
             return self._filled(dialect.becomes.get(code, short))
         if letter in "XYZIJRF" or (letter == "K" and not self.state.cycle):
             address = dialect.arc_radius if letter == "R" and not self.state.cycle else letter
-            return "" if letter == "R" and not address else address + self._length(letter, value, dialect)
+            return "" if letter == "R" and not address else address + self._length(letter, value)
         if letter == "N":
             return "" if dialect.one_code else letter + value
         if letter == "T" and "M06" not in codes:
@@ -464,7 +464,7 @@ class _Translator:
         if letter == "D" and "G41" in dialect.same:
             return letter + value
         if self.state.cycle and letter in "QL":
-            return letter + (self._length("Q", value, dialect) if letter == "Q" else value)
+            return letter + (self._length("Q", value) if letter == "Q" else value)
         if self.state.cycle and letter == "P":
             if "G82" not in codes:
                 raise self._error(number, f"P{value}: its meaning is known only in a block with G82")
@@ -472,7 +472,7 @@ class _Translator:
         why = " repeats a drilling cycle" if letter == "K" else ""
         raise self._error(number, f"{letter}{value}{why}: its meaning on {dialect.control} is not known{_CURE}")
 
-    def _length(self, letter: str, value: str, dialect: Dialect) -> str:
+    def _length(self, letter: str, value: str) -> str:
         """A number with a decimal point: the meaning of one without a point differs between controls."""
         controller = self._machine.controller
         if "." not in value:
@@ -482,7 +482,7 @@ class _Translator:
                 value = f"{int(value) * step:.6f}".rstrip("0")
             else:
                 value += "."
-        bare = dialect.arc_radius == "CR=" and value.lstrip("+-").startswith(".")
+        bare = self._dialect.arc_radius == "CR=" and value.lstrip("+-").startswith(".")
         return value.replace(".", "0.") if bare else value
 
     def _seconds(self, number: int, time_s: float, form: str) -> str:
@@ -528,7 +528,7 @@ class _Translator:
                 filled = f"{text} {tail}{named[tail]}" if tail in named and tail else text
                 (late if code in _BEHIND_THE_MOVE else lines).append(filled)
         if "F" in named:
-            state.feed, state.needs_feed = f"F{self._length('F', named['F'], self._dialect)}", True
+            state.feed, state.needs_feed = f"F{self._length('F', named['F'])}", True
         is_circle = state.motion in (2, 3) and not named.keys().isdisjoint("IJK")
         if "G04" in codes or not (move or is_circle):
             return [*lines, *late]

@@ -6,14 +6,14 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from queue import SimpleQueue
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.conversion.restart import CutRestarts, FreeNumbers
+from shapegcode.conversion.restart import END_NUMBER, FIRST_NUMBER, CutRestarts, free_numbers
 from shapegcode.conversion.write import (
     EmittedRegion,
     OverBudgetError,
@@ -86,13 +86,9 @@ class Written:
     placed: list[Placed]  # its shaped regions
     blocks: int  # shaped blocks in it
     kept_warnings: list[str]  # a sentence for every region left unchanged that the tables do not list
-    # planned deviation by index of a shaped region, µm, if there is a contour target
-    planned_um: dict[int, float]
-    loads: dict[int, TransferLoad]  # by index of a shaped region
-    # reason by index of a region left unchanged for lack of space
-    no_room: dict[int, str]
-    unslowed: set[int]  # indices of shaped cuts that their contour tolerance does not slow
-    durations_s: dict[int, float]  # time of the blocks by index of a shaped cut
+    shaped: dict[int, EmittedRegion]  # by index of a shaped region
+    loads: dict[int, TransferLoad]  # likewise
+    no_room: dict[int, str]  # reason by index of a region left unchanged for lack of space
     restarts: list[CutRestarts]  # of each shaped region, as in `placed`
 
     def read_back(self, machine: Machine) -> Program:
@@ -108,9 +104,8 @@ class Written:
 class Prefetch(Generic[T]):
     """Runs tasks in a pool, in order; a limited number of them is started ahead of the results that are fetched.
 
-    `tasks`: by number; each gets a function, and calls it with its finished ratio. `weights`: of
-    all parts, some of which have no task. `on_progress`: called with the sum of the finished weights, by the thread
-    that fetches results; it may be replaced.
+    `tasks`: by number; each gets a function, and calls it with its finished ratio. `weights`: of all parts, some of
+    which have no task. `on_progress`: called with the sum of the finished weights, by the thread that fetches results.
     """
 
     def __init__(
@@ -167,11 +162,9 @@ class TextWriter:
     def __init__(self, program: Program, model: MachineModel, grid: Grid, pool: Executor) -> None:
         self._program, self._machine, self._model, self.grid = program, model.machine, model, grid
         self._regions = RegionWriter(model, grid)
-        self._numbers = FreeNumbers(program)
         self._pool = pool
         # By region: tolerance and feed for which it was shaped, and the result.
-        self._shaped: dict[int, tuple[Aim, EmittedRegion]] = {}
-        self._loads: dict[int, TransferLoad] = {}
+        self._shaped: dict[int, tuple[Aim, EmittedRegion, TransferLoad]] = {}
         self._started: tuple[dict[int, Aim], Prefetch[EmittedRegion]] | None = None
 
     def begin(self, aims: dict[int, Aim]) -> None:
@@ -194,7 +187,7 @@ class TextWriter:
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)
         position = core.header_offset
-        written = Written([], [], 0, [], 0, [], {}, {}, {}, set(), {}, [])
+        written = Written([], [], 0, [], 0, [], {}, {}, {}, [])
         blocks, size = 0, core.size
         begin = sum(map(len, parts))
         # Unchanged moves: all except those of the shaped regions.
@@ -209,7 +202,7 @@ class TextWriter:
             shaped, bytes_read = None, region.text_end - region.text_begin
             if not reason:
                 try:
-                    shaped = self._shaped_region(index, aims[index], ahead)
+                    shaped, load = self._shaped_region(index, aims[index], ahead)
                     self._space_left(size - bytes_read, blocks + kept_moves).require(shaped.text.size, shaped.blocks)
                 except OverBudgetError as error:
                     shaped = None
@@ -226,12 +219,7 @@ class TextWriter:
                 blocks += shaped.blocks
                 written.placed.append(Placed(region, line, line + _lines(texts) - 1))
                 written.texts.append((shaped.text, begin))
-                written.durations_s[index] = shaped.duration_s
-                if not shaped.is_slowed:
-                    written.unslowed.add(index)
-                if shaped.planned_um > 0.0:
-                    written.planned_um[index] = shaped.planned_um
-                written.loads[index] = self._loads[index]
+                written.shaped[index], written.loads[index] = shaped, load
             line += _lines(texts)
             begin += sum(map(len, texts))
             parts += [between, *texts]
@@ -244,10 +232,19 @@ class TextWriter:
         if not marks:
             return shaped.restarts
         taken = sum(len(each.marks) for each in before)
-        numbers = self._numbers.first(taken + len(marks))[taken:]
+        numbers = self._free_numbers[taken : taken + len(marks)]
+        if len(numbers) < len(marks):
+            raise _core.ProgramError(
+                f"{self._program.source}:1:1: {taken + len(marks)} restart points, but only {len(self._free_numbers)} "
+                f"N numbers from {FIRST_NUMBER} to {END_NUMBER - 1} are free: raise emission.restart_interval_s"
+            )
         shaped.text.number(marks, numbers)
         numbered = (replace(mark, number=number) for mark, number in zip(marks, numbers, strict=True))
         return replace(shaped.restarts, marks=tuple(numbered))
+
+    @cached_property
+    def _free_numbers(self) -> list[int]:
+        return free_numbers(self._program)
 
     def _space_left(self, size: int, moves: int) -> SpaceLeft:
         controller = self._machine.controller
@@ -274,17 +271,19 @@ class TextWriter:
     def _is_new(self, index: int, aim: Aim) -> bool:
         return index not in self._shaped or self._shaped[index][0] != aim
 
-    def _shaped_region(self, index: int, aim: Aim, ahead: Prefetch[EmittedRegion]) -> EmittedRegion:
+    def _shaped_region(
+        self, index: int, aim: Aim, ahead: Prefetch[EmittedRegion]
+    ) -> tuple[EmittedRegion, TransferLoad]:
         if self._is_new(index, aim):
             shaped = ahead.result(index)
             bits = self._machine.controller.dnc_bits_per_character
-            self._loads[index] = measure_load(self._program.regions[index], shaped, self.grid, bits)
+            load = measure_load(self._program.regions[index], shaped, self.grid, bits)
             shaped.block_periods.clear()  # not used again
             shaped.block_bytes.clear()
-            self._shaped[index] = aim, shaped
+            self._shaped[index] = aim, shaped, load
         else:
             ahead.skip(index)
-        return self._shaped[index][1]
+        return self._shaped[index][1:]
 
     def _shaped_again(
         self, region: _core.Region, allowed_um: float, feed_share: float, space: SpaceLeft, on_share: OnShare
@@ -332,7 +331,6 @@ def _lines(parts: Sequence[bytes]) -> int:
     return sum(part.count(b"\n") for part in parts)
 
 
-_LARGEST_SWEEP_RAD = math.pi / 2
 _STATE_FIELDS = (
     "motion", "plane", "distance", "feed_mode", "units", "compensation", "length_offset",
     "cycle", "cycle_return", "coordinate_system", "exact_stop", "feed",
@@ -355,7 +353,7 @@ def read_back(parts: list[bytes], placed: Sequence[Placed], machine: Machine) ->
             _compare_states(state, own, line, math.inf if region.incremental else tolerance_mm[own.units])
         blocks = place.blocks(emitted)
         _compare_ends(blocks, place, tolerance_mm)
-        if blocks.largest_sweep_rad >= _LARGEST_SWEEP_RAD:
+        if blocks.largest_sweep_rad >= math.pi / 2:
             raise RoundTripError(
                 f"emitted arc between lines {place.first_line} and {place.last_line} sweeps "
                 f"{math.degrees(blocks.largest_sweep_rad):.1f} degrees (limit 90)"

@@ -76,8 +76,8 @@ class EmittedRegion:
     block_bytes: list[npt.NDArray[np.uint32]]  # likewise the characters of each block
     planned_um: float  # deviation for which the feed was planned, µm; 0 without a target
     restarts: restart.CutRestarts  # blocks at which the control can restart
-    is_slowed: bool = True  # it is slower than without a contour tolerance
-    duration_s: float = 0.0  # time of its blocks
+    is_slowed: bool  # it is slower than without a contour tolerance
+    duration_s: float  # time of its blocks
 
 
 @dataclass(frozen=True)
@@ -132,19 +132,11 @@ class SpaceLeft:
         raise OverBudgetError(f"its shaped text would take the program over {limit}")
 
 
-_DEGREE = math.pi / 180.0
-_PLUNGE_CORNER_DEG = 45.0
 _PIECE_PERIODS = 1 << 17  # of a region at a time: bounds the memory
 _CORNER_SHARE = 0.75  # deviations of several corners within one shaper duration add up
 
 
 _FADED = 1.0 / 3.0  # part of the time to decay to a millionth in which it decays to a hundredth
-
-_TARGETS = {
-    "response": _core.ContourTarget.response,
-    "command": _core.ContourTarget.command,
-    "off": _core.ContourTarget.none,
-}
 
 
 def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
@@ -228,10 +220,11 @@ class RegionWriter:
             options.limits.max_jerk_mm_per_s3 = planned_jerk_mm_s3(self._machine)
         options.block_period_s = grid.block_period_s
         options.interpolation_period_s = self._model.period_s
-        options.plunge_axis_angle_rad = self._machine.shaping.plunge_angle_deg * _DEGREE
-        options.plunge_corner_angle_rad = _PLUNGE_CORNER_DEG * _DEGREE
+        options.plunge_axis_angle_rad = math.radians(self._machine.shaping.plunge_angle_deg)
+        options.plunge_corner_angle_rad = math.radians(45.0)
         options.rest_at_stop_s = self._model.shaped_filter.duration_s
-        options.target = _TARGETS[self._machine.shaping.contour]
+        targets = _core.ContourTarget.__members__
+        options.target = targets.get(self._machine.shaping.contour, _core.ContourTarget.none)
         options.modes = plant.modes
         options.axis_shapers = list(grid.axis_firs)
         options.feed_excess_ratio = self._machine.tolerance.feed_excess_ratio
@@ -332,18 +325,11 @@ class RegionWriter:
         emitted = RegionText([before, *texts, _lines(after, state)])
         unstopped, stops = stopped
         found = restarts.result(before, stops, (end - unstopped) * fit.block_period_s if stops else 0.0)
-        planned_um = shaper.largest_deviation_mm * 1e3
         duration_s = float(sum(int(part.sum()) for part in periods)) * self._grid.block_period_s
         return EmittedRegion(
-            emitted,
-            sum(map(len, periods)),
-            periods,
-            _block_bytes(texts, map(len, periods)),
-            planned_um,
-            found,
-            shaper.is_slowed,
-            duration_s,
-        )
+            emitted, sum(map(len, periods)), periods, _block_bytes(texts, map(len, periods)),
+            shaper.largest_deviation_mm * 1e3, found, shaper.is_slowed, duration_s,
+        )  # fmt: skip
 
     def _fit(self, region: _core.Region) -> _core.FitOptions:
         controller, emission = self._machine.controller, self._machine.emission
@@ -407,11 +393,7 @@ def _pieces(shaper: _core.RegionShaper) -> Generator[tuple[_core.ShapedCommand, 
         return piece, shaper.share
 
     piece, share = shaped()
-    assert piece is not None  # the first one always exists
     following, following_share = shaped()
-    if following is None:
-        yield piece, share, True
-        return
     with ThreadPoolExecutor(max_workers=1) as other:
         while piece is not None:
             under_way = other.submit(shaped) if following is not None else None

@@ -20,8 +20,6 @@ from shapegcode.results.json import OldNames, sparse
 from shapegcode.results.outcome import CONTOURS, ContourError, Deviation, Pair, Tracks, Xyz
 from shapegcode.results.table import NO_BREAK, Column, Table
 
-_MIN_BETTER = 0.3  # relative reduction of a figure that counts as a benefit
-
 
 @dataclass(frozen=True)
 class Placed:
@@ -201,7 +199,7 @@ class RegionVerdict:
         return any(
             before > threshold
             and before - after >= least_gain_um
-            and (after <= (1.0 - _MIN_BETTER) * before or (before > limit >= after))
+            and (after <= 0.7 * before or (before > limit >= after))
             for before, after, limit, threshold in pairs
         )
 
@@ -257,7 +255,6 @@ class ProgramFigures:
 Target = Literal["command", "response"]
 
 ALL_MODES = "all"
-_OVERRIDES_PERCENT = (50.0, 60.0, 70.0, 80.0, 90.0, 110.0, 120.0)
 
 
 @dataclass(frozen=True)
@@ -354,14 +351,7 @@ def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]
 
 
 def stated_cases(machine: Machine) -> list[Case]:
-    """Operating conditions of the verdict for a machine; the nominal ones come first (FANUC: ceil, carry).
-
-    Feed overrides from 50 to 120 % and at both ends of `verdict.override_percent` (none if the override is locked);
-    each mode, and all modes at once, shifted up and down by the uncertainty, at the lowest damping; all modes shifted
-    at both ends of the override range; look-ahead left on (for a controller that has it); and a buffer underrun. The
-    last two are left out for a control whose planner cannot be switched off: it plans in every condition, and stops in
-    time if its buffer runs empty.
-    """
+    """Operating conditions of the verdict for a machine; the nominal ones come first (FANUC: ceil, carry)."""
     band, kind = machine.verdict, machine.controller.kind
     low, high = band.override_percent
     own = machine.controller.block_end if kind == "fanuc" else None
@@ -375,7 +365,8 @@ def stated_cases(machine: Machine) -> list[Case]:
 
     turns = machine.emission.override != "lock"  # a disabled override has no effect
     ends = sorted({low, high} - {100.0}) if turns else []
-    cases += [at_override(percent) for percent in sorted({*_OVERRIDES_PERCENT, *ends} - {100.0}) if turns]
+    overrides = {50.0, 60.0, 70.0, 80.0, 90.0, 110.0, 120.0, *ends} if turns else set[float]()
+    cases += [at_override(percent) for percent in sorted(overrides)]
     modes = _uncertain_modes(machine)
     for mode, variants in modes:
         cases += [Case(words, own, band.mode_uncertainty, mode=mode, shift=shift) for words, shift in variants]
@@ -389,7 +380,7 @@ def stated_cases(machine: Machine) -> list[Case]:
             for corner in map(at_override, ends)
             for shift, words in together
         ]
-    if own is None:
+    if own is None:  # a planner that cannot be switched off: it stops in time if its buffer runs empty
         return cases
     if machine.controller.motion == "look_ahead" or band.look_ahead:
         cases.append(Case("look-ahead on", None, band.look_ahead, look_ahead=True))
@@ -426,7 +417,6 @@ def region_misses(
 
 
 _NUMBER = re.compile(r"(\d) (%|ms\b|s\b|mm\b|Hz\b|µm\b)")
-_MIN_VIBRATION_UM = 0.005  # an axis below this everywhere has no column
 
 
 def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table:
@@ -436,7 +426,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         *(
             Column(axis.upper(), value=f"residual_um.{axis}", digits=2)
             for axis in "xyz"
-            if any(case.residual_um[axis] >= _MIN_VIBRATION_UM for case in cases)
+            if any(case.residual_um[axis] >= 0.005 for case in cases)
         ),
         Column("command", value=lambda case: _known(case.contour_error_um.command, 1)),
         Column("table", value=lambda case: _known(case.contour_error_um.response, 1)),

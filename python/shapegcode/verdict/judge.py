@@ -173,6 +173,34 @@ class Judge:
             results.append(RegionFigures(result(original), nominal, cases, result(each.slowed)))
         return results
 
+    def simulate_unchanged(
+        self, mine: _core.Region, region: _core.Region, original: _core.SimulationFigures
+    ) -> RegionFigures:
+        """Simulate an unchanged cut in every operating condition that counts for it.
+
+        Three conditions affect shaped blocks only, and get the nominal result: the other block timing, a buffer
+        underrun, and look-ahead left on. Other feed overrides and uncertain modes are simulated where they count. The
+        path is that of the emitted program, which may have chords instead of an arc.
+        """
+        model, path, offset = self._model, mine.path, self._model.offset(region)
+        same = path.moves_as(region.path)
+        run = original
+        if not (same and model.is_emitted_alike(path)):
+            run = model.simulate_original(path, against=region.path, offset=offset, emitted=True)
+
+        def figures(case: Case) -> CaseFigures | None:
+            if case.override == 1.0 and case.mode is None:
+                return case_figures(run)
+            if not case.counts:
+                return None
+            simulated = model.simulate_original(
+                path, against=None if same else region.path, override=case.override, shift=case.shift,
+                only=None if case.mode == ALL_MODES else case.mode, offset=offset, emitted=True,
+            )  # fmt: skip
+            return case_figures(simulated)
+
+        return RegionFigures(original, (run,), tuple(map(figures, self.cases)), 0, is_shaped=False)
+
     def contour_um(self, figures: RegionFigures, *, turned: bool = True) -> float:
         """Largest deviation of the target, µm, in conditions that count; not with look-ahead left on or an underrun.
 
@@ -388,7 +416,7 @@ def judge_program(
         shaped_cuts = [*compress(placed, is_shaped)], [*compress(originals, is_shaped)]
         simulated = iter(judge.measure(emitted, *shaped_cuts, pool))
         unchanged = [
-            pool.submit(simulate_unchanged, judge, model, mine, region, original.result())
+            pool.submit(judge.simulate_unchanged, mine, region, original.result())
             for (mine, region), original, each in zip(pairs, originals, is_shaped, strict=True)
             if not each
         ]
@@ -397,38 +425,6 @@ def judge_program(
         rapids = Pair(rapid_vibration_um(original, model), rapid_vibration_um(emitted, model))
     period_s = machine.emission.block_period_s or machine.controller.interpolation_period_s
     return judge.summarise(figures, placed, period_s, rapids)
-
-
-def simulate_unchanged(
-    judge: Judge, model: MachineModel, mine: _core.Region, region: _core.Region, original: _core.SimulationFigures
-) -> RegionFigures:
-    """Simulate an unchanged cut in every operating condition that counts for it.
-
-    Three conditions affect shaped blocks only, and get the nominal result: the other block timing, a buffer underrun,
-    and look-ahead left on. Other feed overrides and uncertain modes are simulated where they count. The path is
-    that of the emitted program, which may have chords instead of an arc.
-    """
-    path, offset = mine.path, model.offset(region)
-    same = path.moves_as(region.path)
-    if same and model.is_emitted_alike(path):
-        run = original
-    else:
-        run = model.simulate_original(path, against=region.path, offset=offset, emitted=True)
-
-    def figures(case: Case) -> CaseFigures | None:
-        if case.override == 1.0 and case.mode is None:
-            return case_figures(run)
-        if not case.counts:
-            return None
-        only = None if case.mode == ALL_MODES else case.mode
-        return case_figures(
-            model.simulate_original(
-                path, against=None if same else region.path, override=case.override, shift=case.shift, only=only,
-                offset=offset, emitted=True,
-            )
-        )  # fmt: skip
-
-    return RegionFigures(original, (run,), tuple(map(figures, judge.cases)), 0, is_shaped=False)
 
 
 def rapid_vibration_um(program: Program, model: MachineModel) -> Xyz[float]:

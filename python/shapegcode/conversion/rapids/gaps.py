@@ -8,6 +8,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
@@ -22,15 +23,6 @@ from shapegcode.program import MM_PER_INCH, Program
 from shapegcode.verdict.figures import RegionVerdict
 
 MOVE = _core.StepKind.move
-
-CANNED_CYCLE = "drilling cycle"
-COMPENSATION = "cutter compensation"
-OTHER_WORDS = "other words in its block"
-NEW_STATE = "other codes in its block change the modal state"
-UNKNOWN_START = "start position not known"
-NO_CUT = "no cut follows"
-OFF_GRID = "its end lies between two increments, and the program changes between G20 and G21"
-BLOCK_SKIP = "the modal state depends on the block-skip switch"
 
 # M codes after which the table need not have settled: stops, tool change, end of the program.
 _ENDING_CODES = {0, 1, 2, 6, 30}
@@ -55,11 +47,6 @@ class Rapid:
     reason: str  # why it is left unchanged
     head: str  # its N word and comments; may be empty
 
-    @property
-    def travel_mm(self) -> FloatArray:
-        """Signed travel of each axis, (3,)."""
-        return np.asarray(self.end_mm - self.start_mm)
-
 
 @dataclass(frozen=True)
 class Gap:
@@ -79,9 +66,7 @@ def find_gaps(program: Program, machine: Machine) -> list[Gap]:
     core = program.core
     moves = core.other_moves
     functions = core.functions
-    numbers, counts = np.unique([line for kind, _, line in core.steps if kind == MOVE], return_counts=True)
-    shared = set(numbers[counts > 1].tolist())
-    reader = _Reader(program, machine, shared)
+    reader = _Reader(program, machine)
     gaps: list[Gap] = []
     steps: list[Rapid | float] = []
 
@@ -115,22 +100,21 @@ def find_gaps(program: Program, machine: Machine) -> list[Gap]:
 
 
 class _Reader:
-    def __init__(self, program: Program, machine: Machine, shared: set[int]) -> None:
-        self._core = core = program.core
+    def __init__(self, program: Program, machine: Machine) -> None:
+        core = program.core
         self._program, self._machine = program, machine
-        self._shared = shared  # lines that make several moves
         moves = core.other_moves
-        texts = core.text.split(b"\n")
-        self._begins = [0]
-        for text in texts:
-            self._begins.append(self._begins[-1] + len(text) + 1)
+        self._texts = texts = core.text.decode("latin-1").split("\n")
+        self._begins = list(accumulate((len(text) + 1 for text in texts), initial=0))
         rapids = {
             line
             for kind, index, line in core.steps
             if kind == MOVE and moves[index][1] <= 0.0 and moves[index][0].kind == _core.SegmentKind.rapid
         }
+        counts = Counter(line for kind, _, line in core.steps if kind == MOVE)
+        self._shared = {line for line, count in counts.items() if count > 1}  # lines that make several moves
         # The reader returns no move if the path is unknown.
-        taken = {line for kind, _, line in core.steps if kind == MOVE}
+        taken = set(counts)
         for region in core.regions:
             taken.update(range(region.first_line, region.last_line + 1))
         silent = [n for n, text in enumerate(texts, start=1) if n not in taken and _may_be_rapid(text)]
@@ -148,14 +132,15 @@ class _Reader:
         reason = self._why_kept(line)
         if reason:
             return Rapid(line, start_mm, end_mm, None, reason, "")
-        source = self._source(line)
-        begin, end = self._begins[line - 1], min(self._begins[line], self._core.size)
+        source = self._texts[line - 1]
+        begin, end = self._begins[line - 1], min(self._begins[line], self._program.core.size)
         entry, after = self._states[line - 1], self._states[line]
         feed = self._feed_mm_per_s(end_mm - start_mm, entry.units)
         path = _core.Path([_core.Segment.line(start_mm, end_mm, feed)])
         region = _core.Region(path=path, entry=entry, exit=after, line=line, text_begin=begin, text_end=end)
         if why_off_grid(self._program, region, self._machine):
-            return Rapid(line, start_mm, end_mm, None, OFF_GRID, "")
+            reason = "its end lies between two increments, and the program changes between G20 and G21"
+            return Rapid(line, start_mm, end_mm, None, reason, "")
         number = next((f"N{value}" for letter, value in _words(source) or () if letter == "N"), "")
         return Rapid(line, start_mm, end_mm, region, "", number + "".join(_COMMENT.findall(source)))
 
@@ -167,28 +152,25 @@ class _Reader:
         where = np.array(after.position_mm)
         return Rapid(line, where, where, None, self._why_kept(line), "")
 
-    def _source(self, line: int) -> str:
-        return self._core.slice(self._begins[line - 1], min(self._begins[line], self._core.size)).decode("latin-1")
-
     def _start_known(self, line: int) -> bool:
-        block = _COMMENT.sub("", self._source(line)).upper()
+        block = _COMMENT.sub("", self._texts[line - 1]).upper()
         known = self._states[line - 1].known
         return all(is_known for letter, is_known in zip("XYZ", known, strict=True) if letter in block)
 
     def _why_kept(self, line: int) -> str:
         entry, after = self._states[line - 1], self._states[line]
         if entry.cycle != 80 or after.cycle != 80:
-            return CANNED_CYCLE
+            return "drilling cycle"
         if entry.compensation != 40:
-            return COMPENSATION
+            return "cutter compensation"
         if entry.uncertain:
-            return BLOCK_SKIP
-        if line in self._shared or _words(self._source(line)) is None:
-            return OTHER_WORDS
+            return "the modal state depends on the block-skip switch"
+        if line in self._shared or _words(self._texts[line - 1]) is None:
+            return "other words in its block"
         if not self._start_known(line):
-            return UNKNOWN_START
+            return "start position not known"
         if after.motion != 0 or any(getattr(entry, name) != getattr(after, name) for name in _UNCHANGED):
-            return NEW_STATE
+            return "other codes in its block change the modal state"
         return ""
 
     def _feed_mm_per_s(self, travel_mm: FloatArray, units: int) -> float:
@@ -213,9 +195,9 @@ def _words(source: str) -> list[tuple[str, str]] | None:
     return words if plain and codes <= _G_CODES else None
 
 
-def _may_be_rapid(text: bytes) -> bool:
+def _may_be_rapid(text: str) -> bool:
     """True if a block has axis words and no code that changes their meaning."""
-    block = _COMMENT.sub("", text.decode("latin-1")).upper()
+    block = _COMMENT.sub("", text).upper()
     if not any(letter in block for letter in "XYZ"):
         return False
     codes = {value for letter, value in _WORD.findall("".join(block.split())) if letter == "G"}
@@ -239,11 +221,6 @@ class Choice:
     slowed_blocks: int = 0
     verdict: RegionVerdict | None = None
 
-    @property
-    def extra_bytes(self) -> int:
-        """Bytes added by the replacement."""
-        return len(self.text) - (self.region.text_end - self.region.text_begin)
-
 
 class OpenGap:
     """A gap in which rapids may be replaced, with the effect on the time until the next cut can start."""
@@ -251,7 +228,11 @@ class OpenGap:
     def __init__(self, gap: Gap, plant: RapidPlant, pool: Executor, min_gain_s: float) -> None:
         self._plant = plant
         self._min_gain_s = min_gain_s
-        self._steps = [plant.pause(step) if isinstance(step, float) else plant.rapid(step) for step in gap.steps]
+        self._steps = [
+            # A pause: a dwell, an M function.
+            Timing(step, 0.0, 0.0, np.zeros((1, 3))) if isinstance(step, float) else plant.rapid(step)
+            for step in gap.steps
+        ]
         self.choices: list[Choice] = []
         self._at: list[int] = []
         regions = [step.region for step in gap.steps if not isinstance(step, float) and step.region is not None]
@@ -287,7 +268,8 @@ class OpenGap:
 
     def extra_bytes(self) -> int:
         """Bytes that the remaining replacements add."""
-        return sum(choice.extra_bytes for choice in self.choices if choice.text)
+        chosen = [choice for choice in self.choices if choice.text]
+        return sum(len(each.text) - (each.region.text_end - each.region.text_begin) for each in chosen)
 
     def drop(self, reason: str, kept: Counter[str], condition: Callable[[Choice], bool]) -> None:
         """Leave the rapids unchanged that meet a condition."""
@@ -333,34 +315,6 @@ class Timing:
         """Time of the control: motion and wait for in-position."""
         return self.motion_s + self.arrival_s
 
-    @property
-    def settled_s(self) -> float:
-        """Time until the axes are in position and the vibration has settled."""
-        return self.motion_s + max(self.arrival_s, self.settling_s)
-
-
-def settling_time_s(
-    command_mm: FloatArray, options: _core.SimulationOptions, slowest_per_s: float, band_mm: float
-) -> float:
-    """Time from the end of a command until the table stays within a band around it, s; at most 30 s."""
-    still = _core.Path([_core.Segment.line(command_mm[0], command_mm[0], 1.0)])
-    options.measure_contour = False
-    options.record_samples = 0
-    figures = _core.simulate_samples(np.asfortranarray(command_mm), still, options)
-    largest = float(figures.residual_mm.max())
-    if largest <= band_mm:
-        return 0.0
-    # Several modes of an axis may cancel for a while.
-    needed = math.log(4.0 * largest / band_mm) / slowest_per_s if slowest_per_s > 0.0 else math.inf
-    hold = math.ceil(min(needed, _LONGEST_WAIT_S) / options.period_s)
-    held = np.concatenate([command_mm, np.repeat(command_mm[-1:], hold, axis=0)])
-    options.record_samples = len(held)
-    simulated = _core.simulate_samples(np.asfortranarray(held), still, options)
-    apart = np.abs(simulated.recorded_response - simulated.recorded_command).max(axis=1)
-    outside = np.flatnonzero(apart > band_mm)
-    rest = round(simulated.duration_s / options.period_s)
-    return max(0.0, float(outside[-1] + 1 - rest) * options.period_s) if len(outside) else 0.0
-
 
 class RapidPlant:
     """Simulates rapids with the controller and the modes of a machine."""
@@ -369,14 +323,14 @@ class RapidPlant:
         machine = model.machine
         self._machine_model = model
         self.model = model.ordinary.model
-        self.band_mm = machine.tolerance.residual_floor_um * 1e-3
+        self._band_mm = machine.tolerance.residual_floor_um * 1e-3
         self._moves = moving_axis(machine) is not None
         self.longest_memory_s = model.vibration_memory_s or math.inf  # earlier motion is ignored, s
         self._known: dict[tuple[float, ...], Timing] = {}
 
     def rapid(self, rapid: Rapid) -> Timing:
         """Simulate a rapid as G00; if it has no region, its work offset is unknown, and the nominal modes are used."""
-        travel = rapid.travel_mm
+        travel = rapid.end_mm - rapid.start_mm
         key = tuple(np.round(travel, 9))
         if not self._moves and key in self._known:
             return self._known[key]
@@ -406,11 +360,7 @@ class RapidPlant:
             motion_s, arrival_s = len(still) * period + figures.duration_s, self._arrival_s(command)
             settling_s = self._settling_s(command, region)
             runs.append(Timing(motion_s, arrival_s, settling_s, np.concatenate([still, command])))
-        return max(runs, key=lambda run: run.settled_s)
-
-    def pause(self, seconds: float) -> Timing:
-        """A step without motion: a dwell, an M function."""
-        return Timing(seconds, 0.0, 0.0, np.zeros((1, 3)))
+        return max(runs, key=lambda run: run.motion_s + max(run.arrival_s, run.settling_s))
 
     def ready_s(self, steps: Sequence[Timing], region: _core.Region) -> float:
         """Time of consecutive steps until the table has settled after all of them, s."""
@@ -439,8 +389,25 @@ class RapidPlant:
         return model.options(offset=UNKNOWN_OFFSET if region is None else model.offset(region))
 
     def _settling_s(self, command_mm: FloatArray, region: _core.Region | None) -> float:
-        slowest_per_s = self._machine_model.slowest_decay_per_s
-        return settling_time_s(command_mm, self._options(region), slowest_per_s, self.band_mm)
+        """Time from the end of a command until the table stays within the band around it, s; at most 30 s."""
+        still = _core.Path([_core.Segment.line(command_mm[0], command_mm[0], 1.0)])
+        options, slowest_per_s = self._options(region), self._machine_model.slowest_decay_per_s
+        options.measure_contour = False
+        options.record_samples = 0
+        figures = _core.simulate_samples(np.asfortranarray(command_mm), still, options)
+        largest = float(figures.residual_mm.max())
+        if largest <= self._band_mm:
+            return 0.0
+        # Several modes of an axis may cancel for a while.
+        needed = math.log(4.0 * largest / self._band_mm) / slowest_per_s if slowest_per_s > 0.0 else math.inf
+        hold = math.ceil(min(needed, _LONGEST_WAIT_S) / options.period_s)
+        held = np.concatenate([command_mm, np.repeat(command_mm[-1:], hold, axis=0)])
+        options.record_samples = len(held)
+        simulated = _core.simulate_samples(np.asfortranarray(held), still, options)
+        apart = np.abs(simulated.recorded_response - simulated.recorded_command).max(axis=1)
+        outside = np.flatnonzero(apart > self._band_mm)
+        rest = round(simulated.duration_s / options.period_s)
+        return max(0.0, float(outside[-1] + 1 - rest) * options.period_s) if len(outside) else 0.0
 
     def _arrival_s(self, command: FloatArray) -> float:
         model = self.model

@@ -16,7 +16,7 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.conversion.budget import Budget
-from shapegcode.conversion.rapids.gaps import NO_CUT, NO_GAIN, Choice, OpenGap, RapidPlant, find_gaps
+from shapegcode.conversion.rapids.gaps import NO_GAIN, Choice, OpenGap, RapidPlant, find_gaps
 from shapegcode.conversion.tables import RapidMove, RapidsOutcome
 from shapegcode.conversion.whole_text import read_back
 from shapegcode.conversion.write import EmittedRegion, RegionWriter, measure_load
@@ -29,8 +29,6 @@ from shapegcode.shaping.grid import Grid
 from shapegcode.verdict.figures import Placed
 from shapegcode.verdict.judge import Judge
 
-NOTHING_SHAPED = "no cut of the program is shaped"
-OUT_OF_TOLERANCE = "misses its tolerance as shaped blocks"
 BUDGET = "budget"
 
 _STOP, _STOP_S = "G04P1", 0.001  # a stop before the replacement, as before a G00
@@ -81,7 +79,7 @@ class _RapidShaper:
         for gap in gaps:
             kept.update(rapid.reason for rapid in gap.rapids if rapid.region is None)
             if not gap.cut_follows or not self.placed:
-                reason = NO_CUT if self.placed else NOTHING_SHAPED
+                reason = "no cut follows" if self.placed else "no cut of the program is shaped"
                 kept.update(reason for rapid in gap.rapids if rapid.region is not None)
                 continue
             open_gap = OpenGap(gap, self.plant, self.pool, self.grid.block_period_s)
@@ -97,9 +95,8 @@ class _RapidShaper:
                 choice.text = b""
         self._judge([choice for choice in choices if choice.text])
         for open_gap in open_gaps:
-            open_gap.drop(
-                OUT_OF_TOLERANCE, kept, lambda choice: choice.verdict is not None and bool(choice.verdict.misses)
-            )
+            reason = "misses its tolerance as shaped blocks"
+            open_gap.drop(reason, kept, lambda choice: choice.verdict is not None and bool(choice.verdict.misses))
             open_gap.drop_useless(kept)
         if budget is not None and budget.max_bytes is not None:
             _save_bytes(open_gaps, budget.max_bytes - self.emitted.core.size, kept)
@@ -107,8 +104,7 @@ class _RapidShaper:
 
     def _result(self, open_gaps: Sequence[OpenGap], kept: Counter[str], found: int) -> ShapedRapids:
         shaped = [choice for gap in open_gaps for choice in gap.choices if choice.text]
-        spliced = splice(self.emitted.core.text, self.placed, shaped)
-        read = read_back([spliced.text], spliced.everything, self.machine)
+        emitted, placed, moves = self._splice(shaped)
         outcome = RapidsOutcome(
             found=found,
             shaped=len(shaped),
@@ -117,10 +113,10 @@ class _RapidShaper:
             settle_band_um=self.machine.tolerance.residual_floor_um,
             blocks=sum(choice.shaped.blocks for choice in shaped if choice.shaped is not None),
             slowed_blocks=sum(choice.slowed_blocks for choice in shaped),
-            moves=tuple(_move(choice, place, self.placed) for choice, place in zip(shaped, spliced.moves, strict=True)),
+            moves=tuple(_move(choice, place, self.placed) for choice, place in zip(shaped, moves, strict=True)),
         )
         extra_s = math.fsum(c.after.clock_s - c.before.clock_s for c in shaped if c.after is not None)
-        return ShapedRapids(read, spliced.placed, outcome, _warnings(outcome, self.machine), extra_s)
+        return ShapedRapids(emitted, placed, outcome, _warnings(outcome, self.machine), extra_s)
 
     def _write(self, choice: Choice) -> EmittedRegion:
         region = choice.region
@@ -139,20 +135,39 @@ class _RapidShaper:
         return shaped
 
     def _judge(self, choices: Sequence[Choice]) -> None:
-        spliced = splice(self.emitted.core.text, self.placed, choices)
-        emitted = read_back([spliced.text], spliced.everything, self.machine)
+        emitted, _, moves = self._splice(choices)
         stops_s = _STOP_S + self.machine.emission.prefill_dwell_s
         running = [
             self.pool.submit(self.plant.blocks, place.blocks(emitted), choice.region, stops_s)
-            for choice, place in zip(choices, spliced.moves, strict=True)
+            for choice, place in zip(choices, moves, strict=True)
         ]
         originals = [choice.original for choice in choices]
-        figures = self.judge.measure(emitted, spliced.moves, originals, self.pool)
-        verdicts = self.judge.verdicts(figures, spliced.moves, self.grid.block_period_s)
+        figures = self.judge.measure(emitted, moves, originals, self.pool)
+        verdicts = self.judge.verdicts(figures, moves, self.grid.block_period_s)
         for choice, timing, simulated, verdict in zip(choices, running, figures, verdicts, strict=True):
             choice.after = timing.result()
             choice.slowed_blocks = simulated.slowed_blocks
             choice.verdict = verdict
+
+    def _splice(self, choices: Sequence[Choice]) -> tuple[Program, list[Placed], list[Placed]]:
+        """The program with replacements of rapids, read back; positions of its regions and of the replacements."""
+        text, parts, at = self.emitted.core.text, [], 0
+        lines, shifts = [], [0]  # lines after each of which another number of lines has been added
+        moves = []
+        for choice in choices:
+            region = choice.region
+            parts += [text[at : region.text_begin], choice.text]
+            at = region.text_end
+            first, more = region.first_line + shifts[-1], choice.text.count(b"\n") - 1
+            moves.append(Placed(region, first, first + more))
+            lines.append(region.first_line)
+            shifts.append(shifts[-1] + more)
+        moved = []
+        for place in self.placed:
+            shift = shifts[bisect(lines, place.first_line)]
+            moved.append(Placed(place.region, place.first_line + shift, place.last_line + shift))
+        everything = sorted([*moved, *moves], key=lambda place: place.first_line)
+        return read_back([b"".join([*parts, text[at:]])], everything, self.machine), moved, moves
 
 
 def _without_contour(model: MachineModel) -> MachineModel:
@@ -215,44 +230,6 @@ def _warnings(outcome: RapidsOutcome, machine: Machine) -> list[str]:
             '(emission.prologue, for example ["G05.1Q0"]), or it slows them down'
         )
     return warnings
-
-
-@dataclass(frozen=True)
-class Spliced:
-    """A program with replacements, and the positions of regions and replacements in it."""
-
-    text: bytes
-    placed: list[Placed]
-    moves: list[Placed]
-
-    @property
-    def everything(self) -> list[Placed]:
-        """Regions and replacements, in program order."""
-        return sorted([*self.placed, *self.moves], key=lambda place: place.first_line)
-
-
-def splice(text: bytes, placed: Sequence[Placed], choices: Sequence[Choice]) -> Spliced:
-    """Insert the replacements of rapids into a program."""
-    parts, at = [], 0
-    shifts = []  # (line after which it applies, lines added)
-    added = 0
-    moves = []
-    for choice in choices:
-        region = choice.region
-        parts += [text[at : region.text_begin], choice.text]
-        at = region.text_end
-        first = region.first_line + added
-        moves.append(Placed(region, first, first + choice.text.count(b"\n") - 1))
-        added += choice.text.count(b"\n") - 1
-        shifts.append((region.first_line, added))
-    parts.append(text[at:])
-    lines = [line for line, _ in shifts]
-    moved = []
-    for place in placed:
-        index = bisect(lines, place.first_line)
-        shift = shifts[index - 1][1] if index else 0
-        moved.append(Placed(place.region, place.first_line + shift, place.last_line + shift))
-    return Spliced(b"".join(parts), moved, moves)
 
 
 def original_line(line: int, placed: Sequence[Placed]) -> int:
