@@ -98,11 +98,10 @@ def optimize(
         program.require_machine(machine)
     source = str(program) if isinstance(program, Path) else program
     combinations = math.prod(len(values) for values in choices.values())
-
-    def on_conversion(finished: int) -> None:
-        on_progress(min(1.0, finished / min(most, combinations)))
-
-    run = _Choosing(source, machine, choices, rows, probability, shape_all, on_conversion)
+    run = _Choosing(
+        source, machine, choices, rows, probability, shape_all,
+        lambda finished: on_progress(min(1.0, finished / min(most, combinations))),
+    )  # fmt: skip
     for ranks in search(choices, most, seed, run.cost):
         run.converted(ranks)
     best = run.best()

@@ -18,9 +18,8 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.program.compensation import program_for_conversion
 from shapegcode.program.computer import cores
-from shapegcode.results.outcome import Deviation
 from shapegcode.studies.varied import sampled_machine
-from shapegcode.verdict.figures import CaseFigures, RegionLimits, judge_region
+from shapegcode.verdict.figures import RegionLimits, case_figures, judge_region
 from shapegcode.verdict.judge import Judge, RegionFigures
 
 SHARE = "share_of_limit"
@@ -144,10 +143,7 @@ class Replay:
             part.blocks, path, override=override, offset=offset, tracker=part.tracker, contour=contour,
             command_contour=command, last_seconds=last_s,
         )  # fmt: skip
-        followed = Deviation.of([run.command]) if command else None
-        answered = Deviation.of([run.response]) if contour else None
-        figures = CaseFigures(run.residual_mm, followed, answered, run.duration_s)
-        outcomes = judge_region(figures, part.limits)
+        outcomes = judge_region(case_figures(run, contour=contour), part.limits)
         axes = (run.residual_mm * 1e3).tolist()
         measured = {
             "residual_um": max(axes),
@@ -203,15 +199,14 @@ class SamplesJob:
 def simulate_all(
     replay: Replay, job: SamplesJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
 ) -> list[list[float]]:
-    """Simulate the samples of one emitted program."""
-    parts = list(job.parts(replay.time_s))
+    """Simulate the samples of one emitted program; *on_done* gets the number of finished ones."""
     found: list[list[float]] = []
     threads = ThreadPoolExecutor(cores())
-    running = [(pool or threads).submit(part.simulate, replay) for part in parts]
+    running = [(pool or threads).submit(part.simulate, replay) for part in job.parts(replay.time_s)]
     try:
-        for future, part in zip(running, parts, strict=True):
+        for future in running:
             found += future.result()
-            on_done(len(part.rows))
+            on_done(len(found))
     finally:
         for future in running:
             future.cancel()

@@ -171,14 +171,9 @@ class _StudyRun:
             self.wanted,
             any(each.changes_times and not each.known for each in self.varied),
         )
-        done = before
-
-        def tell(more: int) -> None:
-            nonlocal done
-            done += more
-            self.on_progress("simulating", done / self.count)
-
-        self.measured[list(text.draws)] = replays.simulate_all(text.replay, job, self.pool, tell)
+        self.measured[list(text.draws)] = replays.simulate_all(
+            text.replay, job, self.pool, lambda done: self.on_progress("simulating", (before + done) / self.count)
+        )
 
     def _simulate_nominal(self, texts: Sequence[_Text]) -> None:
         """Convert the program for the unvaried machine file, and simulate it on the unvaried machine."""

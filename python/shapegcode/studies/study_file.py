@@ -152,17 +152,16 @@ class StudyFile(TomlTable):
 
     def options(self) -> dict[str, Any]:
         """Arguments of `study` in addition to program and machine."""
-        names = ("sampling", "measure", "seed", "indices", "at_least", "shape_all")
-        return self._draws() | {name: getattr(self, name) for name in names}
+        return self._arguments("sampling", "measure", "seed", "indices", "at_least", "shape_all")
 
     def choice_options(self) -> dict[str, Any]:
         """Arguments of `optimize` in addition to program and machine."""
-        names = ("seed", "shape_all", "most", "choose")
-        return self._draws() | {name: getattr(self, name) for name in names} | {"probability": self.at_least}
+        return self._arguments("seed", "shape_all", "most", "choose") | {"probability": self.at_least}
 
-    def _draws(self) -> dict[str, Any]:
+    def _arguments(self, *names: str) -> dict[str, Any]:
         sampled = {name: value.distribution() for name, value in self.vary.items()}
-        return {"vary": sampled} | ({} if self.n is None else {"n": self.n})
+        found = {"vary": sampled} | {name: getattr(self, name) for name in names}
+        return found if self.n is None else found | {"n": self.n}
 
 
 def study_schema(title: str) -> dict[str, Any]:

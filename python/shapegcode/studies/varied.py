@@ -178,7 +178,6 @@ _SIMULATED = re.compile(
 _VIBRATING = re.compile(r"axes\.[xyz]\.(modes|rigid|drive)\b.*|shaping\.part_mass_kg")
 # Keys of tables that the file may lack; `with_values` checks them.
 _OPTIONAL = re.compile(r"axes\.[xyz]\.(modes|drive)(\.|$)")
-_PERIOD_KEY = "controller.interpolation_period_s"
 
 
 @dataclass(frozen=True)
@@ -233,9 +232,7 @@ def sampled_machine(machine: Machine, values: Mapping[str, object], source: str)
     if not values:
         return machine
     # A control with another period executes the same blocks; only the converter requires a multiple of it.
-    freed = (
-        {"emission.block_period_s": None} if _PERIOD_KEY in values and "emission.block_period_s" not in values else {}
-    )
+    freed = {"emission.block_period_s": None} if "controller.interpolation_period_s" in values else {}
     return machine.with_values({**freed, **values}, source=source)
 
 
