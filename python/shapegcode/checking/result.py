@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.program.stamp import no_room
 from shapegcode.results.json import hidden
+from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
-
-if TYPE_CHECKING:
-    from shapegcode.results.page.model import Figure
 
 _SHOWN_ALIKE = 5
 _SHOWN_ALARMS = 20  # of one number
@@ -164,8 +162,6 @@ class Check(Result):
 
     def key_figures(self) -> tuple[Figure, ...]:
         """Numbers of alarms, warnings and notes."""
-        from shapegcode.results.page.model import Figure
-
         return tuple(
             Figure(f"{name}s", "", None, float(count), 0, key_after=f"counts.{name}")
             for name, count in vars(self.counts).items()

@@ -102,18 +102,10 @@ class MotionRecorder:
         self._envelope.add(np.concatenate(curves, axis=1))
 
     def _note(self, name: str, values: FloatArray) -> None:
-        largest = np.abs(values).max(axis=0)
-        known = self._largest.get(name)
-        self._largest[name] = largest if known is None else np.maximum(known, largest)
+        self._largest[name] = np.maximum(self._largest.get(name, 0.0), np.abs(values).max(axis=0))
 
     def result(
-        self,
-        program: str,
-        *,
-        lines: tuple[int, int] | None = None,
-        every: int = 1,
-        csv: str | None = None,
-        npz: str | None = None,
+        self, program: str, lines: tuple[int, int] | None, every: int, csv: str | None, npz: str | None
     ) -> Motion:
         """The motion so far."""
         middles, low, high = self._envelope.result()

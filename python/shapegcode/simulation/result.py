@@ -5,20 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.io.units import FloatArray
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.results.json import hidden, sparse
 from shapegcode.results.outcome import CONTOURS, ContourError, Plot, Tracks, Xyz
+from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table, xyz_columns
 from shapegcode.verdict.figures import ProgramFigures, case_table
-
-if TYPE_CHECKING:
-    from shapegcode.results.page.model import Figure
-
 
 # With a feed drive the difference of command and table is vibration and servo lag.
 _MIN_SHOWN_UM = 0.005
@@ -227,8 +223,6 @@ class Simulation(Result):
 
     def key_figures(self) -> tuple[Figure, ...]:
         """Time, vibration after a stop and contour error of the machine table."""
-        from shapegcode.results.page.model import Figure
-
         (residual, _), contour_um = _NAMES[self.plant], self.contour_error_um.response.max
         vibrations = [
             Figure(f"{residual} {axis.upper()}", "µm", None, self.residual_vibration_um[axis], 2,

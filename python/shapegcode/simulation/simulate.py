@@ -196,7 +196,7 @@ def simulate_motion(
             first, last = lines or (1, program.core.line_count)
             raise _core.ArgumentError(f"lines {first}-{last}: no motion there: specify other lines")
     names = {name: None if file is None else str(file) for name, file in (("csv", csv), ("npz", npz))}
-    return recorder.result(program.source, lines=lines, every=every, **names)
+    return recorder.result(program.source, lines, every, **names)
 
 
 def _largest(simulated: Sequence[_core.SimulationFigures]) -> dict[str, Any]:
