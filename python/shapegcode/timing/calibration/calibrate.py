@@ -21,6 +21,7 @@ from shapegcode.timing.calibration.runs_file import RunsFile, load_runs
 from shapegcode.timing.cycle_time import time_interval
 
 _Hold = tuple[float, float, str]  # begin and length in s, and reason
+_Runs = Sequence[logs.ObservedRun]
 
 _MAX_FOLDS = 4
 _BETTER = 0.97  # a later family must have at most this ratio of the error to be chosen
@@ -37,7 +38,7 @@ class _Calibration:
     machine: Machine
 
     @classmethod
-    def of(cls, runs: Sequence[logs.ObservedRun], motion: fitting.MotionFit, machine: Machine) -> _Calibration:
+    def of(cls, runs: _Runs, motion: fitting.MotionFit, machine: Machine) -> _Calibration:
         return cls(motion, fitting.fit_functions(runs, motion, machine), machine)
 
     def starts(self, run: logs.ObservedRun) -> FloatArray:
@@ -135,7 +136,7 @@ def _observed(file: RunsFile, machine: Machine) -> list[logs.ObservedRun]:
     return found
 
 
-def _folds(runs: Sequence[logs.ObservedRun]) -> list[list[logs.ObservedRun]]:
+def _folds(runs: _Runs) -> list[list[logs.ObservedRun]]:
     """Cross-validation groups: runs of one or more programs, or two groups of one program (weaker); empty: one."""
     by_program: dict[int, list[logs.ObservedRun]] = defaultdict(list)
     for run in runs:
@@ -148,8 +149,8 @@ def _folds(runs: Sequence[logs.ObservedRun]) -> list[list[logs.ObservedRun]]:
 
 def _tried(
     tried: Sequence[fitting.LookAhead],
-    runs: Sequence[logs.ObservedRun],
-    folds: Sequence[Sequence[logs.ObservedRun]],
+    runs: _Runs,
+    folds: Sequence[_Runs],
     machine: Machine,
     rate: float,
     on_progress: Callable[[float], None],
@@ -186,11 +187,7 @@ def _tried(
 
 
 def _left_out(
-    runs: Sequence[logs.ObservedRun],
-    folds: Sequence[Sequence[logs.ObservedRun]],
-    motion: fitting.MotionFit,
-    machine: Machine,
-    rate: float,
+    runs: _Runs, folds: Sequence[_Runs], motion: fitting.MotionFit, machine: Machine, rate: float
 ) -> dict[int, _Calibration]:
     """Calibration for each run, from the runs outside its fold (cross-validation)."""
     found: dict[int, _Calibration] = {}
@@ -237,9 +234,7 @@ def _row(run: logs.ObservedRun, learned: _Calibration, other: _Calibration | Non
     )
 
 
-def _scatters(
-    rows: Sequence[result.CalibrationRun], observed: Sequence[logs.ObservedRun], learned: _Calibration
-) -> tuple[float, float]:
+def _scatters(rows: Sequence[result.CalibrationRun], observed: _Runs, learned: _Calibration) -> tuple[float, float]:
     """Scatter of the time between two cuts, s, and relative scatter of repeated runs of a program."""
     ratios: dict[str, list[float]] = defaultdict(list)
     late: dict[str, list[float]] = defaultdict(list)
@@ -377,10 +372,7 @@ def _feed_override(run: logs.ObservedRun) -> float:
 
 
 def learned_machine(
-    learned: _Calibration,
-    runs: Sequence[logs.ObservedRun],
-    rivals: Sequence[tuple[_Calibration, float]],
-    scatters: tuple[float, float],
+    learned: _Calibration, runs: _Runs, rivals: Sequence[tuple[_Calibration, float]], scatters: tuple[float, float]
 ) -> tuple[Machine, dict[str, str], list[result.CalibratedParameter], list[str]]:
     """The calibrated machine, its remarks, the parameters, and descriptions of those that the logs do not determine."""
     motion, functions, machine = learned.motion, learned.functions, learned.machine
@@ -468,7 +460,7 @@ def _meaning(name: str) -> tuple[str, str, str]:
     return _FUNCTIONS.get(name) or ("times.m_codes", f"M{int(name[1:]):02d}", "s")
 
 
-def _usual(overrides: Iterable[float], runs: Sequence[logs.ObservedRun]) -> float:
+def _usual(overrides: Iterable[float], runs: _Runs) -> float:
     """Override of most of the run time; 1 if the operator changed it often."""
     value, ratio = logs.longest(zip(overrides, (run.duration_s or 0.0 for run in runs), strict=True))
     return value if ratio >= _USUAL else 1.0
@@ -482,7 +474,7 @@ def _had(machine: Machine, key: str) -> float | None:
     return float(target) if isinstance(target, int | float) else None
 
 
-def _function_values(functions: fitting.FunctionFit, runs: Sequence[logs.ObservedRun]) -> dict[str, object]:
+def _function_values(functions: fitting.FunctionFit, runs: _Runs) -> dict[str, object]:
     values = functions.values
     codes = {code: round(value, 3) for code, value in fitting.m_codes(values).items() if round(value, 3) >= 0.005}
     move_xy, move_z = (min(round(values.get(name, 0.0), 3), _MAX_MOVE_S) for name in ("move xy", "move z"))

@@ -184,11 +184,8 @@ class MotionFit:
         return found
 
 
-# --- misfit of a model -------------------------------------------------------------------------------------------
-#
-# A control reports its line a few times per second, so a line is first seen up to one reading late.
-# The duration of a part is therefore known to one or two readings, whatever its length; the model's error
-# grows with the length.
+# A control reports its line a few times per second, so a line is first seen up to one reading late. The duration of a
+# part is therefore known to one or two readings, whatever its length; the model's error grows with the length.
 
 #: (length of the windows in s, limit of the error in s, weight).
 _SCALES = ((1.0, 0.25, 1.0), (6.0, 0.5, 0.7), (30.0, 1.0, 0.5))
@@ -408,9 +405,7 @@ def _windows(section: SeenSection) -> IntArray:
     return np.array(points if len(points) > 1 or len(section.time_s) < 2 else [0, len(section.time_s) - 1])
 
 
-# --- times in addition to the motion ----------------------------------------------------------------------------------
-#
-# The time between two cuts is a sum of such times and motion. Logs determine the sums; their division among codes
+# The time between two cuts is the sum of motion and other times. Logs determine the sums; their division among codes
 # that always occur together is a choice: the one with the smallest values is used.
 
 _READING_S = 0.1  # scatter of the time between two readings
