@@ -152,13 +152,8 @@ def _unchanged(plan: ConversionPlan, shaped: Shaped) -> list[tuple[Placed, judgi
         for index, cut, mine in found
         if index not in plan.originals_judged or not mine.path.moves_as(cut.path)
     }
-    return [
-        (
-            Placed(cut, mine.first_line, mine.last_line),
-            running[index].result() if index in running else plan.originals_judged[index],
-        )
-        for index, cut, mine in found
-    ]
+    simulated = plan.originals_judged | {index: run.result() for index, run in running.items()}
+    return [(Placed(cut, mine.first_line, mine.last_line), simulated[index]) for index, cut, mine in found]
 
 
 def _cuts(plan: ConversionPlan, shaped: Shaped, figures: ProgramFigures) -> tuple[tables.CutOutcome, ...]:

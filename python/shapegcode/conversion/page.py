@@ -1,5 +1,4 @@
-"""The page of a conversion: whether to run it, before and after, sensitivity to unverified parameters, and the
-operator's run sheet."""
+"""The page of a conversion: whether to run it, before and after, sensitivity, and the operator's run sheet."""
 
 from __future__ import annotations
 

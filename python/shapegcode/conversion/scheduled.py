@@ -154,12 +154,10 @@ def convert_scheduled(
         )
         on_progress(0.2 + 0.8 * (attempt + 1) / _ROUNDS)
         emitted = _measured(planned, conversion, machine, wanted)
-        excess = emitted.excess_ratio
-        if excess <= 0.0:
+        if emitted.excess_ratio <= 0.0:
             break
-        margin += excess + 0.005  # a little more than the last round exceeded it
-    warnings = tuple(dict.fromkeys([*emitted.warnings, *conversion.warnings]))
-    changed: dict[str, object] = {"warnings": warnings}
+        margin += emitted.excess_ratio + 0.005  # a little more than the last round exceeded it
+    changed: dict[str, object] = {"warnings": tuple(dict.fromkeys([*emitted.warnings, *conversion.warnings]))}
     if not emitted.ok:
         changed |= {
             "emitted": conversion.emitted.with_verdict(good=False),

@@ -194,8 +194,9 @@ def unknown_axes(machine: Machine) -> dict[str, KeyValue]:
 
 
 def _with_usual_modes(machine: Machine, letters: Iterable[str]) -> Machine:
-    pairs = ((f"axes.{letter}.rigid", f"axes.{letter}.modes") for letter in letters)
-    values = {key: value for pair in pairs for key, value in zip(pair, (False, [_MODE]), strict=True)}
+    values: dict[str, object] = {}
+    for letter in letters:
+        values |= {f"axes.{letter}.rigid": False, f"axes.{letter}.modes": [_MODE]}
     return machine.with_values(values) if values else machine
 
 

@@ -241,17 +241,18 @@ class _Translator:
 
     def lines(self, number: int, line: str) -> list[str]:
         """Translate a line; set the path tolerance of shaped cuts before each of them, and restore it after."""
-        if self._tolerance is None or not {number} & (self._begins | self._ends):
+        if self._tolerance is None:
             return self._line(number, line)
-        before, behind = list[str](), list[str]()
+        written = list[str]()
         if number in self._begins:
             self._is_shaped = True
-            before = [self._filled(self._dialect.becomes["G64"])]
-        written = self._line(number, line)
+            written.append(self._filled(self._dialect.becomes["G64"]))
+        written += self._line(number, line)
         if number in self._ends:
             self._is_shaped = False
-            behind = [self._filled(self._dialect.becomes["G64"])] if self.state.path == "G64" else []
-        return [*before, *written, *behind]
+            if self.state.path == "G64":
+                written.append(self._filled(self._dialect.becomes["G64"]))
+        return written
 
     def _line(self, number: int, line: str) -> list[str]:
         state = self.state

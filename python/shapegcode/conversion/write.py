@@ -448,8 +448,6 @@ def _restore_line(region: _core.Region, motion: int, plane: int) -> str:
     return "".join(f"G{code:02d}" for code in codes) + feed_word(state.feed)
 
 
-# --- feeds that are linear along their blocks (FLIN), in the words of a SINUMERIK ------------------------------------
-
 _LABEL = re.compile(r"N\d+")
 _MERE_MOVE = re.compile(r"(?:N\d+)?(?:G0?[123])?(?:[XYZIJKRF]-?(?:\d+\.\d*|\.\d+))+")
 
@@ -457,7 +455,7 @@ _MERE_MOVE = re.compile(r"(?:N\d+)?(?:G0?[123])?(?:[XYZIJKRF]-?(?:\d+\.\d*|\.\d+
 def linear_lines(
     lines: Mapping[int, str], path: _core.Path, blocks: Sequence[_core.LinearBlock], decimals: int
 ) -> dict[int, list[str]]:
-    """Replacements of the lines of shaped blocks, by line number; none for a line that is joined to another."""
+    """SINUMERIK lines with linear feeds (FLIN) for those of shaped blocks, by number; none for one that is joined."""
     numbers = [int(number) for number in path.segment_lines]
     written: dict[int, list[str]] = {number: [] for number in numbers}
     is_linear, code, start = False, "", np.asarray(path.start_mm, dtype=float)

@@ -120,8 +120,7 @@ def _plan_all(
 ) -> list[FeedPlan | None]:
     program = surveyed.program
 
-    def plan(index: int) -> FeedPlan | None:
-        part = surveyed.regions[index]
+    def plan(part: SurveyedRegion) -> FeedPlan | None:
         if part.kept or part.track is None or len(part.track) == 0:
             return None
         options = _writer_options(program, part.region, machine)
@@ -134,9 +133,9 @@ def _plan_all(
 
     plans: list[FeedPlan | None] = []
     with ThreadPoolExecutor(max_workers=2) as pool:
-        for done, found in enumerate(pool.map(plan, range(len(surveyed.regions)))):
+        for found in pool.map(plan, surveyed.regions):
             plans.append(found)
-            on_progress(done + 1)
+            on_progress(len(plans))
     return plans
 
 

@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, partial
 from typing import Literal
 
 import numpy as np
@@ -524,6 +524,7 @@ class CaseSimulation:
     def others(self, cases: Sequence[Case]) -> dict[str, SimulatedCase]:
         """Simulate a group of cases; results by name."""
         simulated = {}
+        duration_s = cache(partial(_core.simulated_duration_s, self.blocks, self.model.period_s, self.model.own_rule))
         for case in cases:
             whole = self._whole(case)
             run = self.model.simulate_emitted(
@@ -535,16 +536,9 @@ class CaseSimulation:
             cut_s = 0.0
             if not whole and case.override != 1.0:
                 # The time at 100 % is subtracted: computed here, where no other task waits for it.
-                cut_s = self._cut_s(case.override) - self._own_cut_s
+                cut_s = duration_s(case.override) - duration_s(1.0)
             simulated[case.name] = run, cut_s
         return simulated
-
-    def _cut_s(self, override: float) -> float:
-        return _core.simulated_duration_s(self.blocks, self.model.period_s, self.model.own_rule, override)
-
-    @cached_property
-    def _own_cut_s(self) -> float:
-        return self._cut_s(1.0)
 
     def figures(
         self,

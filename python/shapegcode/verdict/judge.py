@@ -119,11 +119,10 @@ class Judge:
         placed: Sequence[Placed],
         originals: Sequence[Future[_core.SimulationFigures]],
         pool: Executor,
-        on_step: Step = lambda _done, _total: None,
     ) -> list[RegionFigures]:
         """Simulate every emitted region, and add the figures of its original; calls `begin`, then `figures`."""
         trackers = [_core.ContourTracker(place.region.path) for place in placed]
-        return self.figures(self.begin(emitted, placed, trackers, pool), originals, on_step)
+        return self.figures(self.begin(emitted, placed, trackers, pool), originals)
 
     def begin(
         self, emitted: Program, placed: Sequence[Placed], trackers: Iterable[_core.ContourTracker], pool: Executor

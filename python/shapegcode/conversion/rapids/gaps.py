@@ -212,6 +212,7 @@ class Choice:
     """A rapid that may be replaced, and its replacement."""
 
     rapid: Rapid
+    at: int  # its place among the steps of the gap
     region: _core.Region
     before: Timing
     original: Future[_core.SimulationFigures]
@@ -234,7 +235,6 @@ class OpenGap:
             for step in gap.steps
         ]
         self.choices: list[Choice] = []
-        self._at: list[int] = []
         regions = [step.region for step in gap.steps if not isinstance(step, float) and step.region is not None]
         if not regions:
             return
@@ -250,15 +250,14 @@ class OpenGap:
                 continue
             if clock_s - end_s < plant.longest_memory_s:
                 original = pool.submit(plant.simulate_original, step)
-                self.choices.append(Choice(step, step.region, timing, original))
-                self._at.append(at)
+                self.choices.append(Choice(step, at, step.region, timing, original))
 
     def _ready_s(self, shaped: Sequence[bool]) -> float:
         """Time from the end of the last cut until the vibration has settled for the next one, s."""
         steps = list(self._steps)
-        for at, choice, is_shaped in zip(self._at, self.choices, shaped, strict=True):
+        for choice, is_shaped in zip(self.choices, shaped, strict=True):
             if is_shaped and choice.after is not None:
-                steps[at] = choice.after
+                steps[choice.at] = choice.after
         return self._plant.ready_s(steps, self._region)
 
     def saved_s(self) -> float:

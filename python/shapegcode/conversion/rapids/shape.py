@@ -46,12 +46,7 @@ class ShapedRapids:
 
 
 def shape_rapids(
-    emitted: Program,
-    placed: Sequence[Placed],
-    model: MachineModel,
-    grid: Grid,
-    pool: Executor,
-    budget: Budget | None = None,
+    emitted: Program, placed: Sequence[Placed], model: MachineModel, grid: Grid, pool: Executor, budget: Budget | None
 ) -> ShapedRapids:
     """Replace rapids of an emitted program where the next cut can then start sooner."""
     if model.machine.tolerance.residual_floor_um <= 0.0:
@@ -191,8 +186,7 @@ def _save_bytes(gaps: Sequence[OpenGap], room: int, kept: Counter[str]) -> None:
 
 def _move(choice: Choice, place: Placed, placed: Sequence[Placed]) -> RapidMove:
     before, after, verdict = choice.before, choice.after, choice.verdict
-    assert after is not None
-    assert verdict is not None
+    assert after is not None and verdict is not None
     line = original_line(choice.rapid.line, placed)
     return RapidMove(
         lines=(line, line),
