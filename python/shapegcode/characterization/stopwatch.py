@@ -164,7 +164,7 @@ def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
         note = "a stop takes the same time from every feed; linear or bell cannot be distinguished"
         facts.add_word(name, "linear or bell", _SHAPE_KEY, note)
         return 0.0
-    facts.add_word(name, "exponential", "", "stops from a higher feed take longer")
+    facts.add_word(name, "exponential", "controller.after_interpolation_shape", "stops from a higher feed take longer")
     # The end of each stop is rounded to an unknown period: an error uniform over half of the longest usual one.
     away = float(((x - centre) ** 2).sum())
     slack = 1.96 * 0.008 / math.sqrt(12.0) * math.sqrt(away) / away
