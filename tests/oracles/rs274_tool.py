@@ -84,6 +84,7 @@ class CanonicalMove:
     centre: FloatArray | None = None
     sweep_rad: float = 0.0
     normal: int = 2
+    tool: int = 0
 
     @property
     def length_mm(self) -> float:
@@ -124,7 +125,7 @@ def canonical_moves(lines: Iterable[str]) -> Iterator[CanonicalMove]:
     place = np.zeros(3)
     offsets = {"SET_G5X_OFFSET": np.zeros(3), "SET_G92_OFFSET": np.zeros(3)}
     length = np.zeros(3)
-    unit, feed, per_turn, spindle, axes = 1.0, 0.0, False, 0.0, (0, 1, 2)
+    unit, feed, per_turn, spindle, tool, axes = 1.0, 0.0, False, 0.0, 0, (0, 1, 2)
     for line in lines:
         match = _CALL.search(line)
         if match is None:
@@ -148,8 +149,10 @@ def canonical_moves(lines: Iterable[str]) -> Iterator[CanonicalMove]:
             feed = unit * float(words[0])  # a later change of the unit leaves the feed what it is
         elif name == "SET_SPINDLE_SPEED":
             spindle = float(words[-1])
+        elif name == "CHANGE_TOOL":
+            tool = int(words[0])
         elif name == "DWELL":
-            yield CanonicalMove("dwell", place, place, dwell_s=float(words[0]))
+            yield CanonicalMove("dwell", place, place, dwell_s=float(words[0]), tool=tool)
         elif name in {"STRAIGHT_TRAVERSE", "STRAIGHT_FEED", "ARC_FEED"}:
             numbers = [unit * float(word) for word in words]
             speed = feed * (spindle if per_turn else 1.0)
@@ -159,8 +162,8 @@ def canonical_moves(lines: Iterable[str]) -> Iterator[CanonicalMove]:
                 end[[a, b, normal]] = numbers[0], numbers[1], numbers[5]
                 centre[[a, b]] = numbers[2], numbers[3]
                 sweep = _sweep((place - centre)[[a, b]], (end - centre)[[a, b]], int(words[4]))
-                yield CanonicalMove("arc", place, end, speed, 0.0, centre, sweep, normal)
+                yield CanonicalMove("arc", place, end, speed, 0.0, centre, sweep, normal, tool)
             else:
                 end, straight = np.array(numbers[:3]), name == "STRAIGHT_FEED"
-                yield CanonicalMove("line" if straight else "rapid", place, end, speed if straight else 0.0)
+                yield CanonicalMove("line" if straight else "rapid", place, end, speed if straight else 0.0, tool=tool)
             place = end

@@ -126,7 +126,7 @@ def test_the_report_from_python(tmp_path: Path) -> None:
     (tmp_path / "part.nc").write_text(PART)
     result = sg.cycle_time(tmp_path / "part.nc", sg.Machine.load("vx500"))
     assert result.report(tmp_path / "p.html") == [str(tmp_path / "p.html")]
-    assert pieces(tmp_path / "p.html")["result"] == result.to_dict()
+    assert pieces(tmp_path / "p.html")["result"] == result.to_json()
     with pytest.raises(sg.ArgumentError, match="script must be"):
         result.report(tmp_path / "q.html", script="outside")  # type: ignore[arg-type]
     assert not (tmp_path / "q.html").exists()
