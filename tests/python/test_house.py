@@ -168,7 +168,7 @@ def loaded_after(statement: str) -> set[str]:
 
 
 def test_shapely_is_loaded_with_the_first_shape() -> None:
-    assert "shapely" not in loaded_after("import shapegcode.cutting.stock_shape")
+    assert "shapely" not in loaded_after("import shapegcode.cutting.material")
 
 
 HEAVY = {"numpy", "scipy", "matplotlib", "pydantic", "rich"}

@@ -14,8 +14,8 @@ import shapely
 from tool_files_page import STOCK_EXAMPLES
 
 from shapegcode import _core
-from shapegcode.cutting.stock import Stock
-from shapegcode.cutting.stock_shape import StockPiece, stock_polygons
+from shapegcode.cutting.material import stock_polygons
+from shapegcode.cutting.stock import Stock, StockPiece
 from shapegcode.errors import FileError, StockError
 
 DATA = resources.files("shapegcode") / "data" / "milling"

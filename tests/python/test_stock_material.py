@@ -9,8 +9,8 @@ import pytest
 import shapely
 
 from shapegcode import _core
+from shapegcode.cutting.material import build_material, stock_polygons
 from shapegcode.cutting.stock import Stock
-from shapegcode.cutting.stock_shape import build_material, stock_polygons
 from shapegcode.cutting.tool import Tool
 from shapegcode.errors import StockError
 from shapegcode.machine import Machine

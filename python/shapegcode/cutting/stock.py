@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
 from shapegcode.errors import Problem, StockError
+from shapegcode.io.units import FloatArray
 from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTable, key
 from shapegcode.settings.load import KeyProblem, line_of, parsed, read_text, validated
 
@@ -76,8 +78,12 @@ class Solid(TomlTable):
     polygon: Polygon | None = key("a prism over a polygon", default=None)
 
     @model_validator(mode="after")
-    def _one(self) -> Solid:
-        _exactly_one(self, "box", "polygon")
+    def _exactly_one(self) -> Self:
+        tables = type(self).model_fields
+        given = [name for name in tables if getattr(self, name) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) if given else "none of them"
+            raise ValueError(f"must have exactly one of the tables {', '.join(tables)}: has {found}")
         return self
 
 
@@ -89,11 +95,9 @@ class Rough(TomlTable):
     on: Solid = key("stock before that program: [program.on.box] or [program.on.polygon]")
 
 
-class Stock(TomlTable):
+class Stock(Solid):
     """The material before the first block, in the work coordinates of the program: one of four kinds."""
 
-    box: Box | None = key("a block", default=None)
-    polygon: Polygon | None = key("a prism over a polygon", default=None)
     allowance: Allowance | None = key(
         "layer left by roughing on the walls finished by this program: even thickness, and more in the inside "
         "corners. Material on the other side of the tool is assumed gone",
@@ -105,11 +109,6 @@ class Stock(TomlTable):
     _folder: Path = PrivateAttr(default=Path())
     _source: str = PrivateAttr(default="<text>")
     _text: str = PrivateAttr(default="")
-
-    @model_validator(mode="after")
-    def _one(self) -> Stock:
-        _exactly_one(self, "box", "polygon", "allowance", "program")
-        return self
 
     @classmethod
     def load(cls, path: str | Path) -> Stock:
@@ -176,9 +175,11 @@ class Stock(TomlTable):
         return StockError(self._source, (Problem(key, value, limit, line_of(key, self._text)),))
 
 
-def _exactly_one(table: TomlTable, *names: str) -> None:
-    given = [name for name in names if getattr(table, name) is not None]
-    if len(given) != 1:
-        tables = ", ".join(names)
-        found = " and ".join(given) if given else "none of them"
-        raise ValueError(f"must have exactly one of the tables {tables}: has {found}")
+@dataclass(frozen=True)
+class StockPiece:
+    """A prism."""
+
+    # corners, (n, 2), mm, first not repeated: the outline, counter-clockwise, then holes, clockwise
+    rings: tuple[FloatArray, ...]
+    bottom_mm: float  # lower end
+    top_mm: float  # upper end

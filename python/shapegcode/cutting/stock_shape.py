@@ -1,64 +1,40 @@
-"""Shapes of a stock file: its polygons, the layer left by roughing, and the core's material."""
+"""Shapes of a stock file: its polygons, and the layer left by roughing."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
+from shapely import Geometry, MultiPolygon, Polygon as Area, STRtree
+from shapely.ops import substring
 
 from shapegcode import _core
-from shapegcode.cutting.stock import Allowance, Polygon, Rough, Solid, Stock
-from shapegcode.cutting.tool import Tool
+from shapegcode.cutting.stock import Allowance, Polygon, Stock, StockPiece
 from shapegcode.errors import StockError
-from shapegcode.program import Program
+from shapegcode.io.units import FloatArray as Points
 from shapegcode.settings.keys import toml
 
-if TYPE_CHECKING:
-    from shapely import Geometry, MultiPolygon, Polygon as Area, STRtree
-
-    from shapegcode.machine import Machine
-
-Points = NDArray[np.float64]
 _SAME_MM = 2e-3  # points of a program nearer than this coincide
 _CLOSED_RATIO = 0.5  # least length of closed contours in a sequence that has some; the rest is lead-in and lead-out
 _SAGITTA_MM = 4e-5  # largest deviation of chords from their arcs
 _SNAP = 2e-3  # GEOS merges corners nearer than this, relative to the distance; tolerance of corners
 _ROUNDS = 3
 _TURN_RAD = 0.1  # least turn at a corner; between two chords of an arc it is smaller
-_RAMP_STEP_RATIO = 0.1  # of the tool's diameter: height of the layers on ramps and helices
-_MAX_LAYERS = 200  # a sweep takes time for every layer above the tip
 
 
-@dataclass(frozen=True)
-class StockPiece:
-    """A prism."""
-
-    # corners, (n, 2), mm, first not repeated: the outline, counter-clockwise, then holes, clockwise
-    rings: tuple[Points, ...]
-    bottom_mm: float  # lower end
-    top_mm: float  # upper end
-
-
-def stock_polygons(stock: Stock, paths: Sequence[_core.Path], tool_radius_mm: float) -> list[StockPiece]:
-    """The stock as prisms over polygons; for the kind `program`, the stock before the roughing program."""
+def shaped_pieces(stock: Stock, paths: Sequence[_core.Path], tool_radius_mm: float) -> list[StockPiece]:
+    """The prisms of a stock over polygons, or of the layer left by roughing."""
     if stock.allowance is not None:
         return _pieces(_Allowance(stock, stock.allowance, tool_radius_mm).area(paths), stock.allowance.z_mm)
-    solid: Solid | Stock = stock if stock.program is None else stock.program.on
-    if solid.box is not None:
-        (left, right), (front, back) = solid.box.x_mm, solid.box.y_mm
-        outline = np.array([(left, front), (right, front), (right, back), (left, back)])
-        return [StockPiece((outline,), *solid.box.z_mm)]
-    assert solid.polygon is not None, "the solid has one of the two"
-    return _polygon(stock, solid.polygon, "polygon" if stock.program is None else "program.on.polygon")
+    solid, key = (stock, "polygon") if stock.program is None else (stock.program.on, "program.on.polygon")
+    assert solid.polygon is not None, "without a box the solid has a polygon"
+    return _polygon(stock, solid.polygon, key)
 
 
 def _polygon(stock: Stock, polygon: Polygon, key: str) -> list[StockPiece]:
-    import shapely
-
     names = ["points_mm", *(f"holes_mm.{number}" for number in range(1, len(polygon.holes_mm) + 1))]
     outline, *holes = areas = [shapely.Polygon(ring) for ring in (polygon.points_mm, *polygon.holes_mm)]
     for name, area in zip(names, areas, strict=True):
@@ -71,8 +47,6 @@ def _polygon(stock: Stock, polygon: Polygon, key: str) -> list[StockPiece]:
 
 
 def _pieces(area: Area | MultiPolygon, z_mm: tuple[float, float]) -> list[StockPiece]:
-    import shapely
-
     pieces = []
     for part in shapely.get_parts(area):
         if part.geom_type != "Polygon" or part.area < _SAME_MM * _SAME_MM:
@@ -96,13 +70,11 @@ class _Allowance:
         self._rough = allowance.allowance_mm + corner
 
     def area(self, paths: Sequence[_core.Path]) -> Area | MultiPolygon:
-        import shapely
-
         keys = self._keys
         walls, swept = [], []
         for points in self._runs(paths):
             loops, rest = _loops(_with_touched(points))
-            closed, whole = sum(_length(np.vstack([loop, loop[:1]])) for loop in loops), _length(points)
+            closed, whole = sum(shapely.LinearRing(loop).length for loop in loops), shapely.LineString(points).length
             if loops and closed < _CLOSED_RATIO * whole:
                 why = f"only {closed:.4g} of {whole:.4g} mm of a sequence of cutting moves are closed"
                 raise self._error("wall", f"{why}: is that the wall? Describe the stock as [polygon]")
@@ -136,15 +108,12 @@ class _Allowance:
 
     def _closed(self, loop: Points) -> tuple[Area, Area]:
         """The part behind the wall of a closed contour, and the removed area in front of it."""
-        import shapely
-
         ring = shapely.Polygon(loop)
         if not ring.is_valid:
             reason = shapely.is_valid_reason(ring)
             raise self._error("wall", f"the closed contour crosses itself ({reason}): describe the stock as [polygon]")
         sweep = swept(np.vstack([loop, loop[:1]]), self._radius)
-        is_inside = (_signed_area(loop) > 0) == (self._keys.wall == "left")
-        if is_inside:
+        if ring.exterior.is_ccw == (self._keys.wall == "left"):
             part = ring.difference(sweep)
             if part.is_empty:
                 raise self._error("wall", "the tool removes everything inside the closed contour: wrong side?")
@@ -159,9 +128,6 @@ class _Allowance:
 
     def _open(self, points: Points) -> tuple[Area | MultiPolygon, Area]:
         """The part behind the wall of an open contour, and the area removed by the tool."""
-        import shapely
-        from shapely.ops import substring
-
         wall = shapely.LineString(points)
         start, end = self._keys.lead_in_mm, wall.length - self._keys.lead_out_mm
         if end - start <= _SAME_MM:
@@ -182,8 +148,6 @@ class _Allowance:
         return shapely.union_all(behind), swept(straight, self._radius)
 
     def _behind(self, faces: NDArray[np.object_], points: Points) -> list[Area]:
-        import shapely
-
         along = np.diff(points, axis=0)
         to_left = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
         to_wall = to_left if self._keys.wall == "left" else -to_left
@@ -198,15 +162,6 @@ class _Allowance:
         return behind
 
 
-def _length(points: Points) -> float:
-    return float(np.hypot(*np.diff(points, axis=0).T).sum())
-
-
-def _signed_area(loop: Points) -> float:
-    x, y = (loop - loop[0]).T
-    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-
-
 def _extended(points: Points, length_mm: float) -> Points:
     first, last = points[0] - points[1], points[-1] - points[-2]
     before = points[0] + first * (length_mm / np.hypot(*first))
@@ -216,8 +171,6 @@ def _extended(points: Points, length_mm: float) -> Points:
 
 def _with_touched(points: Points) -> Points:
     """Split the segments of a line at its other points that lie on them, such as where its end overlaps its start."""
-    import shapely
-
     pieces = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
     touching, touched = shapely.STRtree(pieces).query(shapely.points(points), predicate="dwithin", distance=_SAME_MM)
     inside = [
@@ -247,7 +200,7 @@ def _loops(points: Points) -> tuple[list[Points], Points]:
         closing = min(found, default=-1)
         if closing >= 0 and len(line) - closing >= 3:
             loop = points[line[closing:]]
-            if abs(_signed_area(loop)) > _SAME_MM * _SAME_MM:
+            if shapely.Polygon(loop).area > _SAME_MM * _SAME_MM:
                 loops.append(loop)
                 for dropped in line[closing + 1 :]:
                     seen.pop(cell(points[dropped]), None)
@@ -272,8 +225,6 @@ def grown(area: Geometry, distance_mm: float) -> Geometry:
 
 def swept(points: Points, distance_mm: float, *, round_ends: bool = True) -> Geometry:
     """All points within a distance of a line; without round ends only perpendicular to it."""
-    import shapely
-
     line = shapely.LineString(points)
     caps = "round" if round_ends else "flat"
     return _placed(line.buffer(distance_mm, quad_segs=_quarter(distance_mm), cap_style=caps), line, distance_mm)
@@ -285,8 +236,6 @@ def _quarter(distance_mm: float) -> int:
 
 def _placed(shape: Geometry, source: Geometry, distance_mm: float) -> Geometry:
     """Move the corners of an offset shape to the exact distance from the original line."""
-    import shapely
-
     if shape.is_empty:
         return shape
     ends = [shapely.get_coordinates(part) for part in shapely.get_parts(source)]
@@ -316,8 +265,6 @@ def _placed(shape: Geometry, source: Geometry, distance_mm: float) -> Geometry:
 
 def _turns(shape: Geometry, corners: Points) -> NDArray[np.intp]:
     """Indices of the corners at which an outline turns by more than between two chords of an arc."""
-    import shapely
-
     begin, turns = 0, []
     for ring in shapely.get_rings(shape):
         count = shapely.get_num_coordinates(ring)
@@ -335,8 +282,6 @@ def _turns(shape: Geometry, corners: Points) -> NDArray[np.intp]:
 
 def _meeting(corner: Points, pieces: NDArray[np.object_], tree: STRtree, distance_mm: float) -> Points:
     """Move a corner until it has this distance from both adjacent lines; unchanged with only one line."""
-    import shapely
-
     moved = corner
     for _ in range(_ROUNDS):
         point = shapely.Point(moved)
@@ -353,74 +298,3 @@ def _meeting(corner: Points, pieces: NDArray[np.object_], tree: STRtree, distanc
             return corner
         moved = moved + np.linalg.solve(pair, distance_mm - length[[first, second]])
     return moved if np.hypot(*(moved - corner)) < 5 * _SNAP * distance_mm else corner
-
-
-def build_material(
-    stock: Stock,
-    paths: Sequence[_core.Path],
-    tool: Tool,
-    resolution_mm: float,
-    machine: Machine,
-    *,
-    others: Sequence[_core.Path] = (),
-) -> _core.Material:
-    """Build the material before the first block of a program; stock of kind `program` is swept by the roughing tool."""
-    pieces = stock_polygons(stock, paths, tool.radius_mm)
-    rough = stock.program
-    diameter_mm = 0.0 if rough is None else Tool.load(stock.beside(rough.tool)).tool.diameter_mm
-    moves = [] if rough is None else _moves(stock, rough, machine)
-    step = _RAMP_STEP_RATIO * tool.tool.diameter_mm
-    borders = _core.layer_borders([*moves, *paths, *others], pieces[0].bottom_mm, pieces[0].top_mm, step)
-    material = _core.Material([ring for piece in pieces for ring in piece.rings], _fewer(borders), resolution_mm)
-    for path in moves:
-        _core.sweep(material, path, diameter_mm)
-    return material
-
-
-def _fewer(borders_mm: Sequence[float]) -> list[float]:
-    """Limit the number of heights by merging the closest ones: a surface milled in 3-D has very many."""
-    borders = list(borders_mm)
-    least_mm = (borders[-1] - borders[0]) / (4.0 * _MAX_LAYERS)
-    while len(borders) > _MAX_LAYERS + 1:
-        kept = borders[:1]
-        for border in borders[1:-1]:
-            if border - kept[-1] >= least_mm:
-                kept.append(border)
-        borders = [*kept, borders[-1]]
-        least_mm *= 1.5
-    return borders
-
-
-def _moves(stock: Stock, rough: Rough, machine: Machine) -> list[_core.Path]:
-    program = Program.read(stock.beside(rough.file), machine)
-
-    def refusal(reason: str, line: int = 0) -> StockError:
-        where = f"{program.place(line)}: " if line else ""
-        return stock.error("program.file", toml(rough.file), f"{where}{reason}")
-
-    tools = sorted({tool for _, tool, _ in program.core.functions if tool > 0})
-    if len(tools) > 1:
-        names = ", ".join(f"T{tool}" for tool in tools)
-        raise refusal(f"uses the tools {names}: must use one, that of program.tool")
-    systems = {(region.exit.coordinate_system, region.exit.coordinate_number) for region in program.regions}
-    if len(systems) > 1:
-        names = ", ".join(f"G{system}" for system, _ in sorted(systems))
-        raise refusal(f"cuts in the work coordinates {names}: must cut in one")
-    paths, moves = [], program.core.other_moves
-    for kind, index, line in program.core.steps:
-        if kind == _core.StepKind.region:
-            region = program.regions[index]
-            if region.incremental:
-                raise refusal("the position of these moves is unknown", line)
-            paths.append(region.path)
-        elif kind == _core.StepKind.move:
-            segment, dwell_s = moves[index]
-            if dwell_s == 0 and segment.length_mm > 0:
-                paths.append(_core.Path([segment]))
-    for path in paths:
-        for index in range(len(path)):
-            if path[index].kind == _core.SegmentKind.arc and path[index].normal != 2:
-                raise refusal("an arc that is not in the XY plane (G17)", path[index].line_number)
-    if not program.regions:
-        raise refusal("has no cutting moves")
-    return paths

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.cutting.material import build_material
 from shapegcode.cutting.stock import Stock
-from shapegcode.cutting.stock_shape import build_material
 from shapegcode.cutting.tool import Tool
 from shapegcode.machine import Machine
 from shapegcode.program import Program
