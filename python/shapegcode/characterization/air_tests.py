@@ -3,18 +3,14 @@
 A test is one run of a program. The fit needs only the data of the tests, which ``RESULTS.toml`` repeats.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, Self
 
 from shapegcode.errors import ArgumentError
-
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
+from shapegcode.machine import Machine
 
 AXES = ("X", "Y", "Z")
 BlockEnd = Literal["ceil", "carry"]  # rounding of a block's end to the interpolation period
@@ -31,7 +27,7 @@ class AirBox:
     high: tuple[float, float, float] = (100.0, 100.0, 20.0)  # largest X, Y, Z in mm, 0 or above
 
     @classmethod
-    def parse(cls, text: str) -> AirBox:
+    def parse(cls, text: str) -> Self:
         """Read ``X0:X1,Y0:Y1,Z0:Z1`` in mm from the start point, for example ``0:100,-50:50,0:20``."""
         number = r"([-+]?\d+(?:\.\d*)?)"
         found = re.fullmatch(",".join([rf"\s*{number}:{number}\s*"] * 3), text)
@@ -279,18 +275,14 @@ class ControllerTiming:
     overhead_s: float = 0.0  # stopwatch time in addition to the program
 
     @classmethod
-    def of(cls, machine: Machine) -> ControllerTiming:
+    def of(cls, machine: Machine) -> Self:
         """Timing of a machine file."""
         control = machine.controller
-
-        def by_axis(value: object) -> dict[str, float]:
-            get = getattr(value, "as_tuple", None)
-            values = get() if get is not None else (value,) * 3
-            return dict(zip(AXES, values, strict=True))
-
-        rapid_s, rapid_bell_s = by_axis(control.rapid_time_constant_s), by_axis(control.rapid_bell_time_s)
+        rapid_s = dict(zip(AXES, control.rapid_time_constant_s.as_tuple(), strict=True))
+        rapid_bell_s = dict.fromkeys(AXES, control.rapid_bell_time_s)
+        in_position_s = dict(zip(AXES, control.in_position_s.as_tuple(), strict=True))
         stop = control.block_end, control.block_time_s, control.time_constant_s + control.bell_time_s
-        return cls(control.interpolation_period_s, *stop, rapid_s, rapid_bell_s, by_axis(control.in_position_s))
+        return cls(control.interpolation_period_s, *stop, rapid_s, rapid_bell_s, in_position_s)
 
 
 def whole_periods(duration_s: float, period_s: float) -> float:

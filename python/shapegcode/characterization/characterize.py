@@ -1,7 +1,5 @@
 """Fits controller parameters to the results of the tests, and returns the machine with them."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,13 +1,12 @@
 """Fits controller parameters to servo logs of the tests: period, time constants, waits, blocks, position loop."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from shapegcode.characterization import moves
 from shapegcode.characterization.air_tests import AXES, AirTest, whole_periods
@@ -18,6 +17,37 @@ from shapegcode.io.units import FloatArray
 
 _Interval = tuple[float, float]  # a value and its half-width
 _FOLLOWED, _RUN_SETTLE_S, _STEPS_SETTLE_S = 0.9, 0.45, 0.3
+
+
+@dataclass
+class LogFacts(Facts):
+    """Parameters found from the logs so far; times in s."""
+
+    source: str = "log"
+    period: float | None = None  # interpolation period; None: unknown
+    held: bool = False  # the command is constant over a period
+    bent: bool = False  # the command is interpolated between periods
+    sampling: float = 0.001  # sampling time of the logs
+    cutting: float | None = None  # time constant and bell time of cutting moves together; None: unknown
+    cutting_half: float = 0.0  # half-width of its interval
+    exponential: bool = False  # cutting moves are exponential
+
+    @property
+    def tick(self) -> float:
+        """The interpolation period; if it is unknown, one too short to round anything."""
+        return self.period or 1e-6
+
+    @property
+    def stop_s(self) -> float | None:
+        """Time that a stop adds to a cutting move; None: unknown, or infinite (exponential)."""
+        return None if self.exponential else self.cutting
+
+    @property
+    def fine_s(self) -> float:
+        """Longest second time constant that may come from sampling alone, and so does not count as a bell time."""
+        if self.bent and self.period:
+            return _FINE_BENT * self.period
+        return 0.0 if self.held else _FINE * max(self.period or 0.0, 2.0 * self.sampling)
 
 
 def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list[ControllerFact]:
@@ -243,37 +273,6 @@ _NO_BELL = "no second moving average was found"
 _SHAPE_NOTES = {"linear": "linear", "bell": "the longer of two moving averages", "exponential": "exponential"}
 
 
-@dataclass
-class LogFacts(Facts):
-    """Parameters found from the logs so far; times in s."""
-
-    source: str = "log"
-    period: float | None = None  # interpolation period; None: unknown
-    held: bool = False  # the command is constant over a period
-    bent: bool = False  # the command is interpolated between periods
-    sampling: float = 0.001  # sampling time of the logs
-    cutting: float | None = None  # time constant and bell time of cutting moves together; None: unknown
-    cutting_half: float = 0.0  # half-width of its interval
-    exponential: bool = False  # cutting moves are exponential
-
-    @property
-    def tick(self) -> float:
-        """The interpolation period; if it is unknown, one too short to round anything."""
-        return self.period or 1e-6
-
-    @property
-    def stop_s(self) -> float | None:
-        """Time that a stop adds to a cutting move; None: unknown, or infinite (exponential)."""
-        return None if self.exponential else self.cutting
-
-    @property
-    def fine_s(self) -> float:
-        """Longest second time constant that may come from sampling alone, and so does not count as a bell time."""
-        if self.bent and self.period:
-            return _FINE_BENT * self.period
-        return 0.0 if self.held else _FINE * max(self.period or 0.0, 2.0 * self.sampling)
-
-
 # --- cutting moves ----------------------------------------------------------------------------------------------------
 
 
@@ -460,7 +459,6 @@ def _servo_rows(log: ServoLog, index: int) -> tuple[FloatArray, FloatArray, floa
 
 def _lag_of(records: list[tuple[FloatArray, FloatArray, float]]) -> tuple[float, float]:
     """Fit position gain (1/s) and remaining lag ratio (1 − feed-forward ratio) to all records by least squares."""
-    from scipy.optimize import minimize_scalar
 
     def solve(gain: float) -> tuple[float, float]:
         cross = square = power = 0.0

@@ -3,14 +3,13 @@
 A move between rests is a smoothed rectangle of speed, in closed form; time constants are fitted to all moves of a part.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from shapegcode.characterization.air_tests import AXES, AirTest, Part
 from shapegcode.errors import ArgumentError
@@ -211,8 +210,6 @@ def fit_shape(
     high: Sequence[float],
 ) -> ShapeFit:
     """Fit one curve to all moves of a back-and-forth part, superimposed at their middles."""
-    from scipy.optimize import least_squares
-
     middles = log.middles_s()
     length = abs(log.part.length_mm)
     pieces_t, pieces_y = [], []

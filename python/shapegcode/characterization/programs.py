@@ -1,7 +1,5 @@
 """The tests as FANUC programs, instructions for the operator, and ``RESULTS.toml``: written, and read for the fit."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re
@@ -9,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -17,12 +15,10 @@ from shapegcode.characterization import air_tests
 from shapegcode.characterization.result import CharacterisationTests, WrittenTest
 from shapegcode.errors import ArgumentError, FileError, Problem
 from shapegcode.io.data_file import write_text
+from shapegcode.machine import Machine
 from shapegcode.program import decimal
 from shapegcode.settings.keys import Count, Float, InlineTable, Positive, Text, TomlTable, key
 from shapegcode.settings.load import KeyProblem, line_of, parsed, read_text, validated
-
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
 
 _HEADER = "G21 G17 G91 G94 G64"
 
@@ -141,7 +137,7 @@ class _PartTable(InlineTable):
     dwell_s: _Dwell = key("dwell after each move, or the pause", default=0.0)
 
     @model_validator(mode="after")
-    def _moves(self) -> _PartTable:
+    def _moves(self) -> Self:
         for name in ("length_mm", "feed_mm_per_min"):
             if self.pattern != "pause" and getattr(self, name) == 0.0:
                 raise KeyProblem(name, 0.0, "must not be 0 with motion")

@@ -1,11 +1,9 @@
 """Results of characterization: the parameters of a controller with intervals, and its tests."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from shapegcode.characterization.air_tests import Kind
 from shapegcode.machine import Machine
@@ -39,7 +37,7 @@ class ControllerFact:
             return math.inf
         return 0.0 if self.low is None or self.high is None else self.high - self.low
 
-    def contradicts(self, other: ControllerFact) -> bool:
+    def contradicts(self, other: Self) -> bool:
         """Whether both are numbers whose intervals do not overlap, or texts of which neither contains the other."""
         if self.value is None or other.value is None:
             return False

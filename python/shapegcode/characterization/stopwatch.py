@@ -5,13 +5,12 @@ period or rule is known only if the alternatives fit clearly worse. Rapids are f
 time constant.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from shapegcode.characterization import air_tests
 from shapegcode.characterization.air_tests import AXES, ControllerTiming, program_time_s
@@ -44,6 +43,15 @@ class WatchFacts(Facts):
             self.add_unknown(name, why)
         else:
             self.add(name, value, half, key, note)
+
+
+@dataclass(frozen=True)
+class TimedTest:
+    """A timed test."""
+
+    test: air_tests.AirTest  # the test
+    time_s: float  # mean of the readings
+    sigma_s: float  # its standard deviation
 
 
 @dataclass(frozen=True)
@@ -124,8 +132,6 @@ def _timing(values: FloatArray, period: float, end: air_tests.BlockEnd) -> Contr
 
 def _least_squares(rows: Sequence[TimedTest], period: float, end: air_tests.BlockEnd) -> _Fit:
     """Fit all unknowns except those of rapids, for one period and rule."""
-    from scipy.optimize import least_squares
-
     tiny = next((row for row in rows if row.test.name == "blocks_tiny"), None)
     block = tiny.time_s / tiny.test.parts[0].count if tiny else 0.005
     begin = np.array([0.3, 0.1, 0.05, 0.05, 0.05, block])
@@ -237,15 +243,6 @@ def _override(best: _Fit, rows: dict[str, TimedTest], facts: WatchFacts) -> None
 _RAMPS_S = np.arange(0.005, 1.0, 0.00025)
 _INSIDE = 3.84  # chi² of a 95 % interval of one parameter
 _WAIT_UNKNOWN_S = 0.1
-
-
-@dataclass(frozen=True)
-class TimedTest:
-    """A timed test."""
-
-    test: air_tests.AirTest  # the test
-    time_s: float  # mean of the readings
-    sigma_s: float  # its standard deviation
 
 
 def _fit_rapids(facts: WatchFacts, axis: str, timed: list[TimedTest], period: float | None, best: _Fit) -> None:

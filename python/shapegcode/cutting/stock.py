@@ -1,7 +1,5 @@
 """The stock file: the material before the first block of a program, in program coordinates."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -111,7 +109,7 @@ class Stock(Solid):
     _text: str = PrivateAttr(default="")
 
     @classmethod
-    def load(cls, path: str | Path) -> Stock:
+    def load(cls, path: str | Path) -> Self:
         """Read a stock file.
 
         Args:
@@ -127,7 +125,7 @@ class Stock(Solid):
         return cls.from_toml(read_text(Path(path), StockError), str(path), Path(path).parent)
 
     @classmethod
-    def from_toml(cls, text: str, source: str = "<text>", folder: str | Path = ".") -> Stock:
+    def from_toml(cls, text: str, source: str = "<text>", folder: str | Path = ".") -> Self:
         """Read the text of a stock file.
 
         Args:

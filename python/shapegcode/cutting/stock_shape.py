@@ -1,7 +1,5 @@
 """Shapes of a stock file: its polygons, and the layer left by roughing."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

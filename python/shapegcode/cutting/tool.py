@@ -1,13 +1,11 @@
 """The tool file: an end mill, its cutting forces, limits and feed settings."""
 
-from __future__ import annotations
-
 import difflib
 import math
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, Strict, field_validator, model_validator
 
@@ -50,7 +48,7 @@ class WorkMaterial(TomlTable):
     assumed: Text = key("assumed values that are not in the source; empty: none")
 
     @model_validator(mode="after")
-    def _range_ascends(self) -> WorkMaterial:
+    def _range_ascends(self) -> Self:
         if self.chip_mm is not None and self.chip_mm[0] >= self.chip_mm[1]:
             raise KeyProblem("chip_mm", self.chip_mm, "the first number must be smaller than the second")
         return self
@@ -60,7 +58,7 @@ class _Library(TomlTable):
     material: tuple[WorkMaterial, ...] = key("the materials")
 
     @model_validator(mode="after")
-    def _names_differ(self) -> _Library:
+    def _names_differ(self) -> Self:
         names = [material.name for material in self.material]
         for name in names:
             if names.count(name) > 1:
@@ -118,7 +116,7 @@ class Cutting(TomlTable):
         return name
 
     @model_validator(mode="after")
-    def _complete(self) -> Cutting:
+    def _complete(self) -> Self:
         if self.material is None:
             for name in ("specific_n_per_mm2", "ratio"):
                 if getattr(self, name) is None:
@@ -188,7 +186,7 @@ class Cutter(TomlTable):
     )
 
     @model_validator(mode="after")
-    def _fits(self) -> Cutter:
+    def _fits(self) -> Self:
         if self.flute_length_mm > self.overhang_mm:
             limit = f"must not exceed overhang_mm = {toml(self.overhang_mm)}"
             raise KeyProblem("flute_length_mm", self.flute_length_mm, limit)
@@ -218,7 +216,7 @@ class Limits(TomlTable):
     feed_per_tooth_max_mm: Positive | None = key("largest feed per tooth", default=None)
 
     @model_validator(mode="after")
-    def _band_ascends(self) -> Limits:
+    def _band_ascends(self) -> Self:
         low, high = self.feed_per_tooth_min_mm, self.feed_per_tooth_max_mm
         if low is not None and high is not None and low >= high:
             raise KeyProblem("feed_per_tooth_min_mm", low, f"must be less than feed_per_tooth_max_mm = {toml(high)}")
@@ -238,7 +236,7 @@ class Feed(TomlTable):
     )
 
     @model_validator(mode="after")
-    def _air_feed_fits(self) -> Feed:
+    def _air_feed_fits(self) -> Self:
         air, most = self.air_feed_mm_per_min, self.max_feed_mm_per_min
         if air is not None and most is not None and air > most:
             raise KeyProblem("air_feed_mm_per_min", air, f"must not exceed max_feed_mm_per_min = {toml(most)}")
@@ -258,7 +256,7 @@ class Tool(TomlTable):
     feed: Feed = key("range of the feed", default={})
 
     @model_validator(mode="after")
-    def _least_chip_can_be_reached(self) -> Tool:
+    def _least_chip_can_be_reached(self) -> Self:
         least, most = self.limits.feed_per_tooth_min_mm, self.feed.max_feed_mm_per_min
         speed = self.feed.spindle_rev_per_min
         if least is not None and most is not None and speed is not None:
@@ -269,7 +267,7 @@ class Tool(TomlTable):
         return self
 
     @classmethod
-    def load(cls, path: str | Path) -> Tool:
+    def load(cls, path: str | Path) -> Self:
         """Read a tool file.
 
         Args:
@@ -285,7 +283,7 @@ class Tool(TomlTable):
         return loaded(cls, path, ToolError)
 
     @classmethod
-    def from_toml(cls, text: str, source: str = "<text>") -> Tool:
+    def from_toml(cls, text: str, source: str = "<text>") -> Self:
         """Read the text of a tool file.
 
         Args:

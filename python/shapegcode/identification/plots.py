@@ -1,7 +1,5 @@
 """The pictures of ``shapegcode identify``: records with fit, frequency response, stabilisation chart, decay."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,13 +1,11 @@
 """Result of an identification with uncertainties: figures, tables, the next step."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -51,7 +49,7 @@ class Estimate:
         """Larger half of the interval, in percent of the value."""
         return 100.0 * max(self.high - self.value, self.value - self.low) / abs(self.value)
 
-    def map(self, function: Callable[[float], float]) -> Estimate:
+    def map(self, function: Callable[[float], float]) -> Self:
         """The estimate of a monotonic function of the value.
 
         Args:
@@ -61,7 +59,7 @@ class Estimate:
             Estimate of the function's value.
         """
         ends = sorted((function(self.low), function(self.high)))
-        return Estimate(function(self.value), *ends)
+        return type(self)(function(self.value), *ends)
 
 
 @dataclass(frozen=True)

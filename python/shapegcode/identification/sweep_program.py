@@ -1,7 +1,5 @@
 """A program that shakes one axis with rising and falling frequency, planned on the model of the control."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import astuple, dataclass
 from itertools import pairwise

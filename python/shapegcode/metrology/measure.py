@@ -35,6 +35,17 @@ _LAST_LINE = 2**32 - 1
 _BLOCKS_PER_CURVE = 2.5  # blocks of a shaped program are shorter than this many block periods at its feed
 
 
+@dataclass(frozen=True)
+class Job:
+    """A region to simulate, the nominal region against which it is measured, and the sections of the nominal region."""
+
+    simulated: _core.Region
+    nominal: _core.Region
+    path: _core.Path
+    sections: list[_core.PathSection]
+    joined_mm: float = 0.0  # shorter sections are joined to curves, as there were too many; 0: the usual length
+
+
 def measure(
     programs: Program | str | Path | Sequence[Program | str | Path],
     machine: Machine | str | Path,
@@ -242,17 +253,6 @@ def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArra
     stream = model.simulated(shaped=job.simulated.shaped).stream(job.simulated.path, options, rest_s)
     while len(chunk := stream.read(_CHUNK_SAMPLES)) > 0:
         yield chunk.command_mm, chunk.response_mm
-
-
-@dataclass(frozen=True)
-class Job:
-    """A region to simulate, the nominal region against which it is measured, and the sections of the nominal region."""
-
-    simulated: _core.Region
-    nominal: _core.Region
-    path: _core.Path
-    sections: list[_core.PathSection]
-    joined_mm: float = 0.0  # shorter sections are joined to curves, as there were too many; 0: the usual length
 
 
 def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:

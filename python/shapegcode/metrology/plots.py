@@ -1,7 +1,5 @@
 """The pictures of ``shapegcode measure``: the part with its deviations magnified, and the walls along the path."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from functools import partial
 

@@ -1,12 +1,11 @@
 """Results of virtual metrology: programs side by side, compared with the tolerance."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Self
 
 from shapegcode import _core
 from shapegcode.metrology.figures import FittedCircle, MeasuredArc, MeasuredSection, SidedError, WallDeviation
@@ -21,6 +20,189 @@ _SHOWN_UM = 0.005  # smaller values are shown as 0.00
 
 Sections = Sequence[MeasuredSection]
 Values = Callable[[MeasuredSection], Sequence[float | None]]
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRegion:
+    """One cutting region of a program, measured."""
+
+    lines: tuple[int, int]  # first and last line of the program against which it is measured, from 1
+    path: _core.Path  # path of that program in the region
+    figures: _core.TrackFigures  # measured by the core
+    sections: tuple[MeasuredSection, ...]  # sections of the path, in order
+    station_spacing_mm: float  # largest distance between two measured stations of walls
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredProgram:
+    """One program, measured."""
+
+    program: str  # its file as named, or other source
+    shaped: bool  # whether it has shaped cuts, which are simulated block by block at their feed
+    measured_against: str  # file of the program whose path is the nominal one; its own file for its own path
+    ok: bool | None  # the response is within the tolerance of the path; None: not judged
+    cutting_time_s: float  # of all regions, until the set-points rest
+    contour_error_um: Tracks[SidedError]  # of all regions, including corners
+    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis after the stop at each region's end
+    sections: tuple[MeasuredSection, ...]  # of all regions, in order
+    warnings: tuple[str, ...]  # on the program and the machine
+    regions: tuple[MeasuredRegion, ...] = field(metadata=hidden())  # in order
+
+    @classmethod
+    def of(
+        cls,
+        about: tuple[str, bool, str],
+        regions: tuple[MeasuredRegion, ...],
+        limit_um: float | None,
+        warnings: tuple[str, ...],
+    ) -> Self:
+        """Combine the figures of its regions; *about*: its name, whether shaped, what it is measured against."""
+        figures = [region.figures for region in regions]
+        contour = Tracks(
+            SidedError.of([each.command for each in figures], [each.command_sides for each in figures]),
+            SidedError.of([each.response for each in figures], [each.response_sides for each in figures]),
+        )
+        return cls(
+            *about,
+            ok=None if limit_um is None else contour.response.max <= limit_um,
+            cutting_time_s=sum(each.duration_s for each in figures),
+            contour_error_um=contour,
+            residual_vibration_um=largest_xyz_um(each.rest.residual_mm for each in figures),
+            sections=tuple(section for region in regions for section in region.sections),
+            warnings=warnings,
+            regions=regions,
+        )
+
+    @property
+    def name(self) -> str:
+        """File name."""
+        return Path(self.program).name
+
+    @property
+    def how(self) -> str:
+        """Sentence: how it was simulated, and against which path it was measured."""
+        simulated = "block by block, as a shaped program" if self.shaped else "with the controller's own motion"
+        own = self.measured_against == self.program
+        path = "its own path" if own else f"the path of {self.measured_against}"
+        why = ", which is not the programmed one" if self.shaped else ", to compare with the shaped one"
+        judged = f"{why}: not judged" if self.ok is None else ""
+        return f"{self.program}: simulated {simulated}, measured against {path}{judged}"
+
+    def verdict(self, limit_um: float) -> str:
+        """Sentence: the largest deviation; not judged, within tolerance, or out of tolerance by how much and where."""
+        largest = self.contour_error_um.response.max
+        within = f"deviates from the path by up to {largest:.2f} µm"
+        if self.ok is None:
+            return f"{self.name}: not judged: {within}"
+        limit = f"limit {limit_um:g} µm (tolerance.contour_um)"
+        if self.ok:
+            return f"{self.name}: within tolerance: {within}, {limit}"
+        return f"{self.name}: OUT OF TOLERANCE by {largest - limit_um:.2f} µm: {within}, {limit}, {self._worst_place}"
+
+    @property
+    def _worst_place(self) -> str:
+        worst = [section.contour_error_um.response.max for section in self.sections]
+        index = worst.index(max(worst))
+        if worst[index] < self.contour_error_um.response.max:
+            return "at a rounded corner"
+        return f"in section {self.sections[index].name(index + 1)}"
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Measurement(Result):
+    """Programs measured side by side.
+
+    Attributes:
+        machine: name of the machine.
+        plant: "modal" or "feed-drive".
+        tool_diameter_mm: diameter of the disc swept along the response.
+        settling_band_um: settled means within this distance of the command.
+        station_spacing_mm: largest distance between two measured stations of walls.
+        roughness_cutoff_mm: cut-off λc; None: by the length of each section.
+        roughness_lambda_s_mm: short-wave cut-off; 0: none.
+        contour_tolerance_um: of the machine file (`tolerance.contour_um`).
+        programs: in the given order.
+        simulated: the first two of them, for a page.
+    """
+
+    machine: str
+    plant: str
+    tool_diameter_mm: float
+    settling_band_um: float
+    station_spacing_mm: float
+    roughness_cutoff_mm: float | None
+    roughness_lambda_s_mm: float
+    contour_tolerance_um: float
+    programs: tuple[MeasuredProgram, ...]
+    simulated: SimulatedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Published methods of controller, plant and circle fit."""
+        has_arcs = any(section.arc is not None for program in self.programs for section in program.sections)
+        return (*(("circle fit",) if has_arcs else ()), *(() if self.simulated is None else self.simulated.methods))
+
+    @property
+    def ok(self) -> bool:
+        """True if the response of every judged program is within the tolerance of the path."""
+        return all(program.ok is not False for program in self.programs)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Warnings of the programs, each once."""
+        return tuple(dict.fromkeys(warning for program in self.programs for warning in program.warnings))
+
+    @property
+    def answer(self) -> str:
+        """For each judged program: within tolerance, or how far out; if none is judged, the deviation of each."""
+        judged = [program for program in self.programs if program.ok is not None] or self.programs
+        return "; ".join(program.verdict(self.contour_tolerance_um) for program in judged)
+
+    @property
+    def next_step(self) -> str:
+        """Next command or change, in one sentence."""
+        if not self.ok and self.plant == "feed-drive":
+            return (
+                "servo lag moves the table off the path: more feed-forward or position gain, or less "
+                "feed; --plant modal shows the effect of vibration alone"
+            )
+        missed = next((each for each in self.programs if each.shaped and each.ok is False), None)
+        if missed is not None:
+            return f"convert again with a smaller --contour-tolerance: {missed.name} deviates from the path"
+        if not any(program.shaped for program in self.programs):
+            return "shapegcode convert shapes the program; measure both to see the gain"
+        if any(program.shaped and program.ok is None for program in self.programs):
+            return "measure it --against the original program: its own path is not the programmed one"
+        return "--plots DIR draws the part with its deviations magnified, --lines A-B measures the cut of these lines"
+
+    def tables(self, *, every_section: bool = False) -> list[Table]:
+        """Tables that compare the programs measured against the same path: a summary, and one of the sections.
+
+        Args:
+            every_section: show all sections; False: if there are many, only the worst.
+
+        Returns:
+            Two tables for each path.
+        """
+        found = []
+        for path in dict.fromkeys(program.measured_against for program in self.programs):
+            beside = [program for program in self.programs if program.measured_against == path]
+            by_name = {program.name: program for program in beside}
+            # Full file paths if two files have the same name.
+            if len(by_name) < len(beside):
+                by_name = {f"{number} {program.program}": program for number, program in enumerate(beside, start=1)}
+            judged = any(program.ok is not None for program in beside)
+            limit_um = self.contour_tolerance_um if judged else None
+            on = f"{self.machine}, tool of {self.tool_diameter_mm:g} mm, {self.plant} plant"
+            if any(program.sections for program in beside):
+                found.append(_summary_table(f"worst figures on {on}", by_name, self.settling_band_um))
+            title = f"sections measured on {on}"
+            found.append(_section_table(title, by_name, limit_um, self.settling_band_um, every=every_section))
+        return found
+
+    def plots(self) -> Mapping[str, Plot]:
+        """`measure-part` and `measure-walls` of the region with the largest deviation of walls; none without walls."""
+        return self._drawn_beside()
 
 
 @dataclass(frozen=True)
@@ -243,186 +425,3 @@ def _axes(values: Xyz[float] | None) -> str:
 
 def _pair(values: Sequence[float | None], decimals: int) -> str:
     return " / ".join("–" if value is None else f"{value:z.{decimals}f}" for value in values)
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredRegion:
-    """One cutting region of a program, measured."""
-
-    lines: tuple[int, int]  # first and last line of the program against which it is measured, from 1
-    path: _core.Path  # path of that program in the region
-    figures: _core.TrackFigures  # measured by the core
-    sections: tuple[MeasuredSection, ...]  # sections of the path, in order
-    station_spacing_mm: float  # largest distance between two measured stations of walls
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredProgram:
-    """One program, measured."""
-
-    program: str  # its file as named, or other source
-    shaped: bool  # whether it has shaped cuts, which are simulated block by block at their feed
-    measured_against: str  # file of the program whose path is the nominal one; its own file for its own path
-    ok: bool | None  # the response is within the tolerance of the path; None: not judged
-    cutting_time_s: float  # of all regions, until the set-points rest
-    contour_error_um: Tracks[SidedError]  # of all regions, including corners
-    residual_vibration_um: Xyz[float]  # largest |response - command| of each axis after the stop at each region's end
-    sections: tuple[MeasuredSection, ...]  # of all regions, in order
-    warnings: tuple[str, ...]  # on the program and the machine
-    regions: tuple[MeasuredRegion, ...] = field(metadata=hidden())  # in order
-
-    @classmethod
-    def of(
-        cls,
-        about: tuple[str, bool, str],
-        regions: tuple[MeasuredRegion, ...],
-        limit_um: float | None,
-        warnings: tuple[str, ...],
-    ) -> MeasuredProgram:
-        """Combine the figures of its regions; *about*: its name, whether shaped, what it is measured against."""
-        figures = [region.figures for region in regions]
-        contour = Tracks(
-            SidedError.of([each.command for each in figures], [each.command_sides for each in figures]),
-            SidedError.of([each.response for each in figures], [each.response_sides for each in figures]),
-        )
-        return cls(
-            *about,
-            ok=None if limit_um is None else contour.response.max <= limit_um,
-            cutting_time_s=sum(each.duration_s for each in figures),
-            contour_error_um=contour,
-            residual_vibration_um=largest_xyz_um(each.rest.residual_mm for each in figures),
-            sections=tuple(section for region in regions for section in region.sections),
-            warnings=warnings,
-            regions=regions,
-        )
-
-    @property
-    def name(self) -> str:
-        """File name."""
-        return Path(self.program).name
-
-    @property
-    def how(self) -> str:
-        """Sentence: how it was simulated, and against which path it was measured."""
-        simulated = "block by block, as a shaped program" if self.shaped else "with the controller's own motion"
-        own = self.measured_against == self.program
-        path = "its own path" if own else f"the path of {self.measured_against}"
-        why = ", which is not the programmed one" if self.shaped else ", to compare with the shaped one"
-        judged = f"{why}: not judged" if self.ok is None else ""
-        return f"{self.program}: simulated {simulated}, measured against {path}{judged}"
-
-    def verdict(self, limit_um: float) -> str:
-        """Sentence: the largest deviation; not judged, within tolerance, or out of tolerance by how much and where."""
-        largest = self.contour_error_um.response.max
-        within = f"deviates from the path by up to {largest:.2f} µm"
-        if self.ok is None:
-            return f"{self.name}: not judged: {within}"
-        limit = f"limit {limit_um:g} µm (tolerance.contour_um)"
-        if self.ok:
-            return f"{self.name}: within tolerance: {within}, {limit}"
-        return f"{self.name}: OUT OF TOLERANCE by {largest - limit_um:.2f} µm: {within}, {limit}, {self._worst_place}"
-
-    @property
-    def _worst_place(self) -> str:
-        worst = [section.contour_error_um.response.max for section in self.sections]
-        index = worst.index(max(worst))
-        if worst[index] < self.contour_error_um.response.max:
-            return "at a rounded corner"
-        return f"in section {self.sections[index].name(index + 1)}"
-
-
-@dataclass(frozen=True, repr=False, eq=False)
-class Measurement(Result):
-    """Programs measured side by side.
-
-    Attributes:
-        machine: name of the machine.
-        plant: "modal" or "feed-drive".
-        tool_diameter_mm: diameter of the disc swept along the response.
-        settling_band_um: settled means within this distance of the command.
-        station_spacing_mm: largest distance between two measured stations of walls.
-        roughness_cutoff_mm: cut-off λc; None: by the length of each section.
-        roughness_lambda_s_mm: short-wave cut-off; 0: none.
-        contour_tolerance_um: of the machine file (`tolerance.contour_um`).
-        programs: in the given order.
-        simulated: the first two of them, for a page.
-    """
-
-    machine: str
-    plant: str
-    tool_diameter_mm: float
-    settling_band_um: float
-    station_spacing_mm: float
-    roughness_cutoff_mm: float | None
-    roughness_lambda_s_mm: float
-    contour_tolerance_um: float
-    programs: tuple[MeasuredProgram, ...]
-    simulated: SimulatedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
-
-    @property
-    def methods(self) -> tuple[str, ...]:
-        """Published methods of controller, plant and circle fit."""
-        has_arcs = any(section.arc is not None for program in self.programs for section in program.sections)
-        return (*(("circle fit",) if has_arcs else ()), *(() if self.simulated is None else self.simulated.methods))
-
-    @property
-    def ok(self) -> bool:
-        """True if the response of every judged program is within the tolerance of the path."""
-        return all(program.ok is not False for program in self.programs)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Warnings of the programs, each once."""
-        return tuple(dict.fromkeys(warning for program in self.programs for warning in program.warnings))
-
-    @property
-    def answer(self) -> str:
-        """For each judged program: within tolerance, or how far out; if none is judged, the deviation of each."""
-        judged = [program for program in self.programs if program.ok is not None] or self.programs
-        return "; ".join(program.verdict(self.contour_tolerance_um) for program in judged)
-
-    @property
-    def next_step(self) -> str:
-        """Next command or change, in one sentence."""
-        if not self.ok and self.plant == "feed-drive":
-            return (
-                "servo lag moves the table off the path: more feed-forward or position gain, or less "
-                "feed; --plant modal shows the effect of vibration alone"
-            )
-        missed = next((each for each in self.programs if each.shaped and each.ok is False), None)
-        if missed is not None:
-            return f"convert again with a smaller --contour-tolerance: {missed.name} deviates from the path"
-        if not any(program.shaped for program in self.programs):
-            return "shapegcode convert shapes the program; measure both to see the gain"
-        if any(program.shaped and program.ok is None for program in self.programs):
-            return "measure it --against the original program: its own path is not the programmed one"
-        return "--plots DIR draws the part with its deviations magnified, --lines A-B measures the cut of these lines"
-
-    def tables(self, *, every_section: bool = False) -> list[Table]:
-        """Tables that compare the programs measured against the same path: a summary, and one of the sections.
-
-        Args:
-            every_section: show all sections; False: if there are many, only the worst.
-
-        Returns:
-            Two tables for each path.
-        """
-        found = []
-        for path in dict.fromkeys(program.measured_against for program in self.programs):
-            beside = [program for program in self.programs if program.measured_against == path]
-            by_name = {program.name: program for program in beside}
-            # Full file paths if two files have the same name.
-            if len(by_name) < len(beside):
-                by_name = {f"{number} {program.program}": program for number, program in enumerate(beside, start=1)}
-            judged = any(program.ok is not None for program in beside)
-            limit_um = self.contour_tolerance_um if judged else None
-            on = f"{self.machine}, tool of {self.tool_diameter_mm:g} mm, {self.plant} plant"
-            if any(program.sections for program in beside):
-                found.append(_summary_table(f"worst figures on {on}", by_name, self.settling_band_um))
-            title = f"sections measured on {on}"
-            found.append(_section_table(title, by_name, limit_um, self.settling_band_um, every=every_section))
-        return found
-
-    def plots(self) -> Mapping[str, Plot]:
-        """`measure-part` and `measure-walls` of the region with the largest deviation of walls; none without walls."""
-        return self._drawn_beside()

@@ -3,12 +3,10 @@
 A pass moves along +X at constant Y; the height of the stock edge above the finished wall is known over X.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError
@@ -40,7 +38,7 @@ class CuttingLaw:
     chip_thickness: Literal["mean", "local"] = "mean"
 
     @classmethod
-    def of(cls, law: _core.CuttingCoefficients) -> CuttingLaw:
+    def of(cls, law: _core.CuttingCoefficients) -> Self:
         """Convert from coefficients of the core."""
         values = {name: getattr(law, name) for name in COEFFICIENTS}
         return cls(**values, chip_thickness="local" if law.thickness == _core.ChipThickness.local else "mean")

@@ -3,8 +3,6 @@
 Source: Y.-H. Kim, S.-L. Ko: Improvement of the Accuracy in Cornering Cut Using End Mill, 2001 (paper 001).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

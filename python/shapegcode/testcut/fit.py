@@ -1,7 +1,5 @@
 """Evaluates records of test cuts: coefficients of a taper, resultant in a corner, shortest interval of feed changes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import takewhile

@@ -1,16 +1,15 @@
 """Tool engagement along a measuring pass, forces by a law, and the law's coefficients from mean forces."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import nnls
+from scipy.optimize import least_squares, nnls
+from scipy.special import stdtrit
 
 from shapegcode import _core
 from shapegcode.cutting.tool import COEFFICIENTS
@@ -28,7 +27,7 @@ class Engagement:
     radial_depth_mm: FloatArray  # distance of the outermost engaged point from the wall
 
     @classmethod
-    def joined(cls, several: Sequence[Engagement]) -> Engagement:
+    def joined(cls, several: Sequence[Self]) -> Self:
         """Concatenate several engagements."""
         return cls(*map(np.concatenate, zip(*(vars(each).values() for each in several), strict=True)))
 
@@ -345,8 +344,6 @@ def _start(model: ForceModel, data: MeanForces, count: int) -> FloatArray:
 
 def _solved(model: ForceModel, start: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Weighted least squares: parameters, residuals, weighted Jacobian (measured values, parameters)."""
-    from scipy.optimize import least_squares
-
     root = np.sqrt(weights)
     # Force must increase with the chip: the exponent of k1 k2 is limited too, and replaces that of k2.
     to_law = np.eye(len(start))
@@ -394,9 +391,7 @@ def _with_intervals(
     model: ForceModel, parameters: FloatArray, covariance: FloatArray, free: int, chip_mm: float
 ) -> tuple[Coefficient, ...]:
     """Coefficients with 95 % intervals; the factors k1 and k2 are evaluated at one chip thickness."""
-    from scipy.stats import t as student
-
-    quantile = float(student.ppf(0.975, max(free, 1)))
+    quantile = float(stdtrit(max(free, 1), 0.975))
     distance = math.log(chip_mm / model.reference)
     found = []
     for k, (name, unit) in enumerate(zip(COEFFICIENTS[: len(parameters)], _UNITS, strict=False)):

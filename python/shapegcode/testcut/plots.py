@@ -1,19 +1,14 @@
 """The pictures of ``shapegcode testcut fit``: forces and coefficients of a taper, resultants of corner and interval."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from shapegcode.results import plot
 from shapegcode.results.outcome import Plot
 from shapegcode.testcut.result import CornerResult, IntervalResult, TaperResult
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _MEASURED, _EXPECTED, _LAGGING = plot.GREY, plot.COLOURS[0], plot.COLOURS[1]
 

@@ -1,7 +1,5 @@
 """Measured forces: file, position of each sample, removal of offset and drift, means over revolutions."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Designs of test cuts, and results of their records: coefficients, forces, and how the control follows the feed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal

@@ -6,8 +6,6 @@ at constant speed is τ + (1 − f)/K. A Sinumerik balances its feed-forward by 
 Feed drive: a rigid axis of 1 kg, since positions determine only force/mass.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,13 +1,11 @@
 """Commands and actual positions of axes, from captures and logs."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -55,7 +53,7 @@ class ServoTrace:
         """Command minus actual position."""
         return tuple(r - x for r, x in zip(self.command, self.actual, strict=True))
 
-    def liveliest(self, most: int) -> ServoTrace:
+    def liveliest(self, most: int) -> Self:
         """Select the windows with most changes of speed, to limit the time of a fit.
 
         Args:
@@ -79,7 +77,7 @@ class ServoTrace:
                 kept.append((rank, slice(at, end)))
         return self._parts(kept)
 
-    def _parts(self, kept: Sequence[tuple[int, slice]]) -> ServoTrace:
+    def _parts(self, kept: Sequence[tuple[int, slice]]) -> Self:
         """Parts of sections, as separate sections."""
         names = ("time_s", "command", "actual", "deviation", "torque")
         columns = {name: values for name in names if (values := getattr(self, name)) is not None}

@@ -1,7 +1,5 @@
 """Position loops identified from a log: figures, tables, pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
