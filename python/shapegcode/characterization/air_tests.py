@@ -16,7 +16,6 @@ AXES = ("X", "Y", "Z")
 BlockEnd = Literal["ceil", "carry"]  # rounding of a block's end to the interpolation period
 Kind = Literal["stopwatch", "log"]
 Pattern = Literal["pause", "continuous", "dwell", "exact", "rapid", "feed_steps"]
-_LARGEST_BOX_MM = 10_000.0
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class AirBox:
             if not low <= 0.0 <= high or low == high:
                 span = f"{axis} from {low:g} to {high:g} mm"
                 raise ArgumentError(f"--box {text}: {span} does not contain the start point, 0")
-            if max(-low, high) > _LARGEST_BOX_MM:
+            if max(-low, high) > 10_000.0:
                 raise ArgumentError(f"--box {text}: {axis} reaches {max(-low, high):g} mm, the limit is 10000")
         return cls(tuple(values[::2]), tuple(values[1::2]))  # type: ignore[arg-type]
 
@@ -135,10 +134,8 @@ _LOG_STOP_S, _LOG_DWELL_S, _LOG_PAUSE_S = 0.160, 0.096, 0.5
 _STEPS_MOVE_S = 0.8  # at full feed: longer than the ramps at both ends
 _LOG_RATIOS = (1.0, 0.5, 0.25, 0.1, 0.05)
 _MORE_RATIOS = (0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.45, 0.4, 0.35)
-_LONG_RAPID_S = 0.2
 _LONG_RAPIDS = ((1.0, 100), (0.5, 100), (0.2, 60), (0.14, 60), (0.1, 60), (0.07, 60), (0.05, 60), (0.03, 60))
 _SHORT_RAPIDS = ((1.0, 100), (0.85, 60), (0.7, 60), (0.55, 60), (0.4, 60), (0.3, 60), (0.2, 60), (0.1, 60), (0.05, 60))
-_PER_MINUTE = 60.0
 
 
 class _Maker:
@@ -163,7 +160,7 @@ class _Maker:
 
     def _length(self, axis: str, duration_s: float, feed: float, side: int) -> float:
         """Signed length for a duration; *side* -1, +1: rounded to increments below or above it."""
-        exact = duration_s * feed / _PER_MINUTE
+        exact = duration_s * feed / 60.0
         margin = max(self._step, 0.0005 * exact) if side else 0.0
         increments = round((exact + side * margin) / self._step)
         if side and (increments * self._step - exact) * side <= 0.0:
@@ -189,12 +186,12 @@ class _Maker:
 
     def rate_is_reached(self, axis: str) -> bool:
         """Whether rapids over the box reach the rapid rate (if not, the tests have rapids of more lengths)."""
-        return abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / _PER_MINUTE
+        return abs(self._box.travel_mm(axis)) > 0.2 * self.rapid[axis] / 60.0
 
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:
         """Moves of one length in one direction, alternately fast and slow, then back; none if the box is too small."""
         room = int((abs(self._box.travel_mm(axis)) + 1e-9) / length_mm)
-        wanted = max(8, 2 * math.ceil(_STEPS_MOVE_S * self.feed / _PER_MINUTE / (2.0 * length_mm)))
+        wanted = max(8, 2 * math.ceil(_STEPS_MOVE_S * self.feed / 60.0 / (2.0 * length_mm)))
         stride = min(wanted, room - room % 2)
         if stride < 4:
             return []
@@ -233,7 +230,7 @@ def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
         for ratio, count in _LONG_RAPIDS if make.rate_is_reached(axis) else _SHORT_RAPIDS:
             name = f"rapid_{axis.lower()}_{ratio * 100:.0f}"
             stopwatch(name, f"RAPID OF {axis}, {ratio * 100:.0f} PERCENT OF THE BOX", make.rapids(axis, ratio, count))
-    override_run = make.run("X", 20, min(1.0, abs(box.travel_mm("X")) / make.feed * _PER_MINUTE))
+    override_run = make.run("X", 20, min(1.0, abs(box.travel_mm("X")) / make.feed * 60.0))
     for percent in (50, 100, 120):
         stopwatch(f"override_{percent}", "FEED OVERRIDE", override_run, percent)
 
@@ -258,7 +255,6 @@ def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
 # --- duration of the tests: paper 004 in docs/evidence/references.md, equations 2 to 16 -------------------------------
 
 NO_PERIOD_S = 1e-6  # too short to round anything
-_ROUND_OFF = 1e-6  # periods
 
 
 @dataclass(frozen=True)
@@ -287,7 +283,7 @@ class ControllerTiming:
 
 def whole_periods(duration_s: float, period_s: float) -> float:
     """Round a duration up to whole interpolation periods, in s."""
-    return math.ceil(duration_s / period_s - _ROUND_OFF) * period_s
+    return math.ceil(duration_s / period_s - 1e-6) * period_s
 
 
 def part_time_s(part: Part, timing: ControllerTiming, override: float = 1.0) -> float:

@@ -16,7 +16,6 @@ from shapegcode.io.servo_log import ServoLog
 from shapegcode.io.units import FloatArray
 
 _Interval = tuple[float, float]  # a value and its half-width
-_FOLLOWED, _RUN_SETTLE_S, _STEPS_SETTLE_S = 0.9, 0.45, 0.3
 
 
 @dataclass
@@ -46,8 +45,8 @@ class LogFacts(Facts):
     def fine_s(self) -> float:
         """Longest second time constant that may come from sampling alone, and so does not count as a bell time."""
         if self.bent and self.period:
-            return _FINE_BENT * self.period
-        return 0.0 if self.held else _FINE * max(self.period or 0.0, 2.0 * self.sampling)
+            return self.period
+        return 0.0 if self.held else 1.7 * max(self.period or 0.0, 2.0 * self.sampling)
 
 
 def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list[ControllerFact]:
@@ -126,7 +125,7 @@ def _period_of_stops(stops: list[moves.PartLog]) -> tuple[float, float, str] | N
 
 def _period_of_run(run: list[moves.PartLog], sampling: float) -> tuple[float, float, str] | None:
     """The one of `PERIODS_S` that explains the rounded block times of a run; with half-width and a note."""
-    steady = moves.line_slope(run[0], _RUN_SETTLE_S) if run else None
+    steady = moves.line_slope(run[0], 0.45) if run else None
     if steady is None:
         return None
     part = run[0].part
@@ -235,7 +234,7 @@ def _feed_steps(facts: LogFacts, parts: list[moves.PartLog]) -> None:
         return
     name = f"feed-control interval at F{parts[0].part.feed_mm_per_min:g}"
     depths = {abs(log.part.length_mm): depth for log in parts if (depth := _followed_share(log)) is not None}
-    followed = [d for d in depths if all(depths[e] >= _FOLLOWED for e in depths if e >= d)]
+    followed = [d for d in depths if all(depths[e] >= 0.9 for e in depths if e >= d)]
     shown = ", ".join(f"{d:g} mm {max(0.0, min(1.0, depths[d])) * 100:.0f} %" for d in sorted(depths))
     if not followed:
         facts.add_unknown(name, f"the speed follows over none of the distances in the box: {shown}", "mm")
@@ -250,7 +249,7 @@ def _followed_share(log: moves.PartLog) -> float | None:
     part = log.part
     top = int(np.argmax(log.travel_mm))  # the reversal, which smoothing shortens
     begin = log.times_s[int(np.argmax(log.travel_mm > max(0.02, 5 * log.noise_mm)))]
-    settle = min(_STEPS_SETTLE_S, 0.25 * (log.times_s[top] - begin))
+    settle = min(0.3, 0.25 * (log.times_s[top] - begin))
     inside = (log.times_s > begin + settle) & (log.times_s < log.times_s[top] - settle)
     pitch = float(np.median(np.diff(log.times_s)))
     width = max(1, round(min(0.02, 0.25 * part.duration_s) / pitch))
@@ -267,8 +266,6 @@ def _followed_share(log: moves.PartLog) -> float | None:
 
 _ODD_SHAPE = 0.002  # largest residual of a fit, relative to the travel
 _BELL_GAIN = 0.8  # a second moving average must reduce the variance below this ratio
-_FINE = 1.7  # periods
-_FINE_BENT = 1.0
 _NO_BELL = "no second moving average was found"
 _SHAPE_NOTES = {"linear": "linear", "bell": "the longer of two moving averages", "exponential": "exponential"}
 

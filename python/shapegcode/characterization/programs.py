@@ -20,8 +20,6 @@ from shapegcode.program import decimal
 from shapegcode.settings.keys import Count, Float, InlineTable, Positive, Text, TomlTable, key
 from shapegcode.settings.load import KeyProblem, line_of, parsed, read_text, validated
 
-_HEADER = "G21 G17 G91 G94 G64"
-
 
 def write_characterization_tests(
     folder: str | Path, machine: Machine, box: str | air_tests.AirBox = "0:100,0:100,0:20"
@@ -69,7 +67,8 @@ def program_text(test: air_tests.AirTest, box: air_tests.AirBox, machine: Machin
     sides = [f"{a}{low:g}/{high:g}" for a, low, high in zip(air_tests.AXES, box.low, box.high, strict=True)]
     lines = ["%", f"O{test.number:04d}({title})", f"({test.purpose})"]
     lines += [f"(BOX FROM START POINT {sides[0]})", f"({sides[1]} {sides[2]} MM)"]
-    lines += [f"(ABOUT {seconds:.0f} S IN TOTAL, AIR ONLY)", "(INCREMENTAL, ENDS WHERE IT BEGAN)", _HEADER]
+    lines += [f"(ABOUT {seconds:.0f} S IN TOTAL, AIR ONLY)", "(INCREMENTAL, ENDS WHERE IT BEGAN)"]
+    lines.append("G21 G17 G91 G94 G64")
     for part in test.parts:
         mode: tuple[str, float] | None = None
         if part.pattern == "exact":
@@ -118,11 +117,6 @@ def readme_text(tests: Sequence[air_tests.AirTest], machine: Machine, box: air_t
 SHEET = "RESULTS.toml"  # file name
 
 _Whole = Annotated[Count, Field(ge=1, le=1_000_000)]
-_Length = Annotated[Float, Field(ge=-1e5, le=1e5)]
-_Feed = Annotated[Float, Field(ge=0, le=1e6)]
-_Dwell = Annotated[Float, Field(ge=0, le=1e4)]
-_Time = Annotated[Positive, Field(lt=86_400)]
-_PROGRAM = r"^O(\d{1,8})\.nc$"
 
 
 class _PartTable(InlineTable):
@@ -131,10 +125,10 @@ class _PartTable(InlineTable):
     pattern: air_tests.Pattern = key("kind of move")
     axis: Literal["X", "Y", "Z"] = key("axis of the moves", default="X")
     count: _Whole = key("number of moves", default=1)
-    length_mm: _Length = key("length of a move", default=0.0)
-    feed_mm_per_min: _Feed = key("cutting feed, or the rapid rate", default=0.0)
+    length_mm: Annotated[Float, Field(ge=-1e5, le=1e5)] = key("length of a move", default=0.0)
+    feed_mm_per_min: Annotated[Float, Field(ge=0, le=1e6)] = key("cutting feed, or the rapid rate", default=0.0)
     stride: _Whole = key("moves in one direction", default=1)
-    dwell_s: _Dwell = key("dwell after each move, or the pause", default=0.0)
+    dwell_s: Annotated[Float, Field(ge=0, le=1e4)] = key("dwell after each move, or the pause", default=0.0)
 
     @model_validator(mode="after")
     def _moves(self) -> Self:
@@ -145,9 +139,9 @@ class _PartTable(InlineTable):
 
 
 class _TestTable(TomlTable):
-    program: Annotated[Text, Field(pattern=_PROGRAM)] = key("file name, such as O7001.nc")
+    program: Annotated[Text, Field(pattern=r"^O(\d{1,8})\.nc$")] = key("file name, such as O7001.nc")
     override_percent: Annotated[Count, Field(ge=1, le=254)] = key("feed override", default=100)
-    times_s: tuple[_Time, ...] = key("stopwatch times", default=())
+    times_s: tuple[Annotated[Positive, Field(lt=86_400)], ...] = key("stopwatch times", default=())
     log: Text | None = key("file of the servo log", default=None)
     parts: Annotated[tuple[_PartTable, ...], Field(min_length=1)] = key("parts of the program")
 

@@ -25,10 +25,8 @@ Measured = Record | FrequencyResponse
 _AXES = "xyz"
 _WIDTHS, _NEAREST = 8.0, 0.08  # fitted around a mode: half-power widths; ratio to its frequency
 _LOCAL_WIDTHS, _LOCAL_LINES = 2.0, 4  # range around a mode for its residual
-_HITS_TO_SCATTER = 5  # fewer impacts do not determine their scatter
 _NO_VIBRATION = 0.3  # damping ratio above which a pole is background
 MIN_MOVE = 0.01  # relative to the motion along its own axis; smaller motion is not written, its phase not reported
-_OUT_OF_PHASE = 1.0  # tan of the phase angle beyond which two axes do not move in phase
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +89,7 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
         moves: dict[str, Estimate | None] = dict.fromkeys(_AXES) | {found.axis: Estimate(1.0, 1.0, 1.0)}
         for letter, parts in along.items():
             ratio, moves[letter] = in_phase = _ratio(own, parts, index)
-            out_of_phase = abs(ratio.imag) > max(_OUT_OF_PHASE * abs(ratio.real), MIN_MOVE)
+            out_of_phase = abs(ratio.imag) > max(abs(ratio.real), MIN_MOVE)  # by more than 45°
             if out_of_phase and _is_significant(in_phase[1], abs(ratio)):
                 notes.append(
                     f"{mode.frequency_hz.value:.4g} Hz: {letter.upper()} moves {abs(ratio):.3g} times as far, "
@@ -297,7 +295,7 @@ def _ratio(own: Sequence[_Amplitudes], other: Sequence[_Amplitudes], index: int)
     ratio = complex(np.sum(np.conj(one) * two) / np.sum(weight))
     variance = float(np.sum(weight * (two_variance + abs(ratio) ** 2 * one_variance)) / np.sum(weight) ** 2)
     half = 1.96 * np.sqrt(0.5 * variance)
-    if len(one) >= _HITS_TO_SCATTER:
+    if len(one) >= 5:  # fewer impacts do not determine their scatter
         scatter = np.sum((weight / np.sum(weight) * np.abs(two / one - ratio)) ** 2) * len(one) / (len(one) - 1)
         half = max(half, float(stats.t.ppf(0.975, len(one) - 1) * np.sqrt(0.5 * scatter)))
     return ratio, Estimate(ratio.real, ratio.real - half, ratio.real + half)

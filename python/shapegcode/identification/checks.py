@@ -85,20 +85,13 @@ DOUBLE_HIT = 0.1  # Below, it may be the ringing of an anti-aliasing filter, whi
 MIN_FORCE = 10.0  # Least ratio of the peak force to its noise: the error of the mass is about the inverse
 MIN_PULSE = 3  # Least samples of a pulse: with three, the impulse of a half sine is known to about 10 %
 MIN_LEAD = 8  # Least samples before the impact to measure noise and offset: a standard deviation to 25 %
-_CUT_PULSE = 0.2  # Refuse a record that begins within the pulse above this fraction of its peak
-_AT_REST = 0.1  # At rest before the impact: vibration below this fraction of that afterwards
-_MIN_MARGIN = 3  # The force is used for half a pulse on either side, at least this many samples
-_OFFSET_ERRORS = 2.0  # An offset above this many standard errors of its mean is removed
-_REPORTED_OFFSET = 0.05  # An offset of the force above this fraction of the peak is reported
-_OPPOSED = -0.7  # Correlation of force and response below which they are opposite
-_SAME_PERIOD = 1e-5  # Allowed relative difference of sampling periods, as in files of six digits
 
 
 def _mean_to_remove(values: FloatArray) -> float:
-    """Mean of a quiet interval; 0 if not significant."""
+    """Mean of a quiet interval; 0 if below two standard errors."""
     mean = float(np.mean(values))
     error = float(np.std(values)) / np.sqrt(len(values))
-    return mean if abs(mean) > _OFFSET_ERRORS * error else 0.0
+    return mean if abs(mean) > 2.0 * error else 0.0
 
 
 def _is_opposed(record: Record, hit: Hit, response: FloatArray, force: FloatArray) -> bool:
@@ -110,7 +103,7 @@ def _is_opposed(record: Record, hit: Hit, response: FloatArray, force: FloatArra
     for _ in range(("acceleration", "velocity", "displacement").index(record.quantity)):
         push = np.cumsum(push)
     norm = float(np.linalg.norm(push) * np.linalg.norm(moved))
-    return norm > 0.0 and float(push @ moved) / norm < _OPPOSED
+    return norm > 0.0 and float(push @ moved) / norm < -0.7
 
 
 def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> Usable:
@@ -145,7 +138,7 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> Usable:
             f"double hit: a second pulse of {100 * hit.second_share:.0f} % comes {1000 * hit.second_s:.3g} ms after "
             f"the first; above {100 * DOUBLE_HIT:g} % it is not one tap: hit again"
         )
-    if hit.first == 0 and hit.peak > 0 and (force[0] - np.median(force)) / hit.peak_n > _CUT_PULSE:
+    if hit.first == 0 and hit.peak > 0 and (force[0] - np.median(force)) / hit.peak_n > 0.2:
         raise RecordError(
             "the record begins inside the pulse: part of the force is missing; required: a pre-trigger of some "
             f"{MIN_LEAD} samples or more"
@@ -164,10 +157,10 @@ def _windowed(
     assert record.force_n is not None
     where = record.source
     offset = _mean_to_remove(quiet) if quiet.size >= MIN_LEAD else 0.0
-    if abs(offset) > _REPORTED_OFFSET * abs(hit.peak_n):
+    if abs(offset) > 0.05 * abs(hit.peak_n):
         warnings.append(f"{where}: offset of the force, {offset:.4g} N, removed")
     force = np.zeros(len(record.force_n))
-    margin = max(_MIN_MARGIN, (hit.end - hit.first) // 2)
+    margin = max(3, (hit.end - hit.first) // 2)  # the force is used for half a pulse on either side
     window = slice(max(hit.first - margin, 0), hit.end + margin)
     force[window] = record.force_n[window] - offset
     if hit.peak_n < 0.0:
@@ -184,7 +177,7 @@ def _windowed(
         response = response - _mean_to_remove(lead)
         noise = float(np.std(lead))
         after = float(np.sqrt(np.mean(response[hit.end :][: len(lead)] ** 2))) if hit.end < len(response) else 0.0
-        if noise > _AT_REST * after > 0.0:
+        if noise > 0.1 * after > 0.0:
             warnings.append(
                 f"{where}: before the impact the sensor shows {100 * noise / after:.0f} % of what it shows afterwards: "
                 "noise, or the machine was not at rest"
@@ -265,18 +258,14 @@ def _refuse_mixture(records: Sequence[Record]) -> None:
                     f"{first.source}: {name} is {one}; {other.source}: {name} is {two}: must be the same in all "
                     "records; choose (--axis, --response-column, --ignore-force)"
                 )
-        if abs(first.period_s / other.period_s - 1.0) > _SAME_PERIOD:
+        if abs(first.period_s / other.period_s - 1.0) > 1e-5:  # as in files of six digits
             raise RecordError(
                 f"{first.source} has a sample every {first.period_s:.9g} s, {other.source} every "
                 f"{other.period_s:.9g} s: must have the same sampling rate"
             )
 
 
-_CLIPPED_RUN = 3  # Consecutive equal extreme samples that may be an overload; a smooth peak has two
-_CLIPPED_STEP = 1e-4  # Values closer than this fraction of the range count as equal: filters do not clip to one value
 _SMOOTH_FALL = 6.0  # A smooth peak falls by four resolution steps at twice the distance of the run's ends from the top
-# A lobe is flat if over half of its samples above 50 % are above 95 %, with at least this many samples.
-_NEARLY_TOP, _FLAT_SHARE, _FLAT_RUN = 0.95, 0.5, 5
 EXCITED = 0.1  # Force spectrum fallen to this ratio (-20 dB): noise counts tenfold
 EXCITED_HALF_SINE = 1.3033  # A half sine reaches it at this multiple of 1/duration: cos(pi x) / (1 - 4 x²) = 0.1
 MIN_PERIODS = 8.0  # Least periods to find damping without full decay; fewer cannot distinguish decay from beat
@@ -296,14 +285,14 @@ def is_clipped(values: FloatArray) -> bool:
         return True
     steps = np.abs(np.diff(values))
     steps = steps[steps > 0.0]
-    step = max(_CLIPPED_STEP * float(np.ptp(values)), float(np.min(steps)))
+    step = max(1e-4 * float(np.ptp(values)), float(np.min(steps)))  # filters do not clip to one value
     for signal in (centred, -centred):
         top = float(np.max(signal))
         if top < 0.5 * largest:
             continue
         high = np.flatnonzero(signal >= top - 0.5 * step)
         for run in np.split(high, np.flatnonzero(np.diff(high) > 1) + 1):
-            if len(run) < _CLIPPED_RUN:
+            if len(run) < 3:  # a smooth peak has two
                 continue
             reach = (len(run) + 1) // 2
             sides = [k for k in (int(run[0]) - reach, int(run[-1]) + reach) if 0 <= k < len(signal)]
@@ -314,11 +303,11 @@ def is_clipped(values: FloatArray) -> bool:
 
 
 def _is_flat_topped(signal: FloatArray) -> bool:
-    """Whether the highest lobe is clipped, also under noise: much of its upper half is above 95 % of the maximum."""
+    """Whether the highest lobe is clipped, also under noise: 5 samples and half of its upper half are above 95 %."""
     top, crest = float(np.max(signal)), int(np.argmax(signal))
-    lobes = (label(signal > share * top)[0] for share in (_NEARLY_TOP, 0.5))
+    lobes = (label(signal > share * top)[0] for share in (0.95, 0.5))
     high, half = (np.count_nonzero(lobe == lobe[crest]) for lobe in lobes)
-    return bool(high >= _FLAT_RUN and high > _FLAT_SHARE * half)
+    return bool(high >= 5 and high > 0.5 * half)
 
 
 def excited_hz(force_n: FloatArray, period_s: float) -> float:
@@ -339,10 +328,7 @@ def excited_hz(force_n: FloatArray, period_s: float) -> float:
 def refuse_short(
     record: Record, response: FloatArray, noise: float, band_hz: float | None, warnings: list[str]
 ) -> float:
-    """Refuse a record too short, or sampled too slowly; return the frequency of its strongest mode, Hz.
-
-    With a band, its upper end decides whether sampling is too slow; the strongest mode then gives a warning only.
-    """
+    """Refuse a record too short, or sampled too slowly for the band or the strongest mode; return that mode's Hz."""
     half_rate = 0.5 / record.period_s
     if len(response) < _MIN_SAMPLES:
         raise RecordError(
@@ -399,7 +385,6 @@ _RINGING_SAMPLES = 8  # A further pulse within this many samples is ringing of t
 _BOUNCE_S = 0.1  # A second impact within this time is a bounce of the hammer
 _RESTED = 0.1  # Before an intended next impact the response has fallen to this fraction of its peak
 _LEAD_SHARE = 0.1  # A record of one impact begins before it by this fraction of the shortest time between impacts
-_MAD = 1.4826  # Normal noise: standard deviation over median absolute deviation
 
 
 def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
@@ -440,7 +425,7 @@ def find_hits(record: Record) -> list[Hit]:
     hits: list[Hit] = []
     largest = float(np.max(sign * force))
     noise = 0.0
-    sigma = _MAD * float(np.median(np.abs(force - np.median(force))))  # quiet most of the time
+    sigma = 1.4826 * float(np.median(np.abs(force - np.median(force))))  # normal noise, as it is quiet most of the time
     for pulse in _pulses(sign * force, sigma):
         if not hits and pulse.first > 1:
             noise = float(np.std(record.response[: pulse.first - 1]))

@@ -31,26 +31,10 @@ from shapegcode.io.record import ComplexArray, FrequencyResponse
 from shapegcode.io.units import FloatArray
 
 _BESIDE = 0.25  # also fit lines this far outside the requested band, relative to its ends
-_COMMON = 0.5  # least common fraction of the bands of several responses
-_FURTHER = 1.3  # fit lines up to this factor above the requested band, or the excited frequency
-_SAME_POINT = 0.1  # largest relative difference of responses of one point
 _MIN_WIDTH = 1.0  # least width of a resonance, in line spacings: narrower may be leakage
-_HUM = 0.1  # a mode at a mains harmonic may be hum if it has not decayed to this ratio when the record ends
-_MAINS_HZ, _HARMONICS, _HUM_WIDTH = (50.0, 60.0), 20, 1.5  # distance to a harmonic, in lines
-_MAINS_WIDTH_HZ = 2.0
-_VERY_CLEAR = 6.0  # added evidence needed by a mode unless it has both a peak of its own and a stable pole
 _LOCAL, _LOCAL_WIDTHS = 30.0, 2.0  # % residual; range in half-power widths
-_TURNED = 1.0  # tan of the phase of a residue: beyond, hammer and sensor are at different points
-_ACCEPTED_PERCENT = 50.0  # largest accepted half interval of the damping ratio
 _MAX_MODES, _IN_WINDOW = 40, 24  # default largest number of modes of a structure; largest one of a window
-_NO_VIBRATION = 0.3  # damping ratio above which it is background, not a mode
 _BEYOND = "beyond the requested number of modes: its peak is lower"
-_SMALL = 0.02  # ratio to the highest supported peak: refused modes below are ignored
-_DIFFERENT = 0.5  # residual ratio of one impact after the model of all: another point, axis or sign
-_OUT_OF_NOISE = 5.0
-_ENOUGH = 3.0  # least independent samples per parameter of a comparison fit
-_PEAK = 0.5  # range around a mode in which its peak must be, in half-power widths
-_RISES = 2.0  # factor by which a peak exceeds its surroundings
 POOR = 0.3  # largest residual ratio in the band of a usable model
 
 
@@ -146,23 +130,24 @@ def _chosen(
                 f"band of {band_hz[0]:g} to {band_hz[1]:g} Hz: must ascend and overlap the lines, {lowest:g} to "
                 f"{highest:g} Hz"
             )
-        used = [_within(each, (1.0 - _BESIDE) * band_hz[0], (1.0 + _BESIDE) * band_hz[1]) for each in used]
+        used = [within(each, (1.0 - _BESIDE) * band_hz[0], (1.0 + _BESIDE) * band_hz[1]) for each in used]
     first_hz, last_hz = np.array([each.frequency_hz[[0, -1]] for each in used]).T
     common, whole = last_hz.min() - first_hz.max(), last_hz.max() - first_hz.min()
-    if common < _COMMON * whole:
+    if common < 0.5 * whole:
         raise RecordError(
             f"{used[0].source} and {len(used) - 1} more share {max(common, 0.0):.4g} Hz of {whole:.4g} Hz: "
             "identify responses of different bands separately"
         )
-    used = [_within(each, first_hz.max(), last_hz.min()) for each in used]
+    used = [within(each, first_hz.max(), last_hz.min()) for each in used]
     if len(used) < 2 or not all(np.array_equal(each.frequency_hz, used[0].frequency_hz) for each in used[1:]):
         return used, False
     mean = np.mean([each.response for each in used], axis=0)
-    most = _SAME_POINT * float(np.linalg.norm(mean))
+    most = 0.1 * float(np.linalg.norm(mean))
     return used, all(float(np.linalg.norm(each.response - mean)) < most for each in used)
 
 
-def _within(each: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyResponse:
+def within(each: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyResponse:
+    """Lines of a response between two frequencies."""
     return _of_lines(each, (each.frequency_hz >= low_hz) & (each.frequency_hz <= high_hz))
 
 
@@ -190,7 +175,7 @@ def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -
     low_hz, high_hz = MIN_CYCLES / duration, excited
     if sought.band_hz is not None:
         low_hz, high_hz = max(low_hz, sought.band_hz[0]), sought.band_hz[1]
-    highest = min(_FURTHER * high_hz, 0.49 / period)
+    highest = min(1.3 * high_hz, 0.49 / period)  # fitted beyond the band, as modes above it matter
     hits = hits_of(ready.usable, responses, low_hz / (1.0 + _BESIDE), highest, sought.exponential_window_s)
     force = np.sqrt(np.sum(np.abs(hits.force) ** 2, axis=0))
     low, high = (2.0 * np.pi * each for each in (low_hz, min(1.1 * high_hz, 0.49 / period)))
@@ -224,7 +209,7 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
         samples[start : start + len(course)] = course
     shares = np.linalg.norm(rest, axis=1) / np.linalg.norm(np.where(inside, hits.response, 0.0), axis=1)
     worst = int(np.argmax(shares))
-    if len(shares) > 1 and shares[worst] > _DIFFERENT:
+    if len(shares) > 1 and shares[worst] > 0.5:  # another point, axis or sign
         found = replace(found, different=ready.records[worst].source)
     return found, fitted
 
@@ -272,14 +257,14 @@ def _tested(
 
 
 def _strongest(modes: Sequence[IdentifiedMode], sought: Sought) -> list[IdentifiedMode]:
-    """Keep the requested number of modes, those with the highest peaks; the others are refused."""
+    """Keep the requested number of modes, those with the highest peaks; refused ones far below them are ignored."""
     supported = [mode for mode in modes if not mode.refusal and mode.mass_kg is not None]
     if sought.modes is not None and len(supported) < sought.modes:
         raise RecordError(f"{sought.modes} modes are asked for, and the data support no more than {len(supported)}")
     most = sought.modes or sought.max_modes or _MAX_MODES
     supported.sort(key=_height, reverse=True)
     over = {id(mode) for mode in supported[most:]}
-    least = _SMALL * _height(supported[0]) if supported else 0.0
+    least = 0.02 * _height(supported[0]) if supported else 0.0
     return [
         replace(mode, refusal=_BEYOND, left_out=True)
         if id(mode) in over
@@ -333,11 +318,11 @@ def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float
     inside = _inside(lines, measured)
     if measured.excitation is not None:
         inside &= measured.excitation >= EXCITED
-    inside &= lines.weight * np.abs(lines.response) > _OUT_OF_NOISE
+    inside &= lines.weight * np.abs(lines.response) > 5.0  # out of the noise
     if np.count_nonzero(inside) < 3:
         return None
     level = np.log(np.maximum(height[inside], 1e-300))
-    tops, _ = find_peaks(level, prominence=np.log(_RISES))
+    tops, _ = find_peaks(level, prominence=np.log(2.0))
     if not len(tops):
         return None
     top = float(lines.omega[inside][tops[int(np.argmax(level[tops]))]]) / (2.0 * np.pi)
@@ -366,7 +351,7 @@ def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], soug
     others = _other_fits(window)
     found = []
     for index in window.inside():
-        if fit.zeta[index] > _NO_VIBRATION:
+        if fit.zeta[index] > 0.3:  # background, not a mode
             continue
         values, spread = _logarithms(window, known, index, measured, others)
         mode = mode_estimates(values, spread)
@@ -388,7 +373,7 @@ def _other_fits(window: Window) -> list[ModalFit]:
     found = []
     for parts in (narrow, other):
         columns = (2 + 1 + parts[0].complex_modes) * len(starts) + 6
-        enough = min(2 * len(lines.s) * lines.independent for lines in parts) > _ENOUGH * columns
+        enough = min(2 * len(lines.s) * lines.independent for lines in parts) > 3.0 * columns
         found += [fit] if enough and (fit := fitted(parts, starts)) is not None else []
     return found
 
@@ -471,7 +456,7 @@ def _refusal(
         or (_response_refusal(frf_search.residues_of(window.fit)[:, index]) if sought.phase_known else "")
         or _evidence_refusal(window, index, hertz, pool)
         or _local_refusal(window, omega, width)
-        or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent or _ACCEPTED_PERCENT)
+        or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent or 50.0)
     )
 
 
@@ -487,8 +472,8 @@ def _record_refusal(hertz: float, zeta: float, measured: _Measured) -> str:
     refusal, lasting = model_search.lasting_refusal(hertz, zeta, measured.record_s)
     if refusal:
         return refusal
-    mains = min((k * base for base in _MAINS_HZ for k in range(1, _HARMONICS)), key=lambda each: abs(each - hertz))
-    if lasting > _HUM and abs(mains - hertz) < min(_HUM_WIDTH * measured.resolution_hz, _MAINS_WIDTH_HZ):
+    mains = min((k * base for base in (50.0, 60.0) for k in range(1, 20)), key=lambda each: abs(each - hertz))
+    if lasting > 0.1 and abs(mains - hertz) < min(1.5 * measured.resolution_hz, 2.0):
         return f"at {mains:g} Hz, a mains harmonic, and still at {100.0 * lasting:.0f} %: it may be hum"
     return ""
 
@@ -511,7 +496,7 @@ def _response_refusal(residues: ComplexArray) -> str:
         return ""
     if first.real < 0.0:
         return OPPOSED
-    if abs(first.imag) > _TURNED * first.real:
+    if abs(first.imag) > first.real:
         return (
             f"its phase is {np.degrees(np.angle(first)):.0f}° from that of hammer and sensor at one point (limit 45°): "
             "another point, a delay between the channels, or no mode"
@@ -534,10 +519,10 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
     stable = any(abs(each.omega - omega) < max(each.zeta, zeta) * omega for each in known)
     lines, left = window.parts[0], fit.left[0]
     modelled_lines = (lines.response - left / lines.weight) * lines.s ** (1 - lines.power)
-    near = np.flatnonzero(lines.near(omega, _PEAK * 2.0 * zeta * omega, steps=1.0))
+    near = np.flatnonzero(lines.near(omega, zeta * omega, steps=1.0))
     course = np.abs(modelled_lines.real)
     peak = any(0 < i < len(course) - 1 and course[i] >= course[i - 1] and course[i] > course[i + 1] for i in near)
-    needed = 0.0 if peak and stable else _VERY_CLEAR
+    needed = 0.0 if peak and stable else 6.0
     if gain >= needed:
         return ""
     if peak and stable:

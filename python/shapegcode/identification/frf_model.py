@@ -20,9 +20,7 @@ from shapegcode.io.units import FloatArray
 
 POWERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _LARGEST_STEP = 0.3  # largest change of ln omega and ln zeta in one iteration
-_STEP_FLOOR = 1e-10
 _RANK = 1e-12  # relative tolerance below which columns are dependent
-_MIN_DAMPING, _MAX_DAMPING = 1e-6, 0.99
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,9 +151,7 @@ def _solved(triangle: FloatArray, right: FloatArray) -> FloatArray:
 def fit_modes(
     parts: Sequence[Lines], starts: Sequence[tuple[float, float]], iterations: int, gain_floor: float
 ) -> ModalFit:
-    """Fit modes to lines: sum over modes of residue s^q / (s² + 2 zeta omega s + omega²), and the background.
-
-    Levenberg-Marquardt in ln omega and ln zeta with exact derivatives; everything linear is eliminated.
+    """Fit modes by Levenberg-Marquardt in ln omega and ln zeta with exact derivatives; all linear is eliminated.
 
     Source: D. J. Ewins, Modal Testing, 2nd ed., ch. 4; variable projection: G. Golub and V. Pereyra, 2003.
     """
@@ -165,7 +161,7 @@ def fit_modes(
         raise ArgumentError(f"{samples // 2} lines are too few for {modes} modes")
     low = 0.3 * min(float(lines.omega[0]) for lines in parts)
     high = 3.0 * max(float(lines.omega[-1]) for lines in parts)
-    bounds = np.log([low, high]), np.log([_MIN_DAMPING, _MAX_DAMPING])
+    bounds = np.log([low, high]), np.log([1e-6, 0.99])
     at, damping = _linearised(parts, theta), 1e-3
     for _ in range(iterations):
         gram = at.projected.T @ at.projected
@@ -185,7 +181,7 @@ def fit_modes(
             theta, at, damping = tried, following, 0.1 * damping
         else:
             damping = max(10.0 * damping, 1e-6)
-        if moved <= _STEP_FLOOR or (0.0 <= gained <= gain_floor * at.squares) or damping > 1e8:
+        if moved <= 1e-10 or (0.0 <= gained <= gain_floor * at.squares) or damping > 1e8:
             break
     omega, zeta = np.exp(theta[::2]), np.exp(theta[1::2])
     residues = [part[:modes] + (part[modes : 2 * modes] * 1j if complex_modes else 0.0) for part in at.linear]
@@ -204,7 +200,6 @@ _QUIETEST = 1e-6  # least noise of a sensor, relative to the largest line
 _LATE = 0.4  # a steady disturbance is searched after this fraction of the record
 _STANDS_OUT = 8.0  # times the median of the spectrum there
 _STEADY = (0.8, 1.25)  # range of the second half's amplitude over that of the first half, both after `_LATE`
-_MAX_STEADY = 12
 
 
 def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, list[float]]:
@@ -227,7 +222,7 @@ def steady_sines(response: FloatArray, period_s: float) -> tuple[FloatArray, lis
         turn = np.angle(spectra[1][top] / spectra[0][top] * np.exp(-2j * np.pi * top)) / (2.0 * np.pi)
         if abs(turn) < 0.45:
             found.append((float(height[top]), float((top + turn) * step)))
-    chosen = [hertz for _, hertz in sorted(found, reverse=True)[:_MAX_STEADY]]
+    chosen = [hertz for _, hertz in sorted(found, reverse=True)[:12]]
     if not chosen:
         return np.zeros(samples), []
     time_s = np.arange(samples) * period_s
@@ -264,10 +259,7 @@ class Hits:
 def hits_of(
     usable: Sequence[Usable], responses: Sequence[FloatArray], low_hz: float, high_hz: float, applied_s: float | None
 ) -> Hits:
-    """Lines of all impacts, each from 4 samples before its pulse; `applied_s`: time constant of the responses' window.
-
-    With the window exp(-t/tau) the response at jw equals the original one at jw + 1/tau: no damping is added.
-    """
+    """Lines of all impacts, each from 4 samples before its pulse; `applied_s`: time constant of the window."""
     period = usable[0].record.period_s
     starts = [max(0, each.hit.first - _LEAD) if each.hit else 0 for each in usable]
     count = min(len(response) - start for response, start in zip(responses, starts, strict=True))
@@ -290,6 +282,7 @@ def hits_of(
     lags = fft.fft(window**2)[:_LAGS]
     pulse = np.mean([np.count_nonzero(np.asarray(each.record.force_n)) for each in usable])
     noise_n = np.sqrt(np.mean([(each.force_noise_n or 0.0) ** 2 for each in usable]))
+    # With the window exp(-t/tau) the response at jw equals the original one at jw + 1/tau: no damping is added.
     plane = np.asarray(sigma + applied + 2j * np.pi * frequency[kept], dtype=np.complex128)
     ratio = np.sum(np.conj(force) * response, axis=0) / power
     nothing = np.zeros((len(power), 0), dtype=np.complex128)
@@ -299,10 +292,7 @@ def hits_of(
     return Hits(lines, force, response, kept, tuple(starts), count, period, sigma, error)
 
 
-#: Noise counts as constant over this many lines, and at least over this fraction of all.
-_SMOOTH_LINES, _SMOOTH_SHARE = 31, 0.02
 _MIN_NOISE = 1e-5  # least assumed noise relative to the largest line, which limits weights
-_THIRD_DIFFERENCE = 20.0  # squared third difference of white noise, over its variance: 1 + 9 + 9 + 1
 
 
 def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
@@ -311,7 +301,7 @@ def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
     power = np.abs(each.response) ** 2
     quantity = POWERS[each.quantity]
     course = omega ** (2.0 * (2.0 - quantity))  # noise is white as an acceleration
-    rough = np.abs(np.diff(each.response, 3)) ** 2 / _THIRD_DIFFERENCE
+    rough = np.abs(np.diff(each.response, 3)) ** 2 / 20.0  # of white noise: 1 + 9 + 9 + 1 times its variance
     noise = smoothed(np.concatenate(([rough[0]], rough, [rough[-1]] * 2)) * course) / course
     if each.coherence is not None and np.any(each.coherence < 1.0):
         coherence = np.clip(each.coherence, 1e-3, 1.0)
@@ -332,8 +322,8 @@ def weighted(lines: Lines, noise: FloatArray) -> Lines:
 
 
 def smoothed(power: FloatArray) -> FloatArray:
-    """Running mean of a power over neighbouring lines, after a median that removes its peaks."""
-    width = max(_SMOOTH_LINES, int(_SMOOTH_SHARE * len(power))) | 1
+    """Running mean of a power over 31 lines, or 2 % of all if that is more, after a median that removes its peaks."""
+    width = max(31, int(0.02 * len(power))) | 1
     level = median_filter(power, width, mode="nearest") / np.log(2.0)
     return np.asarray(uniform_filter1d(level, width, mode="nearest"), dtype=np.float64)
 

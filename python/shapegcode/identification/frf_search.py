@@ -13,7 +13,6 @@ from shapegcode.io.record import ComplexArray
 from shapegcode.io.units import FloatArray
 
 _BAND = 1.8  # upper end of a band of poles over its lower end
-_STEP = 1.3  # ratio from band to band
 _EDGE = 1.05  # poles this near to the end of a band belong to the next one
 _SAME, _SAME_DAMPING = 0.35, 0.4  # poles count as one: distance in half-power half widths, and in ln zeta
 _CORE = 1.35  # upper end of a window over its lower end
@@ -26,15 +25,12 @@ _QUICK, _FULL = (8, 1e-3), (40, 1e-8)  # iterations, and the gain that ends them
 _TRIED, _WEAKEST = 3, 2
 _MORE_REAL = 2  # real modes may exceed 1.5 times the complex ones by this number
 _UNUSUAL = 2.0  # times the median residual: a mode with more near it may be two
-_LINES_PER_MODE = 4
 _FEW = 350  # lines of a window used in trials
 _BAND_LINES = 48  # least lines of a band or window
 _MAX_CHANGES, _ROUNDS = 60, 4  # largest number of changes of a model: with few lines, then with all
 _FEWEST = 12  # a window with no more lines is not fitted
-_DEGREE = 2  # polynomial degree of a window's background
 _CLEAR, _OPPOSED = 6.0, 8.0  # gain needed by a mode beyond the information criterion; more if opposite to the force
 _TWINS = 0.02  # modes nearer than this fraction of half their half-power width are one
-_START_DAMPING = (0.005, 0.02, 0.06)
 _NO_VIBRATION = 0.5
 
 
@@ -71,7 +67,7 @@ def candidates_of(parts: Sequence[Lines]) -> tuple[list[StablePole], list[Pole]]
         highest = max((pole.order for pole in poles), default=0)
         orders = {pole.order for pole in poles if pole.order > highest // 3}
         found += _clusters([pole for pole in kept if pole.order in orders], len(orders))
-        begin *= _STEP
+        begin *= 1.3
     candidates: list[StablePole] = []
     for each in sorted(found, key=lambda each: -each.share):
         if each.share >= _SEEN and not any(_same(each, other) for other in candidates):
@@ -178,7 +174,7 @@ def _without(lines: Lines, modes: Starts, residues: ComplexArray) -> Lines:
     return replace(lines, response=lines.response - np.sum(mode_columns(lines, omega, zeta)[0] * gain, axis=1))
 
 
-def cut(lines: Lines, low: float, high: float, complex_modes: bool, degree: int = _DEGREE) -> Lines:
+def cut(lines: Lines, low: float, high: float, complex_modes: bool, degree: int = 2) -> Lines:
     """The lines between two angular frequencies, with a polynomial and, for real modes, a delay as background."""
     inside = (lines.omega >= low) & (lines.omega <= high)
     place = (lines.omega[inside] - 0.5 * (low + high)) / (0.5 * (high - low))
@@ -207,7 +203,7 @@ def _fit_window(
         wide = tuple(cut(lines, low / _MARGIN, high * _MARGIN, complex_modes) for lines in parts)
         if min(len(lines.s) for lines in wide) <= _FEWEST:
             return []
-        room = min(most, min(len(lines.s) for lines in wide) // _LINES_PER_MODE)
+        room = min(most, min(len(lines.s) for lines in wide) // 4)  # four lines per mode
         best = _best_of(wide, near, spare, room, final)
         if best is None:
             break
@@ -302,7 +298,7 @@ class _Selection:
         whole = [lines.weight * lines.response for lines in parts]
         left: Sequence[ComplexArray] = whole if self.best is None else self.best.left
         highest = float(parts[0].omega[int(np.argmax(np.convolve(np.abs(left[0]), np.ones(3), "same")))])
-        tried = [*spare, *((highest, zeta) for zeta in _START_DAMPING)]
+        tried = [*spare, *((highest, zeta) for zeta in (0.005, 0.02, 0.06))]
         gains = []
         for omega, zeta in tried:
             gain = 0.0
@@ -444,12 +440,8 @@ def uncertainty_of(window: Window) -> Uncertainty:
     counts = [jacobian.shape[1] - 2 * modes for jacobian in fit.jacobian]
     rows = [jacobian.shape[0] for jacobian in fit.jacobian]
     size = sum(counts) + 2 * modes
-    jacobian = np.zeros((sum(rows), size))
-    at, column = 0, 0
-    for part, count in zip(fit.jacobian, counts, strict=True):
-        jacobian[at : at + len(part), column : column + count] = part[:, :count]
-        jacobian[at : at + len(part), sum(counts) :] = part[:, count:]
-        at, column = at + len(part), column + count
+    linear, poles = zip(*((each[:, : -2 * modes], each[:, -2 * modes :]) for each in fit.jacobian), strict=True)
+    jacobian = np.hstack((scipy.linalg.block_diag(*linear), np.vstack(poles)))
     inverse, norms, _ = _inverse(jacobian, 1e-14)
     scaled = jacobian / norms
     spread = np.zeros((size, size))

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 _LARGEST_MODEL = 99
 _OPTIONS = {"period_s": "sample_period", "exponential_window_s": "exponential_window"}  # options with another name
 _MIN_SAMPLES = 3
-_FIRST_STOPS, _STOP_LEFT = 4, 0.1  # least number of stops fitted first; largest residual energy ratio of a used stop
 
 
 def identify(
@@ -224,10 +223,7 @@ def _measured(sources: Sequence[Any], options: ReadOptions) -> tuple[list[Record
 
 
 def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: model_search.Sought) -> Identification:
-    """Find modes in a third of the stops of ordinary runs, 4 or more, then again in all that these modes explain.
-
-    That third has the least slow motion; the stops of all records are sorted together.
-    """
+    """Find modes in the stillest third of the stops of all runs, 4 or more, then in all that these modes explain."""
     forced = [record for record in records if record.force_n is not None]
     if forced:
         raise ArgumentError(f"{forced[0].source}: contains a force: stops are searched in a run without a hammer")
@@ -240,11 +236,11 @@ def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: m
             "required: a run with pauses, such as dwells, or the decay after one stop"
         )
     ready = prepare(stops, band_hz=highest_hz)
-    first = ready.usable[: max(_FIRST_STOPS, len(ready.usable) // 3)]
+    first = ready.usable[: max(4, len(ready.usable) // 3)]
     found = find_modes(replace(ready, usable=first), files, sought)
     if not found.modes:
         return found
-    moving = [use for use in ready.usable if left_by(found.modes, use.record) > _STOP_LEFT]
+    moving = [use for use in ready.usable if left_by(found.modes, use.record) > 0.1]
     if len(moving) == len(ready.usable):
         return found
     why = "the modes of the stillest stops do not explain it: something moved"
@@ -290,9 +286,7 @@ _FEW_MODES, _MORE, _START_DAMPING = 4, 2, 0.02  # largest number of modes for a 
 _SAMPLES_IN_TIME = 20_000  # largest number of samples, of all records, for a fit over time
 _EXPLAINED, _NOISE_SHARE = 0.003, 1.5  # largest residual of few modes, relative to the record's RMS, or to its noise
 _MANY = "many modes, or vibration that is no mode: fitted over frequency, band by band, within the excited band"
-_COLOURED = 4.0  # residuals are coloured if their autocorrelation exceeds this many standard errors
 _SPECTRUM = 4096  # points of the force's transform
-_FOLDED = 2.0 / 3.0
 _FILTER_ERROR = 3e-4  # largest error of a mass by decimation: the filters attenuate by 80 dB
 _FILTER_MOVES = (1e-6, 1e-4)  # ... of a frequency and of a damping ratio
 _FINER = 16  # steps per sampling period of the check by Wilson's method
@@ -426,7 +420,7 @@ def _result(
         return without
     fit = models.fits[order - 1]
     of_white = 0.0 if thinned is None else thinned.noise_correlation
-    coloured = abs(fit.residual_autocorrelation - of_white) * np.sqrt(fit.samples) > _COLOURED
+    coloured = abs(fit.residual_autocorrelation - of_white) * np.sqrt(fit.samples) > 4.0  # standard errors
     if coloured:
         fit = problem.fit(model_search.starts_of(fit), coloured=True)
         warnings.append(
@@ -488,7 +482,7 @@ def _aliased(ready: Prepared, problem: FitProblem) -> Callable[[float], float]:
     highest = float(np.sqrt(np.mean(spectrum[share > HIGHEST_SHARE] ** 2)))
     noise = (ready.usable[0].force_noise_n or 0.0) * np.sqrt(len(pulse))
     # The spectrum of a half sine falls with the square of the frequency: two thirds of its end count as aliased.
-    folded = _FOLDED * np.sqrt(max(highest**2 - 2.0 * noise**2, 0.0))
+    folded = 2.0 / 3.0 * np.sqrt(max(highest**2 - 2.0 * noise**2, 0.0))
 
     def at(frequency_hz: float) -> float:
         here = float(np.interp(frequency_hz * record.period_s, share, spectrum))

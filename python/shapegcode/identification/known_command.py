@@ -19,7 +19,7 @@ from scipy.signal import resample_poly
 
 from shapegcode.errors import RecordError
 from shapegcode.identification.across import with_moves
-from shapegcode.identification.frf_fit import find_frf_modes
+from shapegcode.identification.frf_fit import find_frf_modes, within
 from shapegcode.identification.model_search import Sought
 from shapegcode.identification.result import Estimate, Identification, as_sweep
 from shapegcode.identification.spectra import REST_S, Spectra, moving_parts, transforms
@@ -35,15 +35,11 @@ _COARSE_STEP, _FINE_STEP = 0.001, 5e-4
 _FURTHEST_RATE, _EXACT_RATE = 0.003, 3e-6  # largest change from the rate found below 40 Hz; tolerance
 _LONGEST_WAIT_S, _WAIT_STEP_S = 0.21, 0.015  # largest difference of a part's duration from the simulated one; step
 _WAIT_GRID_S = np.arange(-0.025, 0.025, 2.5e-4)  # around the wait found below 40 Hz
-_REPORTED_WAIT_S, _NEAR_S = 0.005, 0.03
 _CLOCK_KNOWN, _CLOCK_HZ = 3e-4, 150.0  # relative uncertainty of the clock (95 %); highest line used to refine it
 _COARSE_HZ = 40.0  # start and clock are first searched below this frequency
 _AFTER_S, _RINGS_S = 3.0, 2.0  # record used after the last part; record needed after a part, unless the next one begins
 _OVER_HALF = 2.5  # samples per cycle of the highest line
 _LONGEST_LAG_S = 0.02  # largest lag of a part relative to the others
-_IRREGULAR_S = 0.008  # irregularity of the time between a rise and its fall
-_LAST_LAG_S = 0.004  # below half a cycle of the fastest moves
-_LAG_STEP_S = 5e-4
 _UNLIKELY = 0.3  # cost of the longest lag; a perfect correlation gains 1
 _EXPLAINED = 0.5  # least fraction of a part's power explained by the others
 _FEWEST_PARTS = 2
@@ -51,7 +47,6 @@ _LOWEST_HZ, _NARROWEST = 4.0, 8.0  # lowest line; least ratio of the highest lin
 _HELD = 0.002  # fraction of samples at a range end with an equal neighbour
 _LOUD, _QUIET, _LEVELLED_HZ = 0.1, 0.01, 1.0  # energy of a used part over the loudest; whitening: floor, width
 _SAME_START_S, _AWAY_S, _STANDS_OUT = 0.15, 0.5, 2.0
-_GAINS_PER_S = np.geomspace(10.0, 200.0, 14)
 _LOWEST_SHARE = 0.15  # the lowest lines, with this fraction of the power of the command, determine the sign
 _CORRELATED = 0.25  # minimum of the squared correlation of a part, below 40 Hz
 _OWN = 0.1  # least power of a part's own lines, relative to its largest line
@@ -64,14 +59,9 @@ class KnownCommand:
 
     source: str  # of the program
     axis: str  # "x", "y" or "z": the axis that moves
-    times_s: FloatArray  # (n,) instants of the set-points
-    kicks: FloatArray  # (n,) change of speed at each of them, m/s
+    period_s: float  # interpolation period
+    kicks: FloatArray  # (n,) change of speed at each set-point, m/s
     parts: tuple[tuple[float, float], ...]  # begin and end of each part between rests, s
-
-    @property
-    def period_s(self) -> float:
-        """Interpolation period."""
-        return float(self.times_s[1] - self.times_s[0])
 
     @property
     def position(self) -> FloatArray:
@@ -98,8 +88,7 @@ def known_command(program: str | Path | Program, machine: Machine | str | Path) 
     x = positions[:, axis]
     kicks = np.diff(np.diff(x, prepend=x[0], append=x[-1])) * 1e-3 / period_s
     parts = tuple((first * period_s, end * period_s) for first, end in moving_parts(x, period_s))
-    times_s = np.asarray(np.arange(len(x)) * period_s, dtype=np.float64)
-    return KnownCommand(program.source, "xyz"[axis], times_s, kicks, parts)
+    return KnownCommand(program.source, "xyz"[axis], period_s, kicks, parts)
 
 
 def find_modes_of_command(
@@ -114,12 +103,12 @@ def find_modes_of_command(
     options = replace(options, axis=None)
     aligned = [_aligned(command, source, options, sought.band_hz, across=across) for source in sources]
     ends = [[each.response.frequency_hz[end] for each in aligned] for end in (0, -1)]
-    responses = [_between(each.response, max(ends[0]), min(ends[1])) for each in aligned]
+    responses = [within(each.response, max(ends[0]), min(ends[1])) for each in aligned]
     names = tuple(each.source if isinstance(each, Record) else str(each) for each in sources)
     found = find_frf_modes(responses, names, replace(sought, phase_known=False))
     first, lines = aligned[0].record, responses[0].frequency_hz
     if across:
-        others = [_between(one, max(ends[0]), min(ends[1])) for each in aligned for one in each.others]
+        others = [within(one, max(ends[0]), min(ends[1])) for each in aligned for one in each.others]
         found = with_moves(found, others)
     modes = []
     for mode in found.modes:  # the frequency interval includes the uncertainty of the logger's clock
@@ -131,14 +120,6 @@ def find_modes_of_command(
     notes = (*(note for each in aligned for note in each.notes), f"{looked}{rate / _OVER_HALF:.0f} Hz")
     found = replace(found, modes=tuple(modes))
     return as_sweep(found, notes, first.source, len(first.response), first.period_s, command.source)
-
-
-def _between(each: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyResponse:
-    """Lines of a response between two frequencies."""
-    inside = (each.frequency_hz >= low_hz) & (each.frequency_hz <= high_hz)
-    assert each.coherence is not None
-    lines, coherence = each.response[inside], each.coherence[inside]
-    return replace(each, frequency_hz=each.frequency_hz[inside], response=lines, coherence=coherence)
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +194,8 @@ class _Clock:
         thinner = max(1, int(0.4 / period / _COARSE_HZ))
         values = resample_poly(self.values, 1, thinner)
         step = period * thinner
-        smooth, times = _low_passed(command, min(_COARSE_HZ, 0.4 / step))
+        smooth = _low_passed(command, min(_COARSE_HZ, 0.4 / step))
+        times = np.arange(len(smooth)) * command.period_s
         inside = [(times >= begin) & (times < end) for begin, end in self.windows]
         energy = np.array([np.sum(np.abs(smooth[part]) ** 2) for part in inside])
         used = np.flatnonzero(energy > _LOUD * energy.max())
@@ -242,7 +224,7 @@ class _Clock:
                 own = np.maximum(own, _QUIET * float(np.max(own)))
                 share = found / (own * 0.5 * float(np.sum(np.abs(wave) ** 2)))
                 squares[row] = np.roll(share, -round(begin / every))
-            wide = maximum_filter1d(squares, 2 * max(1, round(_NEAR_S / every)) + 1, axis=1, mode="wrap")
+            wide = maximum_filter1d(squares, 2 * max(1, round(0.03 / every)) + 1, axis=1, mode="wrap")
             for wait in waits:
                 total = np.zeros(size, dtype=np.float32)
                 for correlated, part in zip(wide, used, strict=True):
@@ -305,7 +287,7 @@ class _Clock:
                     f"{self.record.source}: {count} lines between {low:g} and {high:g} Hz, {FEWEST_LINES} are needed: "
                     f"there are {len(hertz)} from {hertz[0]:.4g} to {hertz[-1]:.4g} Hz"
                 )
-            response, *beside = (_between(each, low, high) for each in (response, *beside))
+            response, *beside = (within(each, low, high) for each in (response, *beside))
         return _Aligned(self.record, response, tuple(notes), tuple(beside))
 
     def _spectra(
@@ -394,7 +376,7 @@ class _Clock:
             f"the program begins {abs(begins_s):.3f} s {'after' if begins_s >= 0.0 else 'before'} the record does; the "
             f"logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
         ]
-        if abs(waits) > _REPORTED_WAIT_S:
+        if abs(waits) > 0.005:
             notes.append(
                 f"each part of the program with the rest after it takes {1e3 * abs(waits):.0f} ms "
                 f"{'longer' if waits > 0.0 else 'less'} than simulated: the control's ramps or waits are not those of "
@@ -423,7 +405,8 @@ class _Clock:
         hertz, ratio, coherence = spectra.hertz[used], spectra.ratio()[used], coherence[used]
         # Residual delay and position-loop lag, from all lines: the values that align the phases best.
         turn, turns = 2j * np.pi * hertz, np.exp(2j * np.pi * hertz * _LAGS_S[:, None])
-        loops = [np.ones(len(hertz), dtype=np.complex128), *(1.0 + turn / gain for gain in _GAINS_PER_S)]
+        gains_per_s = np.geomspace(10.0, 200.0, 14)
+        loops = [np.ones(len(hertz), dtype=np.complex128), *(1.0 + turn / gain for gain in gains_per_s)]
         sums = [np.abs(turns @ (ratio * loop / np.abs(ratio * loop))) for loop in loops]
         ratio = ratio * loops[int(np.argmax([np.max(each) for each in sums]))]
         unit = ratio / np.abs(ratio)
@@ -467,9 +450,9 @@ def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
     # part would not move.
     between = [lags[pair[1]] - lags[pair[0]] for pair in pairs if len(pair) > 1]
     lags = np.asarray((float(np.median(between)) if between else 0.0) * (rows - np.mean(rows)), dtype=np.float64)
-    lags = moved(lags, each, _IRREGULAR_S)
+    lags = moved(lags, each, 0.008)  # irregularity of the time between a rise and its fall
     lags = moved(lags, pairs if len(pairs) > 1 else [], _LONGEST_LAG_S)
-    lags = moved(lags, each, _LAST_LAG_S)
+    lags = moved(lags, each, 0.004)  # below half a cycle of the fastest moves
     return lags - float(np.mean(lags))
 
 
@@ -485,7 +468,7 @@ def _lag(spectra: Spectra, block: npt.NDArray[np.intp], own: npt.NDArray[np.bool
         unlikely = _UNLIKELY * (lag / _LONGEST_LAG_S) ** 2
         return unlikely - float(np.sum((crossed * np.exp(spectra.turn * lag)).real))
 
-    steps = np.arange(-longest_s, longest_s + 1e-9, _LAG_STEP_S)
+    steps = np.arange(-longest_s, longest_s + 1e-9, 5e-4)
     best = float(steps[int(np.argmin([missed(each) for each in steps]))])
     width = float(steps[1] - steps[0])
     found = minimize_scalar(missed, bounds=(best - width, best + width), method="bounded")
@@ -505,10 +488,10 @@ def _explained(spectra: Spectra) -> FloatArray:
     return np.array(found)
 
 
-def _low_passed(command: KnownCommand, highest_hz: float) -> tuple[ComplexArray, FloatArray]:
-    """Analytic signal of the commanded acceleration below a frequency, and its instants."""
+def _low_passed(command: KnownCommand, highest_hz: float) -> ComplexArray:
+    """Analytic signal of the commanded acceleration below a frequency."""
     size = 2 * len(command.kicks)
     spectrum = np.fft.fft(command.kicks, size) / command.period_s
     hertz = np.fft.fftfreq(size, command.period_s)
     spectrum[(hertz <= 0.0) | (hertz > highest_hz)] = 0.0
-    return 2.0 * np.fft.ifft(spectrum)[: len(command.kicks)], command.times_s
+    return 2.0 * np.fft.ifft(spectrum)[: len(command.kicks)]

@@ -14,17 +14,10 @@ from shapegcode.identification.problem import MIN_CYCLES, Fit, FitProblem, Start
 from shapegcode.identification.result import ChartPole, Estimate, IdentifiedMode
 from shapegcode.io.units import FloatArray
 
-# Least fraction of the energy that a further mode explains: sensors are nonlinear by 0.1 % of amplitude.
-_MIN_SHARE = 1e-6
-_START_DAMPING = (0.01, 0.05)
+_APART = np.pi  # rad: two modes must differ by this phase over the record
 MAX_MODES = 8  # default largest number of modes of a model
 _TWINS = 0.25  # distance of coinciding modes, relative to the half-power half width
 _STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of a stable pole: largest relative change from one order lower
-_APART = np.pi  # rad: two modes must differ by this phase over the record
-_CHART_ORDERS = 20  # of the stabilisation chart
-# Chart poles merged to one start: distance in half-power half widths, and in ln of damping.
-_SAME_FREQUENCY, _SAME_DAMPING = 0.2, 0.2
-_MAX_DAMPING = 0.7  # of a pole used as a start
 _PATIENCE = 2  # Consecutive unsupported models that end the search: one alone may have started badly
 
 
@@ -72,7 +65,7 @@ def search(problem: FitProblem, sought: Sought) -> Search:
         if best is None:
             break
         explained = (fits[-1].sum_of_squares if fits else squares) - best.sum_of_squares
-        if explained < _MIN_SHARE * squares:
+        if explained < 1e-6 * squares:  # sensors are nonlinear by 0.1 % of amplitude
             break
         fits.append(best)
         evidence.append(evidence_of(problem, best))
@@ -94,7 +87,7 @@ def evidence_of(problem: FitProblem, fit: Fit | None) -> float:
 def chart_modes(problem: FitProblem) -> Iterator[Starts]:
     """Yield the modes of each model of a stabilisation chart, in the order of the models: for 1 mode, for 2 ..."""
     orders = (min(map(len, problem.responses)) - 8) // 8  # limited by the samples of the shortest record
-    most = max(1, min(_CHART_ORDERS, orders))
+    most = max(1, min(20, orders))
     for poles in _core.stabilisation_poles(problem.responses, most, problem.forces):
         omega, zeta = _core.poles_to_modes(list(poles), problem.period_s)
         yield list(zip(map(float, omega), map(float, zeta), strict=True))
@@ -119,9 +112,9 @@ def _pool(problem: FitProblem) -> Starts:
     low, high = problem.band_hz
     kept: Starts = []
     for w, z in reversed([mode for modes in chart_modes(problem) for mode in modes]):
-        inside = z < _MAX_DAMPING and low <= w / (2.0 * np.pi) <= high
-        near = [y for v, y in kept if abs(w - v) < _SAME_FREQUENCY * min(z, y) * w]
-        if inside and not any(abs(np.log(z / y)) < _SAME_DAMPING for y in near):
+        inside = z < 0.7 and low <= w / (2.0 * np.pi) <= high
+        near = [y for v, y in kept if abs(w - v) < 0.2 * min(z, y) * w]
+        if inside and not any(abs(np.log(z / y)) < 0.2 for y in near):
             kept.append((w, z))
     return kept
 
@@ -131,7 +124,7 @@ def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None
     so_far = [] if last is None else starts_of(last)
     candidates: list[Starts] = []
     for omega in problem.peaks_left(last):
-        alone = [_attempt(problem, [(omega, zeta)], left_by=last, quick=True) for zeta in _START_DAMPING]
+        alone = [_attempt(problem, [(omega, zeta)], left_by=last, quick=True) for zeta in (0.01, 0.05)]
         usable = [fit for fit in alone if fit is not None]
         if usable:
             candidates.append([*so_far, *starts_of(min(usable, key=lambda fit: fit.sum_of_squares))])
@@ -171,7 +164,6 @@ def _attempt(problem: FitProblem, starts: Starts, **how: Any) -> Fit | None:
 
 ACCEPTED_PERCENT = 5.0  # Widest accepted half interval of damping ratio and stiffness: an error of 10 % is then 4 sigma
 _FREQUENCY_PERCENT, _NOT_AT_ALL_PERCENT = 2.0, 1000.0
-_NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode for a shaper
 _LASTING = 0.8  # Not decayed: still above this ratio at the end (mains hum, a pump, a turning spindle)
 _RIVAL_PROBABILITY = 0.05  # Largest probability that a competing model with one more mode fits as well by chance
 _UNKNOWN = 7.0  # half width of the logarithm of an unknown value: a factor of a thousand
@@ -291,7 +283,7 @@ def checked_modes(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts:
     found = [
         replace(mode, refusal=_refusal_of(mode, doubts))
         for mode in _estimates(fit, alone, others, doubts)
-        if mode.damping_ratio.value <= _NO_VIBRATION and low <= mode.frequency_hz.value <= high
+        if mode.damping_ratio.value <= 0.5 and low <= mode.frequency_hz.value <= high
     ]
     return sorted(found, key=lambda mode: mode.frequency_hz.value)
 

@@ -86,8 +86,6 @@ _LOOK_ABOVE, _LOOK_MIN_HZ = 2.0, 500.0
 _PULSE_SAMPLES = 10  # Samples in the pulse of the hammer: a half sine of ten is known to a percent
 _FALLEN_TO = 0.01  # The record lasts until the slowest mode has decayed to this ratio
 _PERIODS = 20  # ... and at least this many of its periods
-_PRE_TRIGGER_SHARE, _PRE_TRIGGER_SAMPLES = 0.1, 100
-_RATES = (1.0, 2.0, 2.5, 5.0, 10.0)
 _TIPS = (  # Highest frequency that a tip typically excites, Hz
     (300.0, "soft rubber"),
     (1000.0, "hard rubber or soft plastic"),
@@ -100,7 +98,7 @@ _TAPS, _STOPS, _LONG_STOP_S, _WIDTH = 5, 5, 2.0, 80
 
 def _round_up(value: float) -> float:
     power = 10.0 ** math.floor(math.log10(value))
-    return next(step * power for step in _RATES if step * power >= value * (1.0 - 1e-9))
+    return next(step * power for step in (1.0, 2.0, 2.5, 5.0, 10.0) if step * power >= value * (1.0 - 1e-9))
 
 
 def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisRecording:
@@ -113,7 +111,7 @@ def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisReco
     rate = _round_up(_PULSE_SAMPLES / shortest)
     fallen = max(math.log(1.0 / _FALLEN_TO) / (2.0 * math.pi * f * (z or _USUAL_DAMPING)) for f, z in known)
     duration = _round_up(max(fallen, _PERIODS / min(f for f, _ in known)))
-    lead = max(_PRE_TRIGGER_SHARE * duration, _PRE_TRIGGER_SAMPLES / rate)
+    lead = max(0.1 * duration, 100 / rate)
     known_hz = tuple(sorted({frequency for frequency, _ in modes}))
     return AxisRecording(axis, known_hz, highest, rate, duration, lead, pulse, tip)
 

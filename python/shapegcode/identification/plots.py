@@ -17,30 +17,21 @@ from shapegcode.results.outcome import Plot
 
 _MAX_TRACES, _SEEN, _SHOWN_ABOVE = 3, 0.02, 2.5
 _FILE_TIME = "time in the file in s"
-_FAINT = 0.35  # opacity of poles that are not stable
 _MIN_SHOWN = 1e-5  # of the largest value, on a logarithmic axis
 _CLEAR = 3.0  # times the noise: above this the model's envelope is that of the mode
 _BELOW_NOISE = 0.3
-_BEYOND_NOISE = 1.25  # ratio of the time drawn to the decay's duration, to show the noise
-_MAX_ENVELOPES = 4
-_MEASURED, _FITTED = plot.GREY, plot.COLOURS[0]
 
 
 def plots_of(found: Identification) -> dict[str, Plot]:
     """Pictures of an identification, by name."""
     if found.sweep is not None:
-        names = ["sweep"]
+        drawn_by = [plot_sweep]
     elif found.responses:
-        names = ["response", "stabilisation"]
+        drawn_by = [plot_response, plot_stabilisation]
     else:
-        decays = ["decay"] if found.modes else []
-        names = ["traces", "stabilisation", *decays, "spectrum" if found.decay else "response"]
-    drawn_by = {
-        "identify-traces": plot_traces, "identify-response": plot_response, "identify-decay": plot_decay,
-        "identify-stabilisation": plot_stabilisation, "identify-spectrum": plot_spectrum, "identify-sweep": plot_sweep,
-    }  # fmt: skip
-    wanted = [f"identify-{name}" for name in names]
-    return {name: partial(drawn_by[name], found) for name in wanted}
+        decays = [plot_decay] if found.modes else []
+        drawn_by = [plot_traces, plot_stabilisation, *decays, plot_spectrum if found.decay else plot_response]
+    return {each.__name__.replace("plot_", "identify-"): partial(each, found) for each in drawn_by}
 
 
 def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:
@@ -77,8 +68,8 @@ def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:
 
 
 def _draw_both(panel: Axes, x: FloatArray, measured: FloatArray, fitted: FloatArray) -> None:
-    panel.plot(x, measured, color=_MEASURED, linewidth=2.2, label="measured")
-    panel.plot(x[: len(fitted)], fitted, "--", color=_FITTED, linewidth=1.1, label="model")
+    panel.plot(x, measured, color=plot.GREY, linewidth=2.2, label="measured")
+    panel.plot(x[: len(fitted)], fitted, "--", color=plot.COLOURS[0], linewidth=1.1, label="model")
 
 
 def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
@@ -155,7 +146,7 @@ def plot_stabilisation(found: Identification, ax: Axes | None = None) -> Axes:
         ]
         panel.plot(
             [pole.frequency_hz for pole in poles], [pole.order for pole in poles], marker, linestyle="none",
-            markeredgecolor=edge, markerfacecolor=face, label=label, alpha=1.0 if stable == 2 else _FAINT,
+            markeredgecolor=edge, markerfacecolor=face, label=label, alpha=1.0 if stable == 2 else 0.35,
         )  # fmt: skip
     panel.plot([], [], color="#c8c8c8", linewidth=1.0, label="spectrum")
     panel.axhline(found.order, color="black", linewidth=0.8, linestyle="--", label=f"chosen: {found.order}")
@@ -178,7 +169,7 @@ def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
     Returns:
         The upper panel.
     """
-    frequencies = [mode.frequency_hz.value for mode in found.modes][:_MAX_ENVELOPES]
+    frequencies = [mode.frequency_hz.value for mode in found.modes][:4]
     record, model = found.fitted_records[0], _as_fitted(found)[0]
     begin = 0 if record.force_n is None else int(np.argmax(np.abs(record.force_n)))
     record, model = (replace(each, response=each.response[begin:], force_n=None) for each in (record, model))
@@ -201,8 +192,8 @@ def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
         panel.axhline(noise, color="black", linewidth=0.8, linestyle=":", label="noise in the band")
         unit = f"{plot.number(frequency, 4)} Hz, {UNITS[record.quantity]}"
         panel.set(ylim=(_BELOW_NOISE * noise, 2.0 * top), ylabel=unit)
-    for panel in column:
-        panel.set_xlim(time_s[0], time_s[min(round(_BEYOND_NOISE * longest), len(time_s) - 1)])
+    for panel in column:  # to a little after the decay, to show the noise
+        panel.set_xlim(time_s[0], time_s[min(round(1.25 * longest), len(time_s) - 1)])
     column[-1].set_xlabel(_FILE_TIME if found.decay else "time since the impact in s")
     plot.legend_above(column[0])
     return column[0]

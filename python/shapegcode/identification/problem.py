@@ -18,7 +18,6 @@ Fit = _core.ModalFit | _core.DecayFit
 MIN_CYCLES = 2.0  # Least cycles of a mode in the record to find its frequency
 HIGHEST_SHARE = 0.45  # Ratio to the sampling rate up to which the force between samples is known
 _STEPS, _QUICK_STEPS = 60, 15  # iterations of a fit; of one that only locates a mode
-_PEAKS = 2  # tried peaks of the residual's spectrum
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +114,7 @@ class FitProblem:
         frequency = np.fft.rfftfreq(length, self.period_s)
         power[(frequency < self.band_hz[0]) | (frequency > self.band_hz[1])] = 0.0
         inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
-        highest = inner[np.argsort(power[inner])[::-1][:_PEAKS]]
+        highest = inner[np.argsort(power[inner])[::-1][:2]]
         return [float(2.0 * np.pi * frequency[index]) for index in highest]
 
     def other_courses(self, near: Fit) -> list[Self]:
@@ -175,17 +174,13 @@ FLAT = 0.35  # Ratio to the new sampling rate up to which the filter is flat
 _STOP_DB = 80.0  # ... and has fallen to -80 dB at half of it, as the filters of recorders do
 _BAND = 0.34  # Highest end of the band, relative to the new rate
 _FEW = 4096  # Fewer samples than this need no decimation
-_MARGIN = 1.25  # Margin for response peaks above the band that the impact excites
-_MARGIN_OF_PULSES = 2.0
-_GRID = 8  # points of the filter's transform per coefficient
 
 
 def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
     """Highest frequency to keep in taps, Hz: end of the band or, if higher, the highest peak with a margin."""
-    excited = max(each.excited_hz or 0.0 for each in ready.usable)
-    margin = _MARGIN
+    excited, margin = max(each.excited_hz or 0.0 for each in ready.usable), 1.25
     if are_pulses(ready):  # short pulses excite all frequencies up to half the rate
-        excited, margin = 0.0, _MARGIN_OF_PULSES
+        excited, margin = 0.0, 2.0
     peaks = [
         peak.frequency_hz
         for each in ready.usable
@@ -240,6 +235,6 @@ def _filters(factor: int) -> tuple[FloatArray, FloatArray]:
     count, beta = kaiserord(_STOP_DB, (0.5 - FLAT) * 2.0 / factor)
     count |= 1
     plain = firwin(count, (0.5 + FLAT) / factor, window=("kaiser", beta))
-    size = _GRID * count
+    size = 8 * count
     spectrum = np.fft.rfft(plain, size) * np.sinc(np.fft.rfftfreq(size)) ** 2
     return np.asarray(plain, dtype=np.float64), np.asarray(np.fft.irfft(spectrum, size)[:count], dtype=np.float64)

@@ -94,9 +94,6 @@ class IdentifiedMode:
         return Mode(self.frequency_hz.value, self.damping_ratio.value)
 
 
-_SKEWED = 1.2
-
-
 def mode_line(mode: IdentifiedMode) -> str:
     """A mode in one line: each value with half of its 95 % interval, or why the data do not support it."""
     if mode.refusal:
@@ -119,7 +116,7 @@ def estimate_cell(estimate: Estimate | None, factor: float) -> str:
     above, below = high - value, value - low
     if not (math.isfinite(above) and math.isfinite(below) and above > 0.0 and below > 0.0):
         return f"{value:.4g} ({low:.4g} ... {high:.4g})"
-    skewed = max(above, below) > _SKEWED * min(above, below)
+    skewed = max(above, below) > 1.2 * min(above, below)
     half = min(above, below) if skewed else max(above, below)
     decimals = min(max(0, 1 - math.floor(math.log10(half))), 6)
     if skewed:

@@ -20,10 +20,7 @@ from shapegcode.io.units import FloatArray
 
 _PEAK_SHARE, _PEAK_RISES = 0.01, 2.0  # relative to the largest (-40 dB); factor of a peak over its surroundings
 _PEAK_NOISE = 6.0  # Least height in noise levels, estimated by the spectrum's median
-_MAX_PEAKS = 8
-_PADDING = 4  # Zero padding of a decay's spectrum: points per sample
 _BAND_SHARE = 0.25  # Half width of a mode's band relative to its frequency, at most half way to the next
-_BAND_ORDER = 2
 
 
 def frf(records: Sequence[Record]) -> FrequencyResponse:
@@ -77,7 +74,7 @@ def decay_spectrum(record: Record) -> Spectrum:
     response = record.response - np.mean(record.response)
     samples = len(response)
     window = 0.5 * (1.0 + np.cos(np.pi * np.arange(samples) / samples))
-    count = fft.next_fast_len(_PADDING * samples, real=True)
+    count = fft.next_fast_len(4 * samples, real=True)
     amplitude = np.abs(fft.rfft(response * window, count)) * 2.0 / float(np.sum(window))
     frequency = np.asarray(fft.rfftfreq(count, record.period_s), dtype=np.float64)
     peaks = _peaks(frequency, amplitude, 1.0 / (samples * record.period_s))
@@ -100,7 +97,7 @@ def _peaks(frequency: FloatArray, amplitude: FloatArray, resolution_hz: float) -
         height = float(np.exp(top - 0.25 * (left - right) * shift))
         peaks.append(Peak(value, height, f"{value:.{decimals}f} Hz"))
     peaks.sort(key=lambda peak: -peak.amplitude)
-    return tuple(peaks[:_MAX_PEAKS])
+    return tuple(peaks[:8])
 
 
 def mode_envelopes(record: Record, frequencies_hz: Sequence[float]) -> list[FloatArray]:
@@ -114,7 +111,7 @@ def mode_envelopes(record: Record, frequencies_hz: Sequence[float]) -> list[Floa
         above = [each for each in frequencies_hz if each > frequency]
         low = max([(1.0 - _BAND_SHARE) * frequency, *(0.5 * (each + frequency) for each in below)])
         high = min([(1.0 + _BAND_SHARE) * frequency, *(0.5 * (each + frequency) for each in above), 0.99 * half])
-        sections = signal.butter(_BAND_ORDER, (low, high), "bandpass", fs=1.0 / record.period_s, output="sos")
+        sections = signal.butter(2, (low, high), "bandpass", fs=1.0 / record.period_s, output="sos")
         passed = signal.sosfiltfilt(sections, response)
         analytic = signal.hilbert(passed, fft.next_fast_len(2 * len(passed)))[: len(passed)]
         found.append(np.asarray(np.abs(analytic), dtype=np.float64))
@@ -209,17 +206,13 @@ _ENVELOPE_PERIODS = 2.0  # RMS window of the envelope: periods of the slowest mo
 _ENVELOPE_SHARE = 0.05  # ... and at least this fraction of the record while the modes are unknown
 _EVENT_RISES, _EVENT_SHARE = 1.3, 0.3  # An event: the envelope rises by this factor, to this fraction of its maximum
 _TAIL = 0.3  # The tail of a decay, without command, begins after this fraction of it
-_MIN_TAIL = 16  # Least samples of a tail to find a frequency
 _MODE_SHARE = 0.2  # Modes are peaks above this fraction of the tail's largest; slower motion is of the axis
 # A window of one period with this fraction of the largest RMS begins at most half a period early, so the decay
 # has begun this fraction of a period later.
 _ONSET = 0.7
 _SLOWER = 0.8  # Vibration below this fraction of the slowest mode's frequency is motion of the axis
 _MOTION_SHARE = 0.4  # The axis moves if the mean over the slowest mode's period exceeds this fraction of the amplitude
-_FEWEST_PERIODS = 3.0  # of the strongest frequency in the record
-_STOP_PERIODS, _STOP_FALLS = 3.0, 0.3  # periods of the lowest frequency after a stop; ratio to which the envelope falls
 _LOWEST_HZ = 10.0  # lowest mode in an ordinary run; slower is motion
-_MAX_STOPS = 20
 
 
 def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
@@ -227,7 +220,7 @@ def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
     jerk = np.diff(response)
     count = 4 * len(jerk)
     spectrum = np.abs(np.fft.rfft(jerk - np.mean(jerk), count))
-    spectrum[: int(np.ceil(_FEWEST_PERIODS * 4))] = 0.0
+    spectrum[:12] = 0.0  # fewer than three periods in the record
     # Divide by the differences' gain above the lowest quarter of the band, where it would favour noise.
     frequency = np.arange(len(spectrum)) / (count * period_s)
     weight = np.maximum(np.sin(np.pi * frequency * period_s), np.sin(np.pi / 8))
@@ -291,7 +284,7 @@ def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_sample
     """Find the slowest mode of a decay from its tail (after the command), the strongest from all of it."""
     rate = 1.0 / record.period_s
     tail = quiet[start + int(_TAIL * (end - start)) : end]
-    peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= _MIN_TAIL else ()
+    peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= 16 else ()
     modes = sorted(peak.frequency_hz for peak in peaks if peak.amplitude > _MODE_SHARE * peaks[0].amplitude)
     if not modes:
         return _Scales(fast_samples, fast_samples, _ENVELOPE_PERIODS * fast_samples)
@@ -348,7 +341,7 @@ def _stops_of(record: Record, lowest_hz: float | None) -> Iterator[tuple[float, 
     for begin, stop in _until_next(envelope, _events(envelope)):
         rest = _rest_after_motion(quiet, period, float(envelope[begin]), begin, stop)
         whole = max(rest, min(stop, len(envelope) - round(_ENVELOPE_PERIODS * period)) - 1)
-        if stop - rest > _STOP_PERIODS * period and envelope[whole] < _STOP_FALLS * envelope[rest]:
+        if stop - rest > 3.0 * period and envelope[whole] < 0.3 * envelope[rest]:
             parts.append((rest, stop))
     slow = _mean_over(_mean_over(quiet, period), period)
 
@@ -356,7 +349,7 @@ def _stops_of(record: Record, lowest_hz: float | None) -> Iterator[tuple[float, 
         inside = slice(part[0] + round(period), part[1])
         return float(np.sum(slow[inside] ** 2) / np.sum(quiet[inside] ** 2))
 
-    for part in sorted(parts, key=lambda part: -envelope[part[0]])[:_MAX_STOPS]:
+    for part in sorted(parts, key=lambda part: -envelope[part[0]])[:20]:
         yield moved(part), part_of(record, *part, f" stop at {record.start_s + part[0] * record.period_s:.2f} s")
 
 

@@ -21,21 +21,13 @@ from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 _PAUSE_S = 1.0, 2.5  # after each rise, and after each fall, for the vibration to decay
-_BEFORE_S = 2.0  # at rest, before the first
-_BANDS_PER_OCTAVE = 2.0
-_DESIGNED_PER_OCTAVE = 3.0  # planned frequencies per octave, interpolated between
-_FEEDS = 9
 _TRIED = 8, 24  # moves of a trial, and of a longer one
-_LONGEST = 1 << 20
-_ROUNDS = 6
 _OF_STEP = 0.4  # feed over the corner speed difference: a reversal changes the speed by twice the feed; margin 20 %
 _MIN_AT_ONCE = 100.0  # mm/min; below it moves excite too little, and moves with ramps are used
 _SPARE = 1.15  # Margin to the shortest block time, for rounding of moves to increments
-_HALVINGS = 14
 _ENOUGH = 0.98  # of the largest amplitude: a higher feed gains nothing
 _MIN_INCREMENTS = 4  # of the shortest move
 _MIN_MM_S2 = 20.0  # a sensor of 12 bits and ± 2 g resolves 10 mm/s²
-_LOW_HZ, _HIGH_HZ = 8.0, 200.0
 _MIN_CYCLES = 3.0  # least cycles of the lowest frequency in its rise
 _MIN_BAND = 1.5  # upper end over lower end
 
@@ -164,7 +156,7 @@ def write_sweep(
 
 def plan_sweep(
     file: str | Path, machine: Machine | str | Path, axis: Literal["x", "y", "z"], band_hz: tuple[float, float] | None,
-    travel_mm: float, acceleration_share: float, seconds: float, number: int = 7201,
+    travel_mm: float, acceleration_share: float, seconds: float, number: int,
 ) -> tuple[SweepProgram, str]:  # fmt: skip
     """Plan the program of `write_sweep`; returns its result and the text, which is not written."""
     machine = Machine.of(machine)
@@ -179,11 +171,11 @@ def plan_sweep(
         raise ArgumentError(
             f"seconds = {seconds:g}: must be at most {machine.controller.max_program_s:g} (controller.max_program_s)"
         )
-    low, high = band_hz or (_LOW_HZ, _HIGH_HZ)
+    low, high = band_hz or (8.0, 200.0)
     if not 0.0 < low < high < math.inf:
         raise ArgumentError(f"band of {low:g} to {high:g} Hz: must be above 0, finite and ascend")
     planner = _Planner(machine, axis, travel_mm, acceleration_share)
-    for _ in range(_ROUNDS):
+    for _ in range(6):
         strokes, limit = planner.plan(low, high)
         if band_hz is not None and strokes[-1].hertz < 0.999 * high:
             raise ArgumentError(f"{high:g} Hz cannot be reached, {strokes[-1].hertz:.4g} Hz can: {limit}")
@@ -245,7 +237,7 @@ class _Planner:
         top = min(high, most)
         if not top >= _MIN_BAND * low:
             raise ArgumentError(f"band of {low:g} to {high:g} Hz: must ascend by {_MIN_BAND:g} times or more; {limit}")
-        count = 2 + math.ceil(_DESIGNED_PER_OCTAVE * math.log2(top / low))
+        count = 2 + math.ceil(3.0 * math.log2(top / low))  # three per octave, interpolated between
         found: list[_Move] = []
         for hertz in np.geomspace(low, top, count):
             move, amplitude = self._move(float(hertz))
@@ -265,7 +257,7 @@ class _Planner:
     def _move(self, hertz: float) -> tuple[_Move, float]:
         """The move with the wanted amplitude, or with nearly the largest possible one, and its amplitude in mm/s²."""
         top = min(self._feed, 60.0 * self._travel_mm / (0.5 / hertz))
-        tried = [self._tried(hertz, float(feed)) for feed in np.geomspace(top / 100.0, top, _FEEDS)]
+        tried = [self._tried(hertz, float(feed)) for feed in np.geomspace(top / 100.0, top, 9)]
         largest = max(amplitude for _, amplitude in tried)
         goal = min(self.wanted, _ENOUGH * largest)
         place = next(k for k, (_, amplitude) in enumerate(tried) if amplitude >= goal)
@@ -282,7 +274,7 @@ class _Planner:
         """The move that takes half a cycle, and the amplitude of acceleration of moving it back and forth, mm/s²."""
         half_s = 0.5 / hertz
         low, high = 0.0, min(feed / 60.0 * half_s, self._travel_mm)
-        for _ in range(_HALVINGS):
+        for _ in range(14):
             middle = 0.5 * (low + high)
             few, many = (len(self._motion(middle, feed, count)) for count in _TRIED)
             lasts_s = (many - few) * self._model.period_s / (_TRIED[1] - _TRIED[0])
@@ -297,7 +289,7 @@ class _Planner:
         step[self._axis] = length_mm
         ends = [np.zeros(3), step]
         path = _core.Path([_core.Segment.line(ends[k % 2], ends[(k + 1) % 2], feed / 60.0) for k in range(count)])
-        read = self._model.ordinary.stream(path, self._model.options(), 0.0).read(_LONGEST)
+        read = self._model.ordinary.stream(path, self._model.options(), 0.0).read(1 << 20)
         return np.asarray(read.command_mm[:, self._axis], dtype=np.float64)
 
 
@@ -315,7 +307,7 @@ def _bands(strokes: list[_Move], machine: Machine, seconds: float) -> list[list[
     """Moves back and forth of each rise and fall of the frequency, rounded to increments and feed decimals."""
     hertz, length, feed = np.array([astuple(each) for each in strokes]).T
     octaves = math.log2(hertz[-1] / hertz[0])
-    edges = np.geomspace(hertz[0], hertz[-1], 1 + math.ceil(_BANDS_PER_OCTAVE * octaves))
+    edges = np.geomspace(hertz[0], hertz[-1], 1 + math.ceil(2.0 * octaves))  # two bands per octave
     lasts_s = 0.5 * seconds / (len(edges) - 1)
     if lasts_s * hertz[0] < _MIN_CYCLES:
         needed = 2.0 * (len(edges) - 1) * _MIN_CYCLES / hertz[0]
@@ -352,7 +344,7 @@ def _text(bands: list[list[_Move]], machine: Machine, axis: str, number: int) ->
         "(AIR ONLY: NO SPINDLE, NO OTHER AXIS MOVES, ENDS WHERE IT BEGAN)",
         "(START THE LOGGER FIRST, STOP IT LAST. OVERRIDE 100 PERCENT)",
         "(FEED HOLD STOPS IT AT ANY TIME: THE RECORD BEFORE REMAINS USABLE)",
-        "G21 G17 G91 G94 G64", f"G04 P{round(1e3 * _BEFORE_S)}",
+        "G21 G17 G91 G94 G64", "G04 P2000",
     ]  # fmt: skip
     for count, band in enumerate(bands):
         code, feed = f"G01 {axis.upper()}", ""

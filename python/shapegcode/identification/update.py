@@ -186,7 +186,6 @@ def decide_axes(text: str, keep: str, rigid: str, file: str) -> tuple[str, list[
 
 _MEASURED = "half of the 95 % interval"
 _DIGITS = 7
-_SUM_SLACK = 1e-3  # tolerance of the participations' sum, for rounding
 _KEYS = (
     *("frequency_hz", "damping_ratio", "frequency_uncertainty_percent", "damping_uncertainty_percent"),
     *("mass_kg", "mass_uncertainty_percent", "source"),
@@ -246,7 +245,7 @@ class ModeTables:
         added = [self._table(mode, share_of[id(mode)], meaning) for mode in fresh]
         self._insert(stay, added, left)
         total = sum(float(mode.get("participation", 1.0)) for mode in self.expected)
-        if total > 1.0 + _SUM_SLACK:
+        if total > 1.0 + 1e-3:  # of rounded participations
             listed = ", ".join(f"{share:g}" for share in shares)
             self.notes.append(
                 f"warning: the participations of the {self.axis.upper()} axis sum to {total:.4g}: those of all modes "

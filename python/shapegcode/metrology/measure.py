@@ -23,15 +23,10 @@ from shapegcode.model.programs import SimulatedPrograms, shaped_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions
 
-_CHUNK_SAMPLES = 65_536
 _LONGEST_REST_S = 10.0  # longest observation of a vibration after a stop
-_MIN_REST_S = 0.25
-_MILLIONTH = math.log(1e6)
 _MAX_PROFILE_STATIONS = 200_000  # stored per program for pictures
 _MAX_TOOL_MM, _MIN_SPACING_MM, _SHORT_MM = 1000.0, 1e-3, 0.5
 _MAX_SECTIONS = 20_000  # largest number of sections of a program
-_MAX_FACTOR = 2.0**20
-_LAST_LINE = 2**32 - 1
 _BLOCKS_PER_CURVE = 2.5  # blocks of a shaped program are shorter than this many block periods at its feed
 
 
@@ -244,14 +239,14 @@ def _measured(
 def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Yield command and response of a region, including the decay of vibration and servo lag after the stop."""
     model = MachineModel(machine)
-    memory_s = max(model.vibration_memory_s, _MIN_REST_S)
+    memory_s = max(model.vibration_memory_s, 0.25)
     if plant != "modal":
         # The lag decays as exp(-gain t): wait until a millionth remains, as for vibration.
-        memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
+        memory_s = max(memory_s, math.log(1e6) / min(machine.controller.position_gain_per_s.as_tuple()))
     rest_s = min(memory_s, _LONGEST_REST_S)
     options = model.options(plant=plant, offset=model.offset(job.simulated))
     stream = model.simulated(shaped=job.simulated.shaped).stream(job.simulated.path, options, rest_s)
-    while len(chunk := stream.read(_CHUNK_SAMPLES)) > 0:
+    while len(chunk := stream.read(65_536)) > 0:
         yield chunk.command_mm, chunk.response_mm
 
 
@@ -266,14 +261,14 @@ def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequenc
     if lines is None:
         # Increase the least length of a separate section until there are few enough; a region has at least one.
         most = max(_MAX_SECTIONS, len(pairs))
-        while joined < _MAX_FACTOR and sum(len(_core.path_sections(path, joined * mm)) for path, mm in paths) > most:
+        while joined < 2.0**20 and sum(len(_core.path_sections(path, joined * mm)) for path, mm in paths) > most:
             joined *= 2.0
     jobs = []
     for (simulated, region), (path, short_mm) in zip(pairs, paths, strict=True):
         if lines is None:
             sections = _core.path_sections(path, joined * short_mm)
         else:
-            sections = _core.line_sections(path, [(min(a, _LAST_LINE), min(b, _LAST_LINE)) for a, b in lines])
+            sections = _core.line_sections(path, [(min(a, 2**32 - 1), min(b, 2**32 - 1)) for a, b in lines])
         if sections:
             jobs.append(Job(simulated, region, path, sections, joined * short_mm if joined > 1.0 else 0.0))
     if lines is not None and not jobs:

@@ -12,9 +12,6 @@ from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measure
 from shapegcode.results import plot
 from shapegcode.results.outcome import Plot
 
-_SHARE_OF_TOOL = 0.8  # drawn size of the largest deviation, relative to the tool's radius
-_SHARE_OF_PART, _MIN_SHOWN_UM, _MAX_MARKED = 0.03, 1e-3, 12
-
 
 def plots_of(measurement: Measurement) -> dict[str, Plot]:
     """Pictures of the region with the largest deviation of walls; empty unless every program has walls of a region."""
@@ -42,8 +39,8 @@ def plot_part(measurement: Measurement, ax: Axes | None = None, *, region: int |
     everything = np.concatenate([wall.point_mm for wall in _walls(drawn[0][1])])
     extent = float(np.ptp(everything, axis=0).max())
     largest_mm = max(_largest_um(each) for _, each in drawn) * 1e-3
-    wanted_mm = max(_SHARE_OF_TOOL * radius, _SHARE_OF_PART * extent)
-    magnified = plot.round_below(wanted_mm / max(largest_mm, _MIN_SHOWN_UM * 1e-3))
+    wanted_mm = max(0.8 * radius, 0.03 * extent)  # drawn size of the largest deviation
+    magnified = plot.round_below(wanted_mm / max(largest_mm, 1e-6))
     title = (
         f"Walls cut by a tool of {measurement.tool_diameter_mm:g} mm, deviations magnified {magnified:g} times "
         f"(1 mm drawn is {1e3 / magnified:g} µm)"
@@ -92,7 +89,7 @@ def plot_walls(measurement: Measurement, ax: Axes | None = None, *, region: int 
     ylabel = f"width minus {measurement.tool_diameter_mm:g} mm, µm"
     width.set(ylabel=ylabel, xlabel="distance along the programmed path, mm")
     sections = drawn[0][1].sections
-    for section in sections if len(sections) <= _MAX_MARKED else ():
+    for section in sections if len(sections) <= 12 else ():
         for panel in column if section is not sections[0] else ():
             panel.axvline(section.begin_mm, color=plot.GREY, linewidth=0.7, linestyle=":")
         width.annotate(

@@ -208,7 +208,7 @@ class Measurement(Result):
 @dataclass(frozen=True)
 class _Row:
     name: str  # name of the figure
-    values: tuple[str, ...]  # values as text, one per program
+    values: Sequence[str]  # values as text, one per program
     nominal: str = ""  # nominal value; empty: zero
     limit: str = ""  # limit of the machine file; empty: none
     out: tuple[bool, ...] = ()  # for each program: beyond the limit
@@ -330,17 +330,17 @@ def _section_table(
 
 
 def _section_rows(sections: Sections, limit_um: float | None, band_um: float) -> Iterator[_Row]:
-    yield _Row("length mm, time s", _each(sections, lambda s: f"{s.time_s:.3f}"), f"{sections[0].length_mm:.3f}")
+    yield _Row("length mm, time s", [f"{s.time_s:.3f}" for s in sections], f"{sections[0].length_mm:.3f}")
     yield from _contour_rows(sections, limit_um)
     arcs = [section.arc for section in sections if section.arc is not None]
     if arcs:
         yield from _arc_rows(arcs)
     yield from _wall_rows(sections)
     yield from _roughness_rows(sections)
-    yield _Row("peak vibration X / Y / Z µm", _each(sections, lambda s: _axes(s.peak_vibration_um)))
+    yield _Row("peak vibration X / Y / Z µm", [_axes(s.peak_vibration_um) for s in sections])
     if any(section.residual_vibration_um is not None for section in sections):
-        yield _Row("residual at the stop X / Y / Z µm", _each(sections, lambda s: _axes(s.residual_vibration_um)))
-        yield _Row(f"settled to {band_um:g} µm X / Y / Z ms", _each(sections, _settling))
+        yield _Row("residual at the stop X / Y / Z µm", [_axes(s.residual_vibration_um) for s in sections])
+        yield _Row(f"settled to {band_um:g} µm X / Y / Z ms", [_settling(s) for s in sections])
 
 
 def _contour_rows(sections: Sections, limit_um: float | None) -> Iterator[_Row]:
@@ -393,7 +393,7 @@ def _wall_rows(sections: Sections) -> Iterator[_Row]:
     yield _Row("right wall, from / to µm", tuple(_span(each.right) for each in walls), "0")
     bands = tuple(_pair([wall.band for wall in each.both()], 2) for each in walls)
     yield _Row("cut-width band left / right µm", bands, "0")
-    ends = _each(sections, lambda s: _pair((s.width_mm.min, s.width_mm.max), 4))
+    ends = [_pair((s.width_mm.min, s.width_mm.max), 4) for s in sections]
     yield _Row("width min / max mm", ends, f"{sections[0].width_mm.nominal:.3f}")
 
 
@@ -406,10 +406,6 @@ def _roughness_rows(sections: Sections) -> Iterator[_Row]:
         return
     for name, key in (("Ra", "ra_um"), ("Rz", "rz_um"), ("Wa", "wa_um")):
         yield _Row(f"{name} left / right µm", tuple(_pair(_of_walls(key, section), 3) for section in sections))
-
-
-def _each(sections: Sections, text: Callable[[MeasuredSection], str]) -> tuple[str, ...]:
-    return tuple(text(section) for section in sections)
 
 
 def _settling(section: MeasuredSection) -> str:

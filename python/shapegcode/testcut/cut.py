@@ -233,7 +233,7 @@ def read_test_cut(path: str | Path) -> TestCut:
 
 # --- edges: heights are outwards from the wall of the measuring pass --------------------------------------------------
 
-_GRID_MM, _CHORD_MM = 0.004, 1e-4
+_GRID_MM = 0.004
 _MOVED = 9  # increments
 
 
@@ -308,22 +308,9 @@ def on_increments(line: Edge, step_mm: float) -> Edge:
     return Edge(tried[rows, best], step_mm * np.round(heights[rows, best] / step_mm))
 
 
-def reduced(line: Edge, chord_mm: float = _CHORD_MM) -> Edge:
-    """Reduce a line to few points, all its points within a distance of the result (Douglas and Peucker)."""
-    x, y = line.x_mm, line.height_mm
-    keep = np.zeros(len(x), dtype=bool)
-    keep[[0, -1]] = True
-    open_ = [(0, len(x) - 1)]
-    while open_:
-        low, high = open_.pop()
-        if high - low < 2:
-            continue
-        run, rise = x[high] - x[low], y[high] - y[low]
-        inner = slice(low + 1, high)
-        away = np.abs((y[inner] - y[low]) * run - (x[inner] - x[low]) * rise) / np.hypot(run, rise)
-        worst = int(np.argmax(away))
-        if away[worst] > chord_mm:
-            middle = low + 1 + worst
-            keep[middle] = True
-            open_ += [(low, middle), (middle, high)]
-    return Edge(x[keep], y[keep])
+def reduced(line: Edge) -> Edge:
+    """Reduce a line to few points, all its points within 0.1 µm of the result (Douglas and Peucker)."""
+    import shapely
+
+    points = np.column_stack([line.x_mm, line.height_mm])
+    return Edge(*shapely.get_coordinates(shapely.LineString(points).simplify(1e-4, preserve_topology=False)).T)

@@ -30,9 +30,6 @@ from shapegcode.testcut.result import CutDesign
 _Sizes = tuple[float, float, float]  # allowance, rough and finish radius of a corner
 _Block = tuple[float | None, float]  # X up to which a feed applies (None: the end of the pass), feed in mm/min
 
-_MIN_AIR_MM, _AIR_REVS = 5.0, 20.0
-_MAX_DEPTH_RATIO = 0.95  # largest radial depth, relative to the radius
-
 
 @dataclass(frozen=True)
 class CutConditions:
@@ -89,7 +86,7 @@ class CutConditions:
             raise ArgumentError("the tool turns counter-clockwise: test cuts are written for M03 only")
 
     def _check_depths(self, low_mm: float, high_mm: float) -> None:
-        limit = _MAX_DEPTH_RATIO * self.tool.radius_mm
+        limit = 0.95 * self.tool.radius_mm
         if not 0.0 < low_mm <= high_mm <= limit:
             raise ArgumentError(
                 f"radial depths from {low_mm:g} to {high_mm:g} mm: must ascend, above 0, at most {limit:g} mm"
@@ -186,7 +183,7 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     # remains there.
     far = 3.0 * radius
     path = cuts.offset_line(wanted_edge, radius, -far, stock + far)
-    edge = cuts.reduced(cuts.offset_line(path, radius, -radius, stock + radius, inwards=True), 1e-4)
+    edge = cuts.reduced(cuts.offset_line(path, radius, -radius, stock + radius, inwards=True))
     x = np.arange(0.0, stock - radius, _STATION_MM)
     probe = _measuring_pass(given, edge, stock, "probe", [constant])
     met = engagement(given._cut_tool(), probe, x, up=given.up).radial_depth_mm
@@ -269,8 +266,8 @@ def _measuring_pass(
 ) -> MeasuringPass:
     inside = (edge.x_mm > 0.0) & (edge.x_mm < stock_mm)
     x = np.concatenate([[0.0], edge.x_mm[inside], [stock_mm]])
-    # Travel in air at both ends of the pass, from its largest feed.
-    air = max(_MIN_AIR_MM, math.ceil(_AIR_REVS * max(feed for _, feed in blocks) / given.spindle))
+    # Travel in air at both ends of the pass: 20 revolutions at its largest feed, 5 mm or more.
+    air = max(5.0, math.ceil(20.0 * max(feed for _, feed in blocks) / given.spindle))
     air += given.tool.radius_mm
     end = round(stock_mm + air, 3)
     feeds = tuple((end if until is None else until, feed) for until, feed in blocks)
@@ -322,13 +319,11 @@ _RAW_MM = 0.5  # allowed protrusion of the raw edge
 _CLEAR_Z_MM, _NEAR_Z_MM = 10.0, 2.0
 _BLOCKS_OF_EDGE = 3.0  # least duration of a block of the edge, in block times
 _SAMPLES_PER_TOOTH = 12.3  # not a whole number, so that samples do not repeat the same angles
-_TITLES = {"taper": "TAPER TEST CUT", "corner": "CORNER ON A STRAIGHT LINE", "interval": "FEED INTERVAL TEST"}
-_PURPOSES = {
-    "taper": ("CUTTING COEFFICIENTS FROM A GROWING RADIAL DEPTH",),
-    "corner": ("SAME RADIAL DEPTH AS IN A CORNER, FEED CONSTANT,", "THEN MODIFIED"),
-    "interval": ("HOW OFTEN THE CONTROL FOLLOWS A CHANGE OF FEED",),
+_TITLES = {  # and purpose
+    "taper": ("TAPER TEST CUT", "CUTTING COEFFICIENTS FROM A GROWING RADIAL DEPTH"),
+    "corner": ("CORNER ON A STRAIGHT LINE", "SAME RADIAL DEPTH AS IN A CORNER, FEED CONSTANT,", "THEN MODIFIED"),
+    "interval": ("FEED INTERVAL TEST", "HOW OFTEN THE CONTROL FOLLOWS A CHANGE OF FEED"),
 }
-_PER_MINUTE = 60.0
 
 
 def write_test_cut(design: CutDesign, file: str | Path, number: int = 7101) -> CutDesign:
@@ -355,7 +350,8 @@ def write_test_cut(design: CutDesign, file: str | Path, number: int = 7101) -> C
 
 def _program_text(design: CutDesign, number: int) -> str:
     writer = _Writer(design)
-    lines = ["%", f"O{number:04d}({_TITLES[design.cut.kind]})", *(f"({line})" for line in writer.head())]
+    title, *purpose = _TITLES[design.cut.kind]
+    lines = ["%", f"O{number:04d}({title})", *(f"({line})" for line in (*purpose, *writer.head()))]
     lines += ["G21 G17 G90 G94 G64 G40 G49 G80", "G54"]
     lines += [f"S{design.cut.spindle_rev_per_min:g} M03", "G04 P3000", f"G00 Z{decimal(_CLEAR_Z_MM, 3)}"]
     for k in range(len(design.cut.passes)):
@@ -376,9 +372,8 @@ class _Writer:
         """Instructions, in lines that any control can show."""
         cut = self.cut
         ends = self.side * (-_RAW_MM - 3.0 * self.radius), self.side * self.walls[-1]
-        rate = math.ceil(_SAMPLES_PER_TOOTH * cut.tool.flutes * cut.spindle_rev_per_min / _PER_MINUTE / 10.0) * 10
+        rate = math.ceil(_SAMPLES_PER_TOOTH * cut.tool.flutes * cut.spindle_rev_per_min / 60.0 / 10.0) * 10
         text = (resources.files("shapegcode") / "data" / "testcut_head.txt").read_text(encoding="ascii")
-        yield from _PURPOSES[cut.kind]
         yield from text.format(
             cut=cut, machine=plain_name(cut.machine), stock_mm=self.design.stock_mm, rate=rate, clear_z_mm=_CLEAR_Z_MM,
             edge="REAR EDGE" if self.side < 0.0 else "FRONT EDGE", near=min(ends), far=max(ends),
@@ -419,7 +414,7 @@ class _Writer:
         y = wall - path.height_mm - offset
         shortest = float(np.min(np.hypot(np.diff(path.x_mm), np.diff(y))))
         block_s = max(self.controller.block_time_s, self.controller.interpolation_period_s)
-        feed = max(min(feed, shortest / (_BLOCKS_OF_EDGE * block_s) * _PER_MINUTE), 1.0)
+        feed = max(min(feed, shortest / (_BLOCKS_OF_EDGE * block_s) * 60.0), 1.0)
         yield from self._begin(float(path.x_mm[0]), self.side * float(y[0]), feed)
         first = f" F{decimal(math.floor(feed * 10.0) / 10.0, 1)}"
         for px, py in zip(path.x_mm[1:], y[1:], strict=True):
@@ -429,9 +424,8 @@ class _Writer:
 
     def _offsets(self, before: float, wall: float) -> list[float]:
         """Distance of each cut from the edge: equal small depths, and a thin last cut that hardly bends the tool."""
-        more = (
-            float(np.max(wall - self.design.edge.at(np.linspace(0.0, self.design.stock_mm, 200)) - before)) - _SKIM_MM
-        )
+        height = self.design.edge.at(np.linspace(0.0, self.design.stock_mm, 200))
+        more = float(np.max(wall - height - before)) - _SKIM_MM
         if more <= 0.0:
             return [0.0]
         rough = math.ceil(more / (_ROUGH_SHARE * self.cut.tool.diameter_mm))

@@ -70,16 +70,14 @@ def fit_test_cut(
     return _fit_corner(known, measured) if known.kind == "corner" else _fit_interval(known, measured)
 
 
-_BINS_PER_PASS, _MIN_TURNS, _ROUNDS = 60, 4, 2
 _ONE_FILE = np.zeros(0, dtype=np.intp)  # placeholder: groups are numbered when files are joined
 _PLACE = 0.25  # standard error of the tool's position found from entry and exit, in feeds per revolution
-_PER_MINUTE = 60.0
 
 
 def _fit_taper(cut: TestCut, measured: Mapping[int, ForceRecord], *, thickness: Thickness, edge: bool) -> TaperResult:
     law = cut.tool.cutting
     sampled = any(_samples(cut, number, record) >= MIN_SAMPLES for number, record in measured.items())
-    for _ in range(_ROUNDS if sampled else 1):
+    for _ in range(2 if sampled else 1):
         # The positions of entry and exit depend slightly on the law.
         rows, passes, left_out, warnings = _reduced(cut, measured, law)
         data = _joined(rows)
@@ -112,7 +110,7 @@ def _samples(cut: TestCut, number: int, record: ForceRecord) -> float:
     """Samples of a record per revolution; 0 if its rows are means at known radial depths."""
     if record.radial_depth_mm is not None:
         return 0.0
-    turn = _PER_MINUTE / cut.spindle_rev_per_min
+    turn = 60.0 / cut.spindle_rev_per_min
     if record.time_s is not None:
         return float(turn / np.mean(np.diff(record.time_s)))
     assert record.position_mm is not None
@@ -180,9 +178,9 @@ def _of_revolutions(cut: TestCut, measuring: MeasuringPass, found: Revolutions) 
     """Mean forces over groups of revolutions without chatter."""
     margin = 2.0 * found.feed_mm_per_min / found.record.spindle_rev_per_min
     kept = np.flatnonzero(fully_engaged(cut, measuring, found.x_mm, margin) & ~found.chatter)
-    if kept.size < _MIN_TURNS:
+    if kept.size < 4:
         raise ArgumentError(f"{found.record.file}: {kept.size} revolutions in full engagement: too few")
-    many = max(1, kept.size // _BINS_PER_PASS)
+    many = max(1, kept.size // 60)
     # A bin contains consecutive revolutions only: none spans an ignored part.
     runs = np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1)
     bins = np.vstack([run[: len(run) // many * many].reshape(-1, many) for run in runs])
@@ -211,8 +209,6 @@ def _joined(rows: Sequence[MeanForces]) -> MeanForces:
 
 
 # --- corner: measured against expected resultant (paper 001, figure 7) ------------------------------------------------
-
-_MARGIN_REVS = 4.0
 
 
 def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResult:
@@ -246,15 +242,13 @@ def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResu
 
 def _inside(cut: TestCut, number: int, x_mm: FloatArray) -> npt.NDArray[np.bool_]:
     measuring = cut.passes[number - 1]
-    margin = _MARGIN_REVS * measuring.feed_mm_per_min / cut.spindle_rev_per_min
+    margin = 4.0 * measuring.feed_mm_per_min / cut.spindle_rev_per_min
     return fully_engaged(cut, measuring, x_mm, margin)
 
 
 # --- interval test: from which interval on the controller follows the commanded feeds ---------------------------------
 
-_DEVIATION_LIMIT, _NOISE_SHARE = 0.05, 2.0
 _LAGS_S = np.concatenate([[0.0], np.geomspace(2e-3, 0.5, 49)])
-_FEEDS = 40
 
 
 def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> IntervalResult:
@@ -268,7 +262,7 @@ def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> Interval
         program=cut.program,
         machine=cut.machine,
         interval_mm=good[-1] if good else None,
-        lag_interval_mm=lag * math.log(10.0) * fastest / _PER_MINUTE,
+        lag_interval_mm=lag * math.log(10.0) * fastest / 60.0,
         passes=tuple(found),
         warnings=tuple(note for each in found for note in records[each.number].notes),
     )
@@ -306,7 +300,7 @@ def _followed(cut: TestCut, number: int, record: PlacedRecord) -> result.Followe
     off = np.abs(seen - wanted) / wanted
     noise = _noise(record.x_mm[straight], force[straight], 0.5 * interval)
     worst = int(np.argmax(off))
-    ok = bool(off[worst] <= _DEVIATION_LIMIT + _NOISE_SHARE * noise)
+    ok = bool(off[worst] <= 0.05 + 2.0 * noise)
     told = number, interval, float(off[worst]), float(ends[worst]), noise, lag, ok
     return result.FollowedPass(*told, time, size, immediate, course(lag))
 
@@ -314,7 +308,7 @@ def _followed(cut: TestCut, number: int, record: PlacedRecord) -> result.Followe
 def _levels(cut: TestCut, measuring: MeasuringPass, radial_depth_mm: float) -> tuple[FloatArray, FloatArray]:
     """Feeds below, between and above those of a pass, and the mean force at each."""
     commanded = [feed for _, feed in measuring.feeds]
-    low, high = np.linspace(0.2, 0.98, _FEEDS) * min(commanded), np.linspace(0.5, 1.1, _FEEDS) * max(commanded)
+    low, high = np.linspace(0.2, 0.98, 40) * min(commanded), np.linspace(0.5, 1.1, 40) * max(commanded)
     feeds = np.sort(np.concatenate([low, high]))
     law = ForceLaw(cut.tool, cut.tool.cutting, cut.spindle_rev_per_min, cut.axial_depth_mm)
     met = forces.straight_engagement(cut.tool, np.full(len(feeds), radial_depth_mm), up=cut.up)
@@ -327,12 +321,12 @@ def _speeds(measuring: MeasuringPass, time_s: FloatArray, lag: float) -> FloatAr
     commands: list[float] = []
     length = np.diff([end for end, _ in measuring.feeds])
     for travel, (_, feed) in zip(length, measuring.feeds[1:], strict=True):
-        speed, command = starts[-1] / _PER_MINUTE, feed / _PER_MINUTE
+        speed, command = starts[-1] / 60.0, feed / 60.0
         commands.append(feed)
         duration = _block_time(float(travel), speed, command, lag)
         begins.append(begins[-1] + duration)
         left = math.exp(-duration / lag) if lag > 0.0 else 0.0
-        starts.append((command + (speed - command) * left) * _PER_MINUTE)
+        starts.append((command + (speed - command) * left) * 60.0)
     block = np.clip(np.searchsorted(begins, time_s, side="right") - 1, 0, len(commands) - 1)
     into = time_s - np.array(begins)[block]
     wanted, speed_then = np.array(commands)[block], np.array(starts)[block]
@@ -352,9 +346,9 @@ def _block_time(travel: float, speed: float, command: float, lag: float) -> floa
 def _speeds_at(measuring: MeasuringPass, x_mm: FloatArray, lag: float) -> FloatArray:
     """Feed with a first-order lag at the recorded X of each sample, mm/min."""
     first, last = measuring.feeds[0][0], measuring.feeds[-1][0]
-    fine = np.linspace(0.0, 1.5 * (last - first) / min(feed for _, feed in measuring.feeds) * _PER_MINUTE, 20000)
+    fine = np.linspace(0.0, 1.5 * (last - first) / min(feed for _, feed in measuring.feeds) * 60.0, 20000)
     speed = _speeds(measuring, fine, lag)
-    travel = first + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))]) / _PER_MINUTE
+    travel = first + np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))]) / 60.0
     return np.where(x_mm < first, measuring.feeds[0][1], np.interp(x_mm, travel, speed))
 
 

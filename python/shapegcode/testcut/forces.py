@@ -90,9 +90,6 @@ def fully_engaged(
     return np.asarray((x_mm >= low) & (x_mm + reach <= high) & (met.to_rad > met.from_rad))
 
 
-_STEP_MM = 0.1
-
-
 @dataclass(frozen=True)
 class CutForces:
     """Forces on the tool over one revolution, at each of n engagements."""
@@ -144,7 +141,7 @@ class Expected:
 
 def expected(cut: TestCut, measuring: MeasuringPass, law: CuttingLaw | None = None) -> Expected:
     """Forces along a pass at its commanded feeds."""
-    count = math.ceil((measuring.end_mm - measuring.start_mm) / _STEP_MM) + 1
+    count = math.ceil((measuring.end_mm - measuring.start_mm) / 0.1) + 1
     x = np.linspace(measuring.start_mm, measuring.end_mm, count)
     met = engagement(cut.tool, measuring, x, up=cut.up)
     along = ForceLaw(cut.tool, law or cut.tool.cutting, cut.spindle_rev_per_min, cut.axial_depth_mm)
@@ -213,7 +210,6 @@ class ForceModel:
 
 MIN_CHIP_RATIO = 1.5  # thickest over thinnest mean chip; below it exponents and factors are not distinguishable
 MIN_FEED_RATIO = 1.3  # largest over smallest feed; below it edge forces are not distinguishable
-_ROUNDS, _MAX_STEPS, _SETTLED = 6, 40, 1e-4
 _HUBER, _OUTLIER, _MIN_OUTLIER, _LARGEST_SHARE_OUT = 2.5, 4.0, 0.02, 0.25
 # For ln k1, its exponent, ln k2, the exponent of k1 k2, and the edge forces.
 _LOWEST, _HIGHEST = np.array([-50.0, -0.9, -50.0, -0.95, 0.0, 0.0]), np.array([50.0, 5.0, 50.0, 5.0, 1e6, 1e6])
@@ -267,13 +263,13 @@ def fit_coefficients(
     model = ForceModel(tool, axial_depth_mm, data, thickness, middle)
     parameters = _start(model, data, count)
     noise, robust = np.ones(model.measured.shape), np.ones(model.measured.shape)
-    for _ in range(_ROUNDS):
+    for _ in range(6):
         before = parameters
         parameters, left, _ = _solved(model, parameters, robust / noise**2)
         noise = noise_of(left, model.forces(model.law(parameters)), data.revolutions, robust)
         scaled = np.abs(left) / noise
         robust = np.minimum(1.0, _HUBER / np.maximum(scaled, 1e-12))
-        if np.all(np.abs(parameters - before) < _SETTLED * np.maximum(np.abs(parameters), 1.0)):
+        if np.all(np.abs(parameters - before) < 1e-4 * np.maximum(np.abs(parameters), 1.0)):
             break
     outlier = _outliers(model.measured, left, noise)
     weights = np.where(outlier[:, None], 0.0, 1.0 / noise**2)
@@ -357,7 +353,7 @@ def _solved(model: ForceModel, start: FloatArray, weights: FloatArray) -> tuple[
         return np.asarray((root * left_by(to_law @ limited)).ravel())
 
     bounds = _LOWEST[: len(start)], _HIGHEST[: len(start)]
-    found = least_squares(misfit, to_limited @ start, bounds=bounds, x_scale="jac", max_nfev=_MAX_STEPS)
+    found = least_squares(misfit, to_limited @ start, bounds=bounds, x_scale="jac", max_nfev=40)
     parameters = to_law @ found.x
     return parameters, left_by(parameters), np.asarray(found.jac @ to_limited)
 

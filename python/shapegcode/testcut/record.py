@@ -27,7 +27,6 @@ _NAMES: tuple[tuple[str, Measured, str], ...] = (
     ("fy", "force", r"f_?y|force[ _]?y|y[ _]?force"),
     ("torque", "torque", r"torque|m_?z|moment"),
 )
-_MIN_ROWS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +82,7 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
     path = Path(path)
     table = TextTable(path)
     columns = _columns(table)
-    numbers = table.numbers([index for index, _ in columns.values()], _MIN_ROWS)
+    numbers = table.numbers([index for index, _ in columns.values()], 4)
     values = {name: numbers[:, k] * factor for k, (name, (_, factor)) in enumerate(columns.items())}
     sign = -1.0 if on == "workpiece" else 1.0
     time = values.get("time")
@@ -103,13 +102,9 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
 
 # --- the position of each sample --------------------------------------------------------------------------------------
 
-_PER_MINUTE = 60.0
 MIN_SAMPLES = 6.0  # least samples per revolution of a record; a table of means has at most one row
 _MIN_AIR_REVS, _GUARD_REVS = 5, 2
-_FEW_PER_TOOTH, _IN_STEP = 16.0, 0.01
-_REPORTED_SPEED, _REPORTED_FEED = 0.002, 0.005
 _ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04  # least force in a cut, relative to the noise in air, and to the largest force
-_SPEED_RANGE, _MIN_FOR_SPEED = 0.05, 20.0
 _CLEAR_LINE = 8.0  # height of a clear line, relative to the median of the spectrum around it
 _MAX_SHIFT_MM, _SHIFT_STEPS = 1.0, 81
 #: Allowed relative difference of the cut's length: at constant feed (another override), and otherwise.
@@ -139,7 +134,7 @@ def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, f
     """Remove offset and drift of a sampled record of one pass, and find the position of each sample."""
     time, moved = _times_and_travel(record, measuring, cut.kind)
     period = float(time[-1] - time[0]) / (len(time) - 1)
-    turn = _PER_MINUTE / cut.spindle_rev_per_min
+    turn = 60.0 / cut.spindle_rev_per_min
     if turn / period < MIN_SAMPLES:
         raise ArgumentError(
             f"{record.file}: {turn / period:.1f} samples per revolution: must be {MIN_SAMPLES:g} or more, better "
@@ -148,11 +143,11 @@ def place_samples(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, f
     begin, end = _contact(record, turn / period)
     speed, sure = _spindle_speed(record.force_n[begin:end], period, cut.spindle_rev_per_min, cut.tool.flutes)
     notes = []
-    if sure and abs(speed / cut.spindle_rev_per_min - 1.0) > _REPORTED_SPEED:
+    if sure and abs(speed / cut.spindle_rev_per_min - 1.0) > 0.002:
         notes.append(f"the spindle turned at {speed:.1f} rev/min instead of the commanded {cut.spindle_rev_per_min:g}")
-    samples = _PER_MINUTE / speed / period
+    samples = 60.0 / speed / period
     per_tooth = samples / cut.tool.flutes
-    if per_tooth < _FEW_PER_TOOTH and abs(per_tooth - round(per_tooth)) < _IN_STEP:
+    if per_tooth < 16.0 and abs(per_tooth - round(per_tooth)) < 0.01:
         notes.append(
             f"{per_tooth:.1f} samples per tooth repeat the same angles: means may be wrong by some "
             "percent; record with more samples, or with a rate that is not a multiple of the tooth passing frequency"
@@ -174,21 +169,21 @@ def _times_and_travel(record: ForceRecord, measuring: MeasuringPass, kind: str) 
         x = record.position_mm
         if record.time_s is not None:
             return record.time_s, x - x[0]
-        pace = _PER_MINUTE / measuring.commanded_feed(0.5 * (x[1:] + x[:-1]))
+        pace = 60.0 / measuring.commanded_feed(0.5 * (x[1:] + x[:-1]))
         return np.concatenate([[0.0], np.cumsum(np.diff(x) * pace)]), x - x[0]
     if record.time_s is None:
         raise ArgumentError(
             f"{record.file}: a table of means: a {kind} needs sampled records with time_s or position_mm"
         )
     time = record.time_s
-    return time, (time - time[0]) * measuring.feed_mm_per_min / _PER_MINUTE
+    return time, (time - time[0]) * measuring.feed_mm_per_min / 60.0
 
 
 def _spindle_speed(force_n: FloatArray, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
     """Speed by the clearest spectral line of spindle, teeth or harmonics, and True; else the commanded one, False."""
     count = len(force_n)
-    turns = count * period_s * commanded / _PER_MINUTE
-    if turns < _MIN_FOR_SPEED:
+    turns = count * period_s * commanded / 60.0
+    if turns < 20.0:
         return commanded, False
     padded = 1 << int(np.ceil(np.log2(4 * count)))
     window = np.hanning(count)[:, None]
@@ -196,8 +191,8 @@ def _spindle_speed(force_n: FloatArray, period_s: float, commanded: float, flute
     step = 1.0 / (padded * period_s)
     best: tuple[float, float] | None = None
     for order in (flutes, 1, 2 * flutes, 2):
-        centre = order * commanded / _PER_MINUTE
-        low, high = (round(centre * side / step) for side in (1.0 - _SPEED_RANGE, 1.0 + _SPEED_RANGE))
+        centre = order * commanded / 60.0
+        low, high = (round(centre * side / step) for side in (0.95, 1.05))
         if high + 1 >= len(power) or high - low < 8:
             continue
         part = power[low : high + 1]
@@ -205,7 +200,7 @@ def _spindle_speed(force_n: FloatArray, period_s: float, commanded: float, flute
         height = float(part[peak] / max(float(np.median(part)), 1e-300))
         if 0 < peak < len(part) - 1 and height > _CLEAR_LINE**2 and (best is None or height > best[0]):
             fine = _vertex(-np.log(np.maximum(part[peak - 1 : peak + 2], 1e-300)))
-            best = height, (low + peak + fine) * step * _PER_MINUTE / order
+            best = height, (low + peak + fine) * step * 60.0 / order
     return (commanded, False) if best is None else (float(best[1]), True)
 
 
@@ -267,7 +262,7 @@ def _positions(
     if record.position_mm is None and not measuring.constant_feed:
         # The travel over time is that of the blocks; only its start is searched.
         ends_mm = np.array([measuring.start_mm, *(end for end, _ in measuring.feeds)])
-        pace = _PER_MINUTE / np.array([feed for _, feed in measuring.feeds])
+        pace = 60.0 / np.array([feed for _, feed in measuring.feeds])
         at = np.concatenate([[0.0], np.cumsum(np.diff(ends_mm) * pace)])
         moved = np.interp(time - time[first] + np.interp(wanted[0], ends_mm, at), at, ends_mm)
     length, wanted_length = moved[contact[1]] - moved[first], wanted[1] - wanted[0]
@@ -284,8 +279,8 @@ def _positions(
     # Both ends: offset and rate.
     share = (x - wanted[0]) / wanted_length
     x = x + ends[0] * (1.0 - share) + ends[1] * share
-    rate = float(np.polyfit(time, x, 1)[0]) * _PER_MINUTE
-    if abs(rate / measuring.feed_mm_per_min - 1.0) > _REPORTED_FEED:
+    rate = float(np.polyfit(time, x, 1)[0]) * 60.0
+    if abs(rate / measuring.feed_mm_per_min - 1.0) > 0.005:
         notes.append(f"the feed was {rate:.1f} mm/min instead of the commanded {measuring.feed_mm_per_min:g}")
     return np.asarray(x)
 
@@ -316,9 +311,7 @@ def _vertex(three: FloatArray) -> float:
 
 # --- means over whole revolutions -------------------------------------------------------------------------------------
 
-_MIN_REVOLUTIONS = 20
 _CHATTER, _MIN_CHATTER = 8.0, 0.02  # limit of chatter in standard deviations; least deviation, relative to the median
-_CHATTER_ROUNDS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -355,20 +348,20 @@ def revolutions(record: PlacedRecord) -> Revolutions:
     chatter[full] = _chatters(middle[full], uneven[full], means[full, 2])
     feed = measuring.feed_mm_per_min
     if measuring.constant_feed:
-        feed = float(np.polyfit(record.time_s[inside], x[inside], 1)[0]) * _PER_MINUTE
+        feed = float(np.polyfit(record.time_s[inside], x[inside], 1)[0]) * 60.0
     torque = np.abs(means[:, 5]) if record.torque_nm is not None else None
     return Revolutions(record, middle, means[:, :2], torque, means[:, 2], peaks, chatter, feed)
 
 
 def _chatters(x: FloatArray, uneven: FloatArray, resultant: FloatArray) -> npt.NDArray[np.bool_]:
     """Mask where the force oscillates more within a revolution, relative to its mean, than in the rest of the pass."""
-    if len(uneven) < _MIN_REVOLUTIONS:
+    if len(uneven) < 20:
         return np.zeros(len(uneven), dtype=bool)
     share = uneven / np.maximum(resultant, 1e-300)
     place = (x - x.mean()) / max(float(np.ptp(x)), 1e-300)
     floor = _MIN_CHATTER * float(np.median(share))
     weight = np.ones(len(share))
-    for _ in range(_CHATTER_ROUNDS):
+    for _ in range(12):
         # Least absolute deviations, so that outliers do not bend the curve.
         off = share - np.polyval(np.polyfit(place, share, 2, w=np.sqrt(weight)), place)
         weight = 1.0 / np.maximum(np.abs(off), floor)

@@ -24,7 +24,6 @@ from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 
 Masks = Sequence[npt.NDArray[np.bool_]]  # of each section: used samples
-SETTLE_S = 0.1
 GAINS = (2.0, 1000.0)  # 1/s
 _LONGEST_DEAD_S = 0.05
 _SIGN_RATIO = 5e-4  # of the top speed: width of the sign change of friction
@@ -208,7 +207,6 @@ _STIFFNESS_N_PER_M, _DAMPING_N_S_PER_M = 4e6, 400.0  # for 1 kg: 640 Hz, far abo
 _LOW = (0.0, math.log(2.0), 0.0, math.log(5.0), math.log(1e-3), math.log(1e-7))
 _HIGH = (30.0, math.log(500.0), 1.0, math.log(400.0), math.log(1.0), math.log(1e3))
 _SCALE = (1.0, 0.3, 0.02, 0.5, 0.5, 1.0)
-_STARTS = ((150.0, 0.02), (40.0, 0.005))  # bandwidth, integral time
 
 
 def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, tell: Callable[[], None]) -> DriveFit:
@@ -226,7 +224,7 @@ def fit_drive(trace: ServoTrace, use: Masks, period_s: float, start: LoopFit, te
 
     gain, rest = min(max(start.gain_per_s, 15.0), 80.0), min(max(start.rest, 0.005), 0.5)
     tried = []
-    for bandwidth, integral in _STARTS:
+    for bandwidth, integral in ((150.0, 0.02), (40.0, 0.005)):
         friction = max(0.02 * acceleration * _MM, 1e-6)
         logarithms = [math.log(each) for each in (bandwidth, integral, friction)]
         begin = (max(1e3 * start.lag_s - 1.0, 0.1), math.log(gain), rest, *logarithms)
@@ -312,12 +310,7 @@ def torque_friction(
     return (range_of_three(name, [value for value, _ in fits], unit),)
 
 
-_STILL_TRAVEL = 1e-3  # mm or degrees
-_STEADY_CHANGE = 0.02  # least change of speed, relative to the top speed
-_LAG_SPREAD = 0.03
-_SLOPE = (0.5, 2.0)
 _MAX_SAMPLES = 40_000
-_MIN_SPEED = 0.02  # least speed, relative to the top speed, to find a lag at constant speed
 _KEYS = {"controller.position_gain_per_s": "position gain", "controller.feed_forward_ratio": "feed-forward"}
 
 
@@ -383,12 +376,12 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
     top = max(float(np.abs(each).max()) for each in speeds)
     own = None if trace.deviation is None else rms(np.concatenate(trace.deviation))
     base = ServoAxis(trace.name, trace.unit, travel, top, rms(lag), own, (), (), "")
-    if travel < _STILL_TRAVEL:
+    if travel < 1e-3:  # mm or degrees
         return replace(base, note="did not move")
     if alike := _unlike(trace):
         return replace(base, note=alike)
     change = sum(float(np.abs(np.diff(each)).sum()) for each in speeds)
-    if change < _STEADY_CHANGE * top:
+    if change < 0.02 * top:
         mean = float(np.mean(lag)) / float(np.mean(np.concatenate(speeds)))
         steady = ServoEstimate("lag at constant speed", mean, None, None, "s", "one speed: nothing else can be found")
         return replace(base, parameters=(steady,), note="never changes its speed")
@@ -398,7 +391,7 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
     changes = [np.abs(np.diff(each, prepend=each[:1])) for each in speeds]
     done = np.cumsum(np.concatenate(changes))
     early = tuple(np.split(done < done[-1] / 2.0, np.cumsum([len(each) for each in speeds])[:-1]))
-    settle = round(SETTLE_S / period_s)  # the motion before a section is unknown
+    settle = round(0.1 / period_s)  # the motion before a section is unknown
     use = tuple(np.arange(len(each)) >= settle for each in speeds)
     uses = (use, *(tuple(c & (e == which) for e, c in zip(early, use, strict=True)) for which in (True, False)))
     compared = _compare_models(trace, early, uses, period_s, with_drive, tell)
@@ -422,7 +415,7 @@ def _unlike(trace: ServoTrace) -> str:
     motion = [r - r.mean() for r in trace.command]
     power = sum(float(r @ r) for r in motion)
     slope = sum(float(r @ (x - x.mean())) for r, x in zip(motion, trace.actual, strict=True)) / power
-    if _SLOPE[0] <= slope <= _SLOPE[1]:
+    if 0.5 <= slope <= 2.0:
         return ""
     return f"the actual position moves {slope:.3g} times as far as the command: not the same unit, sign or axis"
 
@@ -435,10 +428,10 @@ def _two_lags(trace: ServoTrace, speeds: Sequence[FloatArray], top: float) -> st
         for start in range(0, len(lag) - 2 * count, count):
             part = speed[start : start + 2 * count]
             mean = float(np.mean(part))
-            if abs(mean) > _MIN_SPEED * top and float(np.ptp(part)) < 1e-3 * abs(mean):
+            if abs(mean) > 0.02 * top and float(np.ptp(part)) < 1e-3 * abs(mean):
                 late = lag[start + count : start + 2 * count]
                 found.append((float(np.mean(late)) / mean, mean, float(time[start])))
-    if not found or max(found)[0] - min(found)[0] <= _LAG_SPREAD * abs(max(found)[0]):
+    if not found or max(found)[0] - min(found)[0] <= 0.03 * abs(max(found)[0]):
         return ""
     least, most = (
         f"{1e3 * lag:.3f} ms at {speed:.5g} {trace.unit}/s ({time_s:.2f} s)"

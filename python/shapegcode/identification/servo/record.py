@@ -16,7 +16,6 @@ from shapegcode.io.edge_json import is_edge_json, read_edge_json
 from shapegcode.io.servo_log import parse_units, read_log
 from shapegcode.io.units import FloatArray
 
-_GAP = 1.5  # longest step, relative to the usual one
 _FEWEST, _WINDOW = 100, 2500
 _LARGEST_ACCELERATION = 5e5  # mm/s² or degrees/s²; beyond it a command is a step, not motion
 
@@ -177,7 +176,7 @@ def _of_log(path: Path, units: tuple[float, float] | None) -> ServoRecord:
     if log.actual_mm is None:
         raise RecordError(f"{path}: no actual positions: columns such as X_act are needed next to the commanded X")
     steps = np.diff(log.times_s)
-    ends = [0, *(np.flatnonzero(steps > _GAP * log.sampling_s) + 1).tolist(), len(log.times_s)]
+    ends = [0, *(np.flatnonzero(steps > 1.5 * log.sampling_s) + 1).tolist(), len(log.times_s)]
     ranges = [slice(a, b) for a, b in itertools.pairwise(ends) if b - a >= _FEWEST]
     notes = [f"{len(ends) - 2} gaps between samples"] if len(ends) > 2 else []
     axes = []
