@@ -262,15 +262,10 @@ def _followed_share(log: moves.PartLog) -> float | None:
     return swing / (part.feed_mm_per_min / 120.0)
 
 
-# --- time constants from the shape of single moves --------------------------------------------------------------------
-
 _ODD_SHAPE = 0.002  # largest residual of a fit, relative to the travel
 _BELL_GAIN = 0.8  # a second moving average must reduce the variance below this ratio
 _NO_BELL = "no second moving average was found"
 _SHAPE_NOTES = {"linear": "linear", "bell": "the longer of two moving averages", "exponential": "exponential"}
-
-
-# --- cutting moves ----------------------------------------------------------------------------------------------------
 
 
 def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
@@ -287,7 +282,6 @@ def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
         for name in names:
             facts.add_unknown(name, f"{why}was a look-ahead mode on?")
         return
-    # Longest time of each fit first.
     pairs_of = [zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True) for fit in fits[best]]
     times = [sorted(pairs, reverse=True) for pairs in pairs_of]
     value, half = mean(*zip(*(pairs[0] for pairs in times), strict=True))
@@ -303,7 +297,6 @@ def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
     elif best == "linear":
         facts.add_interval(names[1], 0.0, 0.0, max(facts.fine_s, 0.002), bell_key, _NO_BELL)
     if not facts.exponential:
-        # The sum, as from a stopwatch.
         facts.add(CUTTING_SUM, facts.cutting, facts.cutting_half)
 
 
@@ -314,14 +307,11 @@ def _cutting_fits(facts: LogFacts, stops: list[moves.PartLog]) -> dict[str, list
         nominal = part.part.duration_s
         low, high = nominal * 0.95, nominal + (facts.period or 0.004) * 1.1
         one = [low, 1e-4], [high, 1.0]
-        fits["linear"].append(moves.fit_shape(part, moves.smoothed_share, [nominal, 0.05], *one))
+        fits["linear"].append(moves.fit_shape(part, moves.smoothed_share, [nominal, 0.05], one))
         two = [low, 1e-4, 1e-5], [high, 1.0, 0.5]
-        fits["bell"].append(moves.fit_shape(part, moves.smoothed_share, [nominal, 0.06, 0.02], *two))
-        fits["exponential"].append(moves.fit_shape(part, moves.lagged_share, [nominal, 0.03], *one))
+        fits["bell"].append(moves.fit_shape(part, moves.smoothed_share, [nominal, 0.06, 0.02], two))
+        fits["exponential"].append(moves.fit_shape(part, moves.lagged_share, [nominal, 0.03], one))
     return fits
-
-
-# --- rapids -----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -345,10 +335,10 @@ def _rapid(part: moves.PartLog, facts: LogFacts) -> _Rapid:
         begin = math.sqrt(nominal * ramp_guess)
         tail, low, high = ([], [], []) if bell is None else ([bell], [1e-5], [0.5])
         ends = [0.1 * begin, *low], [20.0 * begin, *high]
-        fit = moves.fit_shape(part, lambda t, p: moves.smoothed_share(t, [p[0], p[0], *p[1:]]), [begin, *tail], *ends)
+        fit = moves.fit_shape(part, lambda t, p: moves.smoothed_share(t, [p[0], p[0], *p[1:]]), [begin, *tail], ends)
         found.append((fit, False, bell is not None))
         ends, start = ([1e-4, *low], [1.05 * rectangle, *high]), [0.7 * rectangle, *tail]
-        fit = moves.fit_shape(part, lambda t, p: moves.smoothed_share(t, [rectangle, *p]), start, *ends)
+        fit = moves.fit_shape(part, lambda t, p: moves.smoothed_share(t, [rectangle, *p]), start, ends)
         found.append((fit, True, bell is not None))
     plain, curved = (
         min((each for each in found if each[2] == with_bell), key=lambda each: each[0].rms_mm)

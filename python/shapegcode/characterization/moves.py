@@ -202,13 +202,10 @@ class ShapeFit:
 
 
 def fit_shape(
-    log: PartLog,
-    share: Callable[[FloatArray, FloatArray], FloatArray],
-    guess: Sequence[float],
-    low: Sequence[float],
-    high: Sequence[float],
-) -> ShapeFit:
-    """Fit one curve to all moves of a back-and-forth part, superimposed at their middles."""
+    log: PartLog, share: Callable[[FloatArray, FloatArray], FloatArray], guess: Sequence[float],
+    ends: tuple[Sequence[float], Sequence[float]],
+) -> ShapeFit:  # fmt: skip
+    """Fit one curve to all moves of a back-and-forth part, superimposed at their middles; *ends*: lowest, highest."""
     middles = log.middles_s()
     length = abs(log.part.length_mm)
     pieces_t, pieces_y = [], []
@@ -228,7 +225,7 @@ def fit_shape(
     grid = np.linspace(0.0, 2.0, 20001)
     middle = float(grid[np.searchsorted(share(grid, np.array(guess)), 0.5)])
     begin = np.array([*guess, -middle])
-    bounds = (np.array([*low, -2.0]), np.array([*high, 2.0]))
+    bounds = [*ends[0], -2.0], [*ends[1], 2.0]
     found = least_squares(residual, begin, bounds=bounds, x_scale=np.maximum(np.abs(begin), 1e-3), max_nfev=60)
     n = len(guess)
     variance = float(found.fun @ found.fun) / max(1, len(t) - len(begin))

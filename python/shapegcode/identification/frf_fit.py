@@ -33,7 +33,7 @@ from shapegcode.io.units import FloatArray
 _BESIDE = 0.25  # also fit lines this far outside the requested band, relative to its ends
 _MIN_WIDTH = 1.0  # least width of a resonance, in line spacings: narrower may be leakage
 _LOCAL, _LOCAL_WIDTHS = 30.0, 2.0  # % residual; range in half-power widths
-_MAX_MODES, _IN_WINDOW = 40, 24  # default largest number of modes of a structure; largest one of a window
+_MAX_MODES = 40  # default largest number of modes of a structure
 _BEYOND = "beyond the requested number of modes: its peak is lower"
 POOR = 0.3  # largest residual ratio in the band of a usable model
 
@@ -189,7 +189,7 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
     quiet = [each.record.response - sines for each, (sines, _) in zip(ready.usable, at_first, strict=True)]
     measured, hits = _of_hits(ready, quiet, sought)
     pool, poles = frf_search.candidates_of(measured.parts)
-    windows = frf_search.search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
+    windows = frf_search.search(measured.parts, measured.low, measured.high, pool, None)
     # Search for steady oscillations again in the residual of a first model.
     left = hits.in_time(_left(measured, hits, _model(measured.parts, windows)[0]))
     steady = [steady_sines(rest, period) for rest in left]
@@ -198,7 +198,7 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
             response[start : start + hits.count] -= sines
         measured, hits = _of_hits(ready, quiet, sought)
     first = frf_search.modes_of(windows)
-    windows = frf_search.search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, first)
+    windows = frf_search.search(measured.parts, measured.low, measured.high, pool, first)
     found = _tested(measured, windows, pool, poles, sought)
     found = replace(found, steady=any(hertz for _, hertz in (*at_first, *steady)))
     rest = _left(measured, hits, found.model[0])
@@ -225,10 +225,10 @@ def _in_responses(responses: Sequence[FrequencyResponse], sought: Sought) -> Frf
     low, high = min(float(each.omega[0]) for each in parts), max(float(each.omega[-1]) for each in parts)
     measured = _Measured(parts, low, high * (1.0 + 1e-9), None, max(each.resolution_hz for each in responses))
     pool, poles = frf_search.candidates_of(measured.parts)
-    windows = frf_search.search(measured.parts, measured.low, measured.high, _IN_WINDOW, pool, None)
+    windows = frf_search.search(measured.parts, measured.low, measured.high, pool, None)
     models = _model(measured.parts, windows)
     parts = tuple(_weighed(lines, model) for lines, model in zip(measured.parts, models, strict=True))
-    windows = frf_search.search(parts, measured.low, measured.high, _IN_WINDOW, pool, frf_search.modes_of(windows))
+    windows = frf_search.search(parts, measured.low, measured.high, pool, frf_search.modes_of(windows))
     for rank, window in enumerate(windows):
         correlation = correlation_of(window.fit.left)
         correlated = tuple(replace(lines, correlation=correlation) for lines in window.parts)
@@ -343,7 +343,6 @@ def doubt_of(found: FrfModes) -> str:
     return ""
 
 
-# --- The modes of a window --------------------------------------------------------------------------------------------
 def _modes(window: Window, measured: _Measured, pool: Sequence[StablePole], sought: Sought) -> list[IdentifiedMode]:
     if not window.inside():
         return []
@@ -399,7 +398,7 @@ def _logarithms(
         # Force noise rotates and scales the whole response near a mode.
         error = 2.0 * float(np.interp(omega, measured.parts[0].omega, measured.hits.gain_error))
         half = np.hypot(half, error * np.array([zeta, 1.0, 1.0, 1.0, 1.0]))
-        half = np.maximum(half, _scatter(window, known, index, measured, change, scale))
+        half = np.maximum(half, _scatter(window, known, index, measured, scale))
     return values, half
 
 
@@ -414,16 +413,9 @@ def _misfit(fit: ModalFit, parts: Sequence[Lines], index: int) -> float:
     return max(1.0, around / max(count, 1) * sum(map(len, fit.left)) / max(fit.squares, 1e-300))
 
 
-def _scatter(
-    window: Window,
-    known: Uncertainty,
-    index: int,
-    measured: _Measured,
-    change: FloatArray,
-    scale: FloatArray,
-) -> FloatArray:
+def _scatter(window: Window, known: Uncertainty, index: int, measured: _Measured, scale: FloatArray) -> FloatArray:
     """Half widths of the intervals from the scatter of a mode between impacts; 0 if noise explains it."""
-    hits, fit, lines = measured.hits, window.fit, window.parts[0]
+    hits, fit, lines, change = measured.hits, window.fit, window.parts[0], model_search.LOGARITHMS
     assert hits is not None
     count = len(hits.force)
     if count < 2:

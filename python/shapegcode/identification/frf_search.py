@@ -28,6 +28,7 @@ _UNUSUAL = 2.0  # times the median residual: a mode with more near it may be two
 _FEW = 350  # lines of a window used in trials
 _BAND_LINES = 48  # least lines of a band or window
 _MAX_CHANGES, _ROUNDS = 60, 4  # largest number of changes of a model: with few lines, then with all
+_MAX_MODES = 24  # of a window
 _FEWEST = 12  # a window with no more lines is not fitted
 _CLEAR, _OPPOSED = 6.0, 8.0  # gain needed by a mode beyond the information criterion; more if opposite to the force
 _TWINS = 0.02  # modes nearer than this fraction of half their half-power width are one
@@ -110,7 +111,7 @@ class Window:
 
 
 def search(
-    parts: Sequence[Lines], low: float, high: float, most: int, candidates: Sequence[StablePole], starts: Starts | None
+    parts: Sequence[Lines], low: float, high: float, candidates: Sequence[StablePole], starts: Starts | None
 ) -> list[Window]:
     """Fit the modes of each window, starting from stable poles or `starts`; other modes are subtracted."""
     final, least = starts is not None, STABLE if starts is None else np.inf
@@ -133,7 +134,7 @@ def search(
         far = [index for index in range(len(starts)) if index not in near]
         rest = [_without(lines, [starts[i] for i in far], known[row, far]) for row, lines in enumerate(parts)]
         tried = [each for each in spare if first < each[0] < last]
-        windows += _fit_window(rest, [starts[i] for i in near], tried, begin, end, most, final)
+        windows += _fit_window(rest, [starts[i] for i in near], tried, begin, end, final)
         begin = end
     return windows
 
@@ -195,10 +196,11 @@ def residues_of(fit: ModalFit) -> ComplexArray:
 
 
 def _fit_window(
-    parts: Sequence[Lines], near: Starts, spare: Starts, low: float, high: float, most: int, final: bool
+    parts: Sequence[Lines], near: Starts, spare: Starts, low: float, high: float, final: bool
 ) -> list[Window]:
     """Fit the modes of a window from starts near it; evidence decides how many. Empty: too few lines, or no mode."""
     found: list[tuple[float, Window]] = []
+    most = _MAX_MODES
     for complex_modes in (True, False) if final else (True,):
         wide = tuple(cut(lines, low / _MARGIN, high * _MARGIN, complex_modes) for lines in parts)
         if min(len(lines.s) for lines in wide) <= _FEWEST:
@@ -278,7 +280,6 @@ class _Selection:
         if fit is None:
             return False
         samples = 2 * sum(map(len, fit.left)) * self.share
-        # Standard errors of the residues, up to a common factor.
         spread = [_inverse(jacobian, 1e-13)[1:] for jacobian in fit.jacobian]
         squares = np.max((np.abs(fit.residues) / [each[: len(fit.omega)] for _, each in spread]) ** 2, axis=0)
         for index in np.argsort(squares)[:_WEAKEST]:

@@ -271,10 +271,8 @@ def _spectrum(found: Identification) -> tuple[FloatArray, FloatArray]:
 def _seen(frequency_hz: FloatArray, found: Identification, peaks_hz: Sequence[float] = ()) -> slice:
     """Range of frequencies to draw: without 0 Hz, to well above the highest mode or peak."""
     marked = [*peaks_hz, *(mode.frequency_hz.value for mode in (*found.modes, *found.refused))]
-    first = int(frequency_hz[0] == 0.0)
-    return slice(
-        first, int(np.searchsorted(frequency_hz, _SHOWN_ABOVE * max(marked, default=frequency_hz[-1] / _SHOWN_ABOVE)))
-    )
+    highest = _SHOWN_ABOVE * max(marked, default=frequency_hz[-1] / _SHOWN_ABOVE)
+    return slice(int(frequency_hz[0] == 0.0), int(np.searchsorted(frequency_hz, highest)))
 
 
 def _mark_modes(column: list[Axes], found: Identification) -> None:

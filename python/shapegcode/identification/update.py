@@ -418,7 +418,6 @@ class ModeTables:
             self.tables[:] = [*stay, *added]
             self.tables[-1].value.body.extend(behind)
             return
-        # At a commented table of modes, or after the axis.
         entries = self.home.value.body
         modes = (SingleKey("modes"), AoT(added, "modes", parsed=True))
         for place, entry in enumerate(entries):

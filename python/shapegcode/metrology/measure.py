@@ -36,9 +36,8 @@ class Job:
 
     simulated: _core.Region
     nominal: _core.Region
-    path: _core.Path
     sections: list[_core.PathSection]
-    joined_mm: float = 0.0  # shorter sections are joined to curves, as there were too many; 0: the usual length
+    joined_mm: float  # shorter sections are joined to curves, as there were too many; 0: the usual length
 
 
 def measure(
@@ -212,7 +211,7 @@ def _measured_regions(
     for number, job in enumerate(jobs, start=1):
         samples, keep = _samples(job, machine, plant), kept < _MAX_PROFILE_STATIONS
         lines = (job.nominal.first_line, job.nominal.last_line)
-        region = _measured(samples, job.path, job.sections, options, lines, number, keep_walls=keep)
+        region = _measured(samples, job.nominal.path, job.sections, options, lines, number, keep_walls=keep)
         kept += sum(each.walls.distance_mm.size for each in region.sections if each.walls is not None)
         yield region
         on_done()
@@ -270,7 +269,7 @@ def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequenc
         else:
             sections = _core.line_sections(path, [(min(a, 2**32 - 1), min(b, 2**32 - 1)) for a, b in lines])
         if sections:
-            jobs.append(Job(simulated, region, path, sections, joined * short_mm if joined > 1.0 else 0.0))
+            jobs.append(Job(simulated, region, sections, joined * short_mm if joined > 1.0 else 0.0))
     if lines is not None and not jobs:
         names = ", ".join(f"{first}-{last}" for first, last in lines)
         raise _core.ArgumentError(f"{nominal.source}: no cutting move in lines {names}")

@@ -230,9 +230,6 @@ def _program_columns(names: Sequence[str]) -> tuple[Column, ...]:
     )
 
 
-# --- worst value of each figure ---------------------------------------------------------------------------------------
-
-
 def _summary_table(title: str, programs: Mapping[str, MeasuredProgram], band_um: float) -> Table:
     """Table of cutting time, contour error, and the largest value of each other figure with section and line."""
     all_of = programs.values()
@@ -297,9 +294,6 @@ def _radii_off(keys: Sequence[str], section: MeasuredSection) -> list[float | No
 def _width_off_um(section: MeasuredSection) -> list[float | None]:
     width = section.width_mm
     return [None if value is None else 1e3 * abs(value - width.nominal) for value in (width.min, width.max)]
-
-
-# --- section by section -----------------------------------------------------------------------------------------------
 
 
 def _section_table(

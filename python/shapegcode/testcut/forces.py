@@ -433,7 +433,6 @@ def neighbour_correlation(scaled: FloatArray, group: npt.NDArray[np.intp], outli
         return 0.0
     product = float(np.mean(scaled[1:][pairs] * scaled[:-1][pairs]))
     square = float(np.mean(scaled[~outlier] ** 2))
-    # A correlation up to this may be chance.
     chance = 2.0 / math.sqrt(2.0 * pairs.sum())
     found = product / max(square, 1e-300)
     return min(found, _LARGEST_CORRELATION) if found > chance else 0.0

@@ -100,8 +100,6 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
     return ForceRecord(str(path), force, torque, time, position, depth, feed)
 
 
-# --- the position of each sample --------------------------------------------------------------------------------------
-
 MIN_SAMPLES = 6.0  # least samples per revolution of a record; a table of means has at most one row
 _MIN_AIR_REVS, _GUARD_REVS = 5, 2
 _ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04  # least force in a cut, relative to the noise in air, and to the largest force
@@ -276,7 +274,6 @@ def _positions(
     ends = [_shift(forecast, x, size, side) for side in wanted]
     if not free:
         return np.asarray(x + ends[0])
-    # Both ends: offset and rate.
     share = (x - wanted[0]) / wanted_length
     x = x + ends[0] * (1.0 - share) + ends[1] * share
     rate = float(np.polyfit(time, x, 1)[0]) * 60.0
@@ -308,8 +305,6 @@ def _vertex(three: FloatArray) -> float:
     bend = left - 2.0 * middle + right
     return 0.5 * (left - right) / bend if bend > 0.0 else 0.0
 
-
-# --- means over whole revolutions -------------------------------------------------------------------------------------
 
 _CHATTER, _MIN_CHATTER = 8.0, 0.02  # limit of chatter in standard deviations; least deviation, relative to the median
 

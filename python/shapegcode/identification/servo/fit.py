@@ -71,9 +71,6 @@ def delayed(motion: FloatArray, samples: float) -> FloatArray:
     return np.where(at < 0.0, motion[0] + at * (motion[1] - motion[0]), found)
 
 
-# --- servo lag --------------------------------------------------------------------------------------------------------
-
-
 def lagged_motion(motion: FloatArray, gain_per_s: float, period_s: float, late: float = 0.0) -> FloatArray:
     """Error of a first-order lag (f = 0), exact for set-points joined by straight lines; `late`: delay in samples."""
     kept = math.exp(-gain_per_s * period_s)
@@ -199,8 +196,6 @@ def _correlated_samples(left: FloatArray) -> float:
     return float(1.0 + 2.0 * correlation[1:end].sum())
 
 
-# --- feed drive -------------------------------------------------------------------------------------------------------
-
 _RUN_UP_S, _MM = 0.4, 1e-3
 _STIFFNESS_N_PER_M, _DAMPING_N_S_PER_M = 4e6, 400.0  # for 1 kg: 640 Hz, far above the speed loop
 # Dead time in ms, ln of position gain, lag ratio 1 − f, ln of bandwidth in Hz, of integral time, of friction.
@@ -264,9 +259,6 @@ def _drive_motions(trace: ServoTrace, values: FloatArray, period_s: float, top_s
         drive.reset(run_up[0])
         found.append(np.asarray(drive.respond(np.concatenate([run_up, late]))[count:, 0], dtype=np.float64))
     return found
-
-
-# --- torque -----------------------------------------------------------------------------------------------------------
 
 
 def range_of_three(name: str, values: Sequence[float], unit: str) -> ServoEstimate:
@@ -364,9 +356,6 @@ def fit_servo(
     duration = float(sum(each[-1] - each[0] for each in record.axes[0].time_s))
     name = "" if machine is None else machine.name
     return ServoFit(record.source, duration, tuple(found), name, written, tuple(warnings), fitted)
-
-
-# --- one axis ---------------------------------------------------------------------------------------------------------
 
 
 def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[float], None]) -> ServoAxis:
@@ -489,17 +478,13 @@ def _drive_estimates(fits: Sequence[DriveFit], unit: str) -> tuple[ServoEstimate
     return tuple(range_of_three(f"drive: {name}", values, of) for name, values, of in rows)
 
 
-# --- the machine file -------------------------------------------------------------------------------------------------
-
-
 def _machine_axes(record: ServoRecord, axes: str | Mapping[str, str] | None) -> dict[str, int]:
     if axes is None:
         named = {each.name.partition("(")[2].rstrip(")") or each.name: rank for rank, each in enumerate(record.axes)}
         found = {
             letter: named[name] for letter in "xyz" for name in (f"{letter.upper()}1", letter.upper()) if name in named
         }
-        turning = [letter for letter, rank in found.items() if record.axes[rank].unit == "deg"]
-        return {} if turning else found
+        return {} if any(record.axes[rank].unit == "deg" for rank in found.values()) else found
     if isinstance(axes, str):
         pairs = [each.partition("=") for each in axes.split(",")]
         if any(not equals for _, equals, _ in pairs):
