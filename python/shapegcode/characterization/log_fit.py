@@ -24,9 +24,7 @@ class LogFacts(Facts):
 
     source: str = "log"
     period: float | None = None  # interpolation period; None: unknown
-    held: bool = False  # the command is constant over a period
-    bent: bool = False  # the command is interpolated between periods
-    sampling: float = 0.001  # sampling time of the logs
+    fine_s: float = 0.0  # longest second time constant that may come from sampling alone, and so is no bell time
     cutting: float | None = None  # time constant and bell time of cutting moves together; None: unknown
     cutting_half: float = 0.0  # half-width of its interval
     exponential: bool = False  # cutting moves are exponential
@@ -40,13 +38,6 @@ class LogFacts(Facts):
     def stop_s(self) -> float | None:
         """Time that a stop adds to a cutting move; None: unknown, or infinite (exponential)."""
         return None if self.exponential else self.cutting
-
-    @property
-    def fine_s(self) -> float:
-        """Longest second time constant that may come from sampling alone, and so does not count as a bell time."""
-        if self.bent and self.period:
-            return self.period
-        return 0.0 if self.held else 1.7 * max(self.period or 0.0, 2.0 * self.sampling)
 
 
 def fit_logs(tests: Mapping[str, AirTest], logs: Mapping[str, ServoLog]) -> list[ControllerFact]:
@@ -89,18 +80,20 @@ def _period(
     """Interpolation period: from steps or bends of the command, else from move durations rounded up to periods."""
     name, key = "interpolation period", "controller.interpolation_period_s"
     count, sampling = min((moves.held_samples(log)[0], log.sampling_s) for log in logs.values())
-    facts.sampling = sampling
     note = f"the command changes every {count} samples"
-    if count == 1 and bend > 1:
-        facts.bent = True
+    bent = count == 1 and bend > 1
+    if bent:
         count, note = bend, f"the speed of the command changes every {bend} samples"
     if count > 1:
-        facts.period, facts.held = round(count * sampling, 6), True
+        facts.period = round(count * sampling, 6)
+        facts.fine_s = facts.period if bent else 0.0
         facts.add(name, facts.period, 1e-3 * facts.period, key, note)
         return
+    facts.fine_s = 1.7 * (2.0 * sampling)
     for found in (_period_of_stops(stops), _period_of_run(run, sampling)):
         if found is not None:
             facts.period, half, note = found
+            facts.fine_s = max(facts.fine_s, 1.7 * facts.period)
             facts.add(name, facts.period, half, key, note)
             return
     why = f"not longer than the {sampling * 1e3:g} ms between samples, or interpolated between periods"

@@ -142,17 +142,17 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
     rows = np.flatnonzero(moved)
     if not len(rows):
         raise ArgumentError(f"{log.file}: no motion, so this is not a log of test {test.name}")
-    cuts = np.flatnonzero(np.diff(times[rows]) > _PAUSE_S)
-    bounds = [(int(rows[a]), int(rows[b])) for a, b in zip([0, *(cuts + 1)], [*cuts, len(rows) - 1], strict=True)]
-    if len(bounds) != len(wanted):
+    motions = np.split(rows, np.flatnonzero(np.diff(times[rows]) > _PAUSE_S) + 1)
+    if len(motions) != len(wanted):
         raise ArgumentError(
-            f"{log.file}: {len(bounds)} motions with rests of {_PAUSE_S:g} s between them; test "
+            f"{log.file}: {len(motions)} motions with rests of {_PAUSE_S:g} s between them; test "
             f"{test.name} has {len(wanted)}"
         )
     out = []
     margin = max(2, round(0.05 / float(np.median(np.diff(times)))))
-    for part, (first, last) in zip(wanted, bounds, strict=True):
-        low, high = max(0, first - margin), min(len(times), last + reach + margin)
+    for part, motion in zip(wanted, motions, strict=True):
+        first = int(motion[0])
+        low, high = max(0, first - margin), min(len(times), int(motion[-1]) + reach + margin)
         axis = AXES.index(part.axis)
         rest = positions[low : max(low + 2, first), axis]
         travel = (positions[low:high, axis] - rest.mean()) * math.copysign(1.0, part.length_mm)

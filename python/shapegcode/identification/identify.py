@@ -98,11 +98,11 @@ def identify(
             raise ArgumentError(f"{name} = {number}: must be from 1 to {_LARGEST_MODEL}")
     if isinstance(response, ReadOptions):
         options, response = response, None
+    options = options or ReadOptions()
     if quantity not in (kinds := get_args(Quantity)):
         raise ArgumentError(f"quantity = {quantity!r}: must be one of {', '.join(kinds)}")
     if response is not None:
-        axis = None if options is None else options.axis
-        source = [replace(_record_of(source, response, force, quantity), axis=axis)]
+        source = [replace(_record_of(source, response, force, quantity), axis=options.axis)]
     elif force is not None:
         raise ArgumentError("force is given without a response: identify(time_s, response, force)")
     is_one = isinstance(source, str | Path | Record | FrequencyResponse)
@@ -112,13 +112,12 @@ def identify(
     if any(isinstance(each, float | int | np.ndarray | np.generic) for each in sources):
         raise ArgumentError("arrays: identify(time_s, response) or identify(time_s, response, force), each of (n,)")
     names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
-    window_s = None if options is None else options.exponential_window_s
+    window_s = options.exponential_window_s
     sought = model_search.Sought(band_hz, max_modes, modes, accepted_percent, window_s)
     if sweep is not None and (machine is None or response is not None):
         raise ArgumentError("a sweep needs the machine whose controller ran it, and files or records")
     if sweep is not None and not isinstance(across, bool):
         raise ArgumentError("across: a sweep needs one record of all axes, whose other channels are used")
-    options = options or ReadOptions()
     if sweep is not None and (stops or start_s is not None or options.ignore_force):
         raise ArgumentError("a sweep with its program has neither force, start of a decay nor stops: omit them")
     found = _identified(

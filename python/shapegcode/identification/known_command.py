@@ -244,10 +244,9 @@ class _Clock:
         """Find start and clock of the record, and the ratio −response/command, also for other axes of the sensor."""
         rows = self._recorded(self._clear_parts(), _FEWEST_PARTS)
         clear = np.isin(np.arange(len(self.windows)), rows)
-        spectra = self._spectra(None)
         for furthest in (_FURTHEST_RATE, _FINE_STEP):
             self._refine(rows, furthest)
-            spectra = self._spectra(None)
+            spectra = self._spectra()
             rows = self._recorded(_in_place(spectra, clear), _FEWEST_PARTS)
         while True:
             lags = _lags(spectra.of(rows), rows)
@@ -264,7 +263,7 @@ class _Clock:
         rows = self._recorded(rows[np.isin(rows ^ 1, rows) | (rows == alone)], 1)
         if len(rows) > 1:
             self._refine(rows, _FINE_STEP)  # without the parts that did not match the others
-        spectra = self._spectra(None)
+        spectra = self._spectra()
         lags = _lags(spectra.of(rows), rows)
         notes = self._notes(rows)
         if chosen:
@@ -275,7 +274,7 @@ class _Clock:
         for other in others:
             clock = copy(self)
             clock.record, clock.values = other, other.response - np.mean(other.response)
-            of_other = clock._spectra(None).of(rows).late(lags).in_twos(rows)
+            of_other = clock._spectra().of(rows).late(lags).in_twos(rows)
             # Delay, lag and sign removed from the first are removed from the others too.
             lines = response.response * (of_other.ratio() / used.ratio())[inside]
             beside.append(replace(response, source=other.source, response=lines, axis=other.axis))
@@ -291,14 +290,13 @@ class _Clock:
         return _Aligned(self.record, response, tuple(notes), tuple(beside))
 
     def _spectra(
-        self, band_hz: tuple[float, float] | None, rate: float | None = None, rows: npt.NDArray[np.intp] | None = None
+        self, highest_hz: float = np.inf, rate: float | None = None, rows: npt.NDArray[np.intp] | None = None
     ) -> Spectra:
         stretch = 1.0 + (self.rate if rate is None else rate)
         period = self.record.period_s * stretch
-        low, high = band_hz or (_LOWEST_HZ, np.inf)
-        high = min(high, 1.0 / (_OVER_HALF * period))
+        highest_hz = min(highest_hz, 1.0 / (_OVER_HALF * period))
         begins, ends = np.array(self.windows).T
-        hertz = np.arange(max(low, _LOWEST_HZ), high, 0.5 / np.max(ends - begins))
+        hertz = np.arange(_LOWEST_HZ, highest_hz, 0.5 / np.max(ends - begins))
         rows = np.arange(len(self.windows)) if rows is None else rows
         before = self.places_s * stretch - self.middles  # logger's minus program time of each part
         first = np.ceil((begins + before) / period).astype(int)
@@ -345,10 +343,9 @@ class _Clock:
 
     def _refine(self, rows: npt.NDArray[np.intp], furthest: float) -> None:
         """Fit the clock error with which neighbouring parts agree best, at any wait between them; then fit the wait."""
-        band_hz = _LOWEST_HZ, _CLOCK_HZ
 
         def shares(rate: float) -> Spectra:  # response times conjugate command, over the root of the power of all
-            spectra = self._spectra(band_hz, rate, rows)
+            spectra = self._spectra(_CLOCK_HZ, rate, rows)
             share = np.conj(spectra.command) * spectra.response / np.sqrt(np.maximum(spectra.power, 1e-300))
             return replace(spectra, response=share)
 

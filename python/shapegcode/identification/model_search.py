@@ -30,11 +30,6 @@ class Search:
     # lower is better. Each mode counts one parameter more, since its frequency was searched
     evidence: tuple[float, ...]
 
-    @property
-    def order(self) -> int:
-        """Number of modes with the best evidence."""
-        return int(np.argmin(self.evidence))
-
 
 @dataclass(frozen=True)
 class Sought:
@@ -51,7 +46,7 @@ class Sought:
         """Number of modes to use; raises if the data support fewer than requested."""
         if self.modes is not None and len(models.fits) < self.modes:
             raise RecordError(f"{self.modes} modes are asked for, and the data support no more than {len(models.fits)}")
-        return self.modes or models.order
+        return self.modes or int(np.argmin(models.evidence))
 
 
 def search(problem: FitProblem, sought: Sought) -> Search:

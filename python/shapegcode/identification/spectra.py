@@ -195,11 +195,8 @@ def moving_parts(x_mm: FloatArray, period_s: float) -> list[tuple[int, int]]:
     rows = np.flatnonzero(np.diff(x_mm))
     if not len(rows):
         return []
-    cuts = np.flatnonzero(np.diff(rows) * period_s > REST_S)
-    return [
-        (int(rows[first]), int(rows[last]) + 2)
-        for first, last in zip([0, *(cuts + 1)], [*cuts, len(rows) - 1], strict=True)
-    ]
+    parts = np.split(rows, np.flatnonzero(np.diff(rows) * period_s > REST_S) + 1)
+    return [(int(part[0]), int(part[-1]) + 2) for part in parts]
 
 
 _ENVELOPE_PERIODS = 2.0  # RMS window of the envelope: periods of the slowest mode, or a beat of the two closest modes

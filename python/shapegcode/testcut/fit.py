@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import find_objects, label
 from scipy.special import lambertw
 
 from shapegcode.errors import ArgumentError
@@ -137,9 +138,8 @@ def _reduced(
         passes.append(result.TaperPass(shown.file, found.feed_mm_per_min, shown.spindle_rev_per_min, offset, drift))
         warnings += shown.notes
         rows.append(_of_revolutions(cut, measuring, found))
-        marks = np.flatnonzero(np.diff(np.concatenate([[0], found.chatter.astype(int), [0]])))
-        for first, behind in zip(marks[::2], marks[1::2], strict=True):
-            low, high = float(found.x_mm[first]), float(found.x_mm[behind - 1])
+        for (part,) in find_objects(label(found.chatter)[0]):
+            low, high = (float(found.x_mm[part][end]) for end in (0, -1))
             left_out.append(result.LeftOut(number, low, high))
             warnings.append(
                 f"{shown.file}: X {low:.1f} to {high:.1f} mm ignored: the force oscillates far more there than in the "

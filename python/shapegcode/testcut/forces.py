@@ -412,7 +412,6 @@ def noise_of(left: FloatArray, predicted: FloatArray, revolutions: FloatArray, r
     for k in range(left.shape[1]):
         square = predicted[:, k] ** 2
         columns = np.column_stack([np.ones(len(square)), square])
-        weight = np.ones(len(square))
         level = np.full(len(square), float(np.mean((robust[:, k] * left[:, k]) ** 2)))
         observed = robust[:, k] * left[:, k] ** 2 * many
         for _ in range(4):
