@@ -258,7 +258,6 @@ def _followed_share(log: moves.PartLog) -> float | None:
 _ODD_SHAPE = 0.002  # largest residual of a fit, relative to the travel
 _BELL_GAIN = 0.8  # a second moving average must reduce the variance below this ratio
 _NO_BELL = "no second moving average was found"
-_SHAPE_NOTES = {"linear": "linear", "bell": "the longer of two moving averages", "exponential": "exponential"}
 
 
 def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
@@ -278,7 +277,8 @@ def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
     pairs_of = [zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True) for fit in fits[best]]
     times = [sorted(pairs, reverse=True) for pairs in pairs_of]
     value, half = mean(*zip(*(pairs[0] for pairs in times), strict=True))
-    facts.add(names[0], value, half, "controller.time_constant_s", _SHAPE_NOTES[best])
+    note = "the longer of two moving averages" if best == "bell" else best
+    facts.add(names[0], value, half, "controller.time_constant_s", note)
     facts.add_word("cutting acceleration shape", best, "controller.after_interpolation_shape")
     facts.exponential = best == "exponential"
     facts.cutting, facts.cutting_half = value, half

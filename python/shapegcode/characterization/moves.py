@@ -113,9 +113,7 @@ class PartLog:
         middles = []
         for i, j in zip(known[turns], known[turns + 1], strict=True):
             times, shares = self.times_s[i : j + 1], u[i : j + 1]
-            slope, offset = (shares[1] - shares[0]) / (times[1] - times[0]), shares[0]
-            if j - i > 1:
-                slope, offset = np.polyfit(times - times[0], shares, 1)
+            slope, offset = np.polyfit(times - times[0], shares, 1)
             middles.append(times[0] - offset / slope)
         return np.array(middles)
 

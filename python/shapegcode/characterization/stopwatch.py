@@ -20,9 +20,7 @@ from shapegcode.io.units import FloatArray
 
 _WIDE = 0.5  # ratio to the value: a wider half interval determines nothing
 _CONTRADICTS = 4.0  # standard deviations
-_SHAPE_KEY = "controller.after_interpolation_shape"
 _SLOW = ("stop_slow", "stop_slower")
-_PRIOR_S = 1.0
 _NAMES = ("overhead", "cutting", "X", "Y", "Z", "block")
 
 
@@ -138,7 +136,7 @@ def _least_squares(rows: Sequence[TimedTest], period: float, end: air_tests.Bloc
     def residual(p: FloatArray) -> FloatArray:
         timing = _timing(p, period, end)
         fits = [(program_time_s(row.test, timing) - row.time_s) / row.sigma_s for row in rows]
-        return np.array([*fits, *((p - begin) / _PRIOR_S)])
+        return np.array([*fits, *(p - begin)])  # a parameter without effect stays at its start
 
     found = least_squares(residual, begin, x_scale=np.maximum(begin, 1e-3), diff_step=[1e-6] * len(begin))
     jacobian = np.asarray(found.jac)
@@ -167,7 +165,7 @@ def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
     half = 1.96 / math.sqrt(spread)
     if slope <= half + 0.002:
         note = "a stop takes the same time from every feed; linear or bell cannot be distinguished"
-        facts.add_word(name, "linear or bell", _SHAPE_KEY, note)
+        facts.add_word(name, "linear or bell", "controller.after_interpolation_shape", note)
         return 0.0
     facts.add_word(name, "exponential", "controller.after_interpolation_shape", "stops from a higher feed take longer")
     # The end of each stop is rounded to an unknown period: an error uniform over half of the longest usual one.

@@ -133,8 +133,7 @@ class _Allowance:
             raise self._error("lead_in_mm", why)
         points = np.asarray(substring(wall, start, end).coords)
         # Extend the wall straight beyond its ends, as far as the tool reaches.
-        beyond = 2 * self._radius + self._rough
-        straight = _extended(points, beyond)
+        straight = _extended(points, 2 * self._radius + self._rough)
         line = shapely.LineString(straight)
         if not line.is_simple:
             why = "the path crosses itself or the straight continuation of its ends"
@@ -142,8 +141,7 @@ class _Allowance:
         band = swept(straight, self._reach, round_ends=False)
         cut = shapely.LineString(_extended(straight, _SAME_MM))
         faces = shapely.get_parts(shapely.polygonize([shapely.union_all([band.boundary, cut])]))
-        behind = self._behind(faces, straight)
-        return shapely.union_all(behind), swept(straight, self._radius)
+        return shapely.union_all(self._behind(faces, straight)), swept(straight, self._radius)
 
     def _behind(self, faces: NDArray[np.object_], points: Points) -> list[Area]:
         along = np.diff(points, axis=0)

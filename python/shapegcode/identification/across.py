@@ -25,7 +25,6 @@ Measured = Record | FrequencyResponse
 _AXES = "xyz"
 _WIDTHS, _NEAREST = 8.0, 0.08  # fitted around a mode: half-power widths; ratio to its frequency
 _LOCAL_WIDTHS, _LOCAL_LINES = 2.0, 4  # range around a mode for its residual
-_NO_VIBRATION = 0.3  # damping ratio above which a pole is background
 MIN_MOVE = 0.01  # relative to the motion along its own axis; smaller motion is not written, its phase not reported
 
 
@@ -82,7 +81,7 @@ def with_moves(found: Identification, others: Sequence[Measured], window_s: floa
         )
     if not found.modes:
         return found
-    refused = [mode for mode in found.refused if 0.0 < mode.damping_ratio.value < _NO_VIBRATION]
+    refused = [mode for mode in found.refused if 0.0 < mode.damping_ratio.value < 0.3]  # others are background
     own, along = _amplitudes(found, by_axis, _Poles.of((*found.modes, *refused), window_s))
     notes, modes = list(found.notes), []
     for index, mode in enumerate(found.modes):

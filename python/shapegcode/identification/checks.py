@@ -383,8 +383,6 @@ _SMALLEST_HIT = 0.1  # An impact is above this fraction of the largest force; be
 _PULSE_NOISE = 7.0  # ... and above this many standard deviations, which a million samples of noise do not reach
 _RINGING_SAMPLES = 8  # A further pulse within this many samples is ringing of the anti-aliasing filter
 _BOUNCE_S = 0.1  # A second impact within this time is a bounce of the hammer
-_RESTED = 0.1  # Before an intended next impact the response has fallen to this fraction of its peak
-_LEAD_SHARE = 0.1  # A record of one impact begins before it by this fraction of the shortest time between impacts
 
 
 def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
@@ -409,11 +407,11 @@ def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
 
 
 def _has_rested(record: Record, noise: float, hit: Hit, next_hit: Hit) -> bool:
-    """Whether the response decays between two impacts: at the end, little of it remains above the noise."""
+    """Whether the response decays between two impacts: at the end, a tenth of it remains above the noise."""
     between = (record.response - np.median(record.response))[hit.end : next_hit.first]
     peak = float(np.max(np.abs(between)))
     power = float(np.mean(between[-max(1, len(between) // 10) :] ** 2)) - noise**2
-    return bool(np.sqrt(2.0 * max(power, 0.0)) <= _RESTED * peak)
+    return bool(np.sqrt(2.0 * max(power, 0.0)) <= 0.1 * peak)
 
 
 def find_hits(record: Record) -> list[Hit]:
@@ -447,6 +445,6 @@ def split_hits(record: Record) -> list[Record]:
     hits = find_hits(record)
     if len(hits) < 2:
         return [record]
-    lead = int(_LEAD_SHARE * float(np.min(np.diff([hit.first for hit in hits]))))
+    lead = int(0.1 * float(np.min(np.diff([hit.first for hit in hits]))))
     edges = [*(max(0, hit.first - lead) for hit in hits), len(record.response)]
     return [part_of(record, *ends, f" hit {number}") for number, ends in enumerate(pairwise(edges), start=1)]

@@ -1,5 +1,4 @@
-"""Modes of frequency responses and of impacts with many modes, each with its 95 % interval or the reason for its
-refusal."""
+"""Modes of frequency responses and of impacts with many modes, each with its 95 % interval or why it is refused."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -427,8 +426,7 @@ def _scatter(window: Window, known: Uncertainty, index: int, measured: _Measured
     mean = measured.parts[0].response[places]
     rest = lines.weight * np.conj(force) * (response - mean * force) / power
     stacked = np.hstack((rest.real, rest.imag))
-    modes = len(fit.omega)
-    begin = known.step.shape[0] - 2 * modes + 2 * index
+    begin = known.step.shape[0] - 2 * len(fit.omega) + 2 * index
     rows = known.step[[begin, begin + 1, index]]
     moved = (change * scale) @ (rows @ stacked.T)
     spread = np.sqrt(count / (count - 1.0) * np.sum((moved - moved.mean(axis=1, keepdims=True)) ** 2, axis=1))

@@ -292,9 +292,6 @@ def hits_of(
     return Hits(lines, force, response, kept, tuple(starts), count, period, sigma, error)
 
 
-_MIN_NOISE = 1e-5  # least assumed noise relative to the largest line, which limits weights
-
-
 def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
     """Lines of a measured response, weighted by the roughness of neighbouring lines and by coherence."""
     omega = 2.0 * np.pi * each.frequency_hz
@@ -314,10 +311,10 @@ def measured_lines(each: FrequencyResponse, applied_s: float | None) -> Lines:
 
 
 def weighted(lines: Lines, noise: FloatArray) -> Lines:
-    """The same lines with weights 1/sqrt(noise power); very low noise is raised to a minimum."""
+    """The same lines with weights 1/sqrt(noise power); noise below 1e-5 of the largest line is raised to that."""
     # As acceleration: noise of a displacement integrated from it may exceed all modes at the lowest lines.
     course = lines.omega ** (2.0 - lines.power)
-    least = (_MIN_NOISE * float(np.max(np.abs(lines.response * course))) / course) ** 2
+    least = (1e-5 * float(np.max(np.abs(lines.response * course))) / course) ** 2
     return replace(lines, weight=np.asarray(1.0 / np.sqrt(np.maximum(noise, least)), dtype=np.float64))
 
 

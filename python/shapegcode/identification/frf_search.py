@@ -453,8 +453,7 @@ def uncertainty_of(window: Window) -> Uncertainty:
         spread += (paired.conj().T @ _correlated(paired, lines.correlation)).real
         at += count
     lost = float(np.trace(inverse @ spread))
-    samples = float(sum(rows))
-    variance = fit.squares / max(samples - lost, 1.0)
+    variance = fit.squares / max(sum(rows) - lost, 1.0)
     whole = variance * (inverse @ spread @ inverse) / np.outer(norms, norms)
     freedom = max(sum(count * lines.independent for count, lines in zip(rows, parts, strict=True)) - size, 2.0)
     first = sum(counts)
@@ -476,7 +475,6 @@ def _correlated(columns: ComplexArray, correlation: ComplexArray) -> ComplexArra
 
 # --- poles by poly-reference least squares in the frequency domain (pLSCF), band by band -----------------------------
 
-_CIRCLE = 0.85  # fraction of the unit circle onto which a band is mapped
 _LINES_PER_ORDER, _MAX_ORDER, _MIN_ORDER, _MAX_POLE_DAMPING = 4, 24, 2, 0.3
 
 
@@ -491,7 +489,7 @@ def band_poles(parts: Sequence[Lines], low: float, high: float) -> list[Pole]:
     most = min(_MAX_ORDER, fewest // _LINES_PER_ORDER)
     if most < _MIN_ORDER:
         return []
-    width = 2.0 * np.pi * _CIRCLE / (high - low)
+    width = 2.0 * np.pi * 0.85 / (high - low)  # a band is mapped onto 85 % of the unit circle
     sides: list[tuple[ComplexArray, ComplexArray, ComplexArray]] = []
     for lines, inside in chosen:
         z = np.exp(-width * (lines.s[inside] - 1j * low))

@@ -40,14 +40,11 @@ _COARSE_HZ = 40.0  # start and clock are first searched below this frequency
 _AFTER_S, _RINGS_S = 3.0, 2.0  # record used after the last part; record needed after a part, unless the next one begins
 _OVER_HALF = 2.5  # samples per cycle of the highest line
 _LONGEST_LAG_S = 0.02  # largest lag of a part relative to the others
-_UNLIKELY = 0.3  # cost of the longest lag; a perfect correlation gains 1
 _EXPLAINED = 0.5  # least fraction of a part's power explained by the others
 _FEWEST_PARTS = 2
 _LOWEST_HZ, _NARROWEST = 4.0, 8.0  # lowest line; least ratio of the highest line to it
-_HELD = 0.002  # fraction of samples at a range end with an equal neighbour
 _LOUD, _QUIET, _LEVELLED_HZ = 0.1, 0.01, 1.0  # energy of a used part over the loudest; whitening: floor, width
 _SAME_START_S, _AWAY_S, _STANDS_OUT = 0.15, 0.5, 2.0
-_LOWEST_SHARE = 0.15  # the lowest lines, with this fraction of the power of the command, determine the sign
 _CORRELATED = 0.25  # minimum of the squared correlation of a part, below 40 Hz
 _OWN = 0.1  # least power of a part's own lines, relative to its largest line
 _LAGS_S = np.arange(-0.1, 0.1, 2.5e-4)
@@ -147,7 +144,7 @@ def _held_at_ends(values: FloatArray) -> bool:
     """Whether consecutive samples at the maximum, or at the minimum, are more than 0.2 % of all."""
     ends = [end for end in (np.max(values), np.min(values)) if abs(end - np.median(values)) > 0.0]
     beside = (np.diff(np.flatnonzero(values == end)) == 1 for end in ends)
-    return any(np.count_nonzero(each) > _HELD * len(values) for each in beside)
+    return any(np.count_nonzero(each) > 0.002 * len(values) for each in beside)
 
 
 class _Clock:
@@ -408,9 +405,9 @@ class _Clock:
         ratio = ratio * loops[int(np.argmax([np.max(each) for each in sums]))]
         unit = ratio / np.abs(ratio)
         best = turns[int(np.argmax(np.abs(turns @ unit)))]
-        # Sign of the sensor from the lowest lines, where the axis moves as a rigid body.
+        # Sign of the sensor from the lowest lines, with 15 % of the power, where the axis moves as a rigid body.
         power = power[used]
-        lowest = np.cumsum(power) <= _LOWEST_SHARE * np.sum(power)
+        lowest = np.cumsum(power) <= 0.15 * np.sum(power)
         ratio = ratio * best * (np.sign(np.sum((unit * best * power)[lowest].real)) or 1.0)
         source, axis = self.record.source, self.command.axis
         return FrequencyResponse(source, hertz, -ratio, "acceleration", coherence, axis, scaled=False)
@@ -462,7 +459,7 @@ def _lag(spectra: Spectra, block: npt.NDArray[np.intp], own: npt.NDArray[np.bool
 
     def missed(lag: float) -> float:
         """Cost of a lag; the fastest parts correlate nearly as well one cycle away, so shorter lags are preferred."""
-        unlikely = _UNLIKELY * (lag / _LONGEST_LAG_S) ** 2
+        unlikely = 0.3 * (lag / _LONGEST_LAG_S) ** 2  # a perfect correlation gains 1
         return unlikely - float(np.sum((crossed * np.exp(spectra.turn * lag)).real))
 
     steps = np.arange(-longest_s, longest_s + 1e-9, 5e-4)

@@ -17,7 +17,6 @@ from shapegcode.io.units import FloatArray
 _APART = np.pi  # rad: two modes must differ by this phase over the record
 MAX_MODES = 8  # default largest number of modes of a model
 _TWINS = 0.25  # distance of coinciding modes, relative to the half-power half width
-_STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of a stable pole: largest relative change from one order lower
 _PATIENCE = 2  # Consecutive unsupported models that end the search: one alone may have started badly
 
 
@@ -95,8 +94,8 @@ def chart_of(models: Iterable[tuple[int, Starts]]) -> tuple[ChartPole, ...]:
     for order, now in models:
         omega, zeta = before.T
         for w, z in now:
-            near = np.abs(w / omega - 1.0) <= _STABLE_FREQUENCY
-            damped_alike = near & (np.abs(z - zeta) <= _STABLE_DAMPING * zeta)
+            near = np.abs(w / omega - 1.0) <= 0.01
+            damped_alike = near & (np.abs(z - zeta) <= 0.05 * zeta)
             chart.append(ChartPole(order, w / (2.0 * np.pi), z, bool(np.any(near)), bool(np.any(damped_alike))))
         before = np.array(now).reshape(-1, 2)
     return tuple(chart)
@@ -158,9 +157,6 @@ def _attempt(problem: FitProblem, starts: Starts, **how: Any) -> Fit | None:
 
 
 ACCEPTED_PERCENT = 5.0  # Widest accepted half interval of damping ratio and stiffness: an error of 10 % is then 4 sigma
-_FREQUENCY_PERCENT, _NOT_AT_ALL_PERCENT = 2.0, 1000.0
-_LASTING = 0.8  # Not decayed: still above this ratio at the end (mains hum, a pump, a turning spindle)
-_RIVAL_PROBABILITY = 0.05  # Largest probability that a competing model with one more mode fits as well by chance
 _UNKNOWN = 7.0  # half width of the logarithm of an unknown value: a factor of a thousand
 SCATTER_PROBABILITY = 0.01  # probability that noise alone makes taps differ as much
 TURNED = (
@@ -268,7 +264,7 @@ def rival_of(order: int, fits: Sequence[Fit], white_share: float) -> Fit | None:
     chosen, larger = fits[order - 1 : order + 1]
     better = chosen.sum_of_squares / max(larger.sum_of_squares, np.finfo(float).tiny)
     gain = white_share * chosen.samples * np.log(better)
-    by_chance = stats.chi2.ppf(1.0 - _RIVAL_PROBABILITY, larger.parameters - chosen.parameters)
+    by_chance = stats.chi2.ppf(0.95, larger.parameters - chosen.parameters)
     return larger if gain > by_chance else None
 
 
@@ -319,13 +315,13 @@ def lasting_refusal(frequency_hz: float, damping_ratio: float, record_s: float) 
         f"still at {100.0 * lasting:.0f} % after {record_s:.3g} s: a steady disturbance (mains, pump, "
         "spindle), or a record too short for a mode of so little damping"
     )
-    return said if lasting > _LASTING else "", lasting
+    return said if lasting > 0.8 else "", lasting
 
 
 def interval_refusal(mode: IdentifiedMode, limit_percent: float, folded_percent: float = 0.0) -> str:
     """Reason why an interval is too wide; empty if none is. `folded_percent`: aliased part of the force."""
     limits = (
-        ("frequency", mode.frequency_hz, min(_FREQUENCY_PERCENT, limit_percent)),
+        ("frequency", mode.frequency_hz, min(2.0, limit_percent)),
         ("damping ratio", mode.damping_ratio, limit_percent),
         ("stiffness", mode.stiffness_n_per_m, limit_percent),
     )
@@ -338,7 +334,7 @@ def interval_refusal(mode: IdentifiedMode, limit_percent: float, folded_percent:
                 f"{known}: the pulse has few samples, which without an anti-aliasing filter do not determine the force "
                 "at this frequency; sample faster or take a softer tip"
             )
-        if estimate.uncertainty_percent > _NOT_AT_ALL_PERCENT:
+        if estimate.uncertainty_percent > 1000.0:
             known = f"{name} is not known (limit {limit:g} %)"
         return f"{known}: more taps, a longer record or less noise"
     return ""

@@ -18,7 +18,6 @@ from shapegcode.results.outcome import Plot
 _MAX_TRACES, _SEEN, _SHOWN_ABOVE = 3, 0.02, 2.5
 _FILE_TIME = "time in the file in s"
 _MIN_SHOWN = 1e-5  # of the largest value, on a logarithmic axis
-_CLEAR = 3.0  # times the noise: above this the model's envelope is that of the mode
 _BELOW_NOISE = 0.3
 
 
@@ -184,7 +183,7 @@ def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
         top = float(measured.max())
         noise = max(float(np.median(rest)), _MIN_SHOWN * top)
         peak = int(np.argmax(fitted))
-        below = np.flatnonzero(fitted[peak:] < _CLEAR * noise)
+        below = np.flatnonzero(fitted[peak:] < 3.0 * noise)
         end = peak + int(below[0]) if len(below) else len(fitted)
         longest = max(longest, end)
         panel.set_yscale("log")

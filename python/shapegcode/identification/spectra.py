@@ -202,14 +202,12 @@ def moving_parts(x_mm: FloatArray, period_s: float) -> list[tuple[int, int]]:
 _ENVELOPE_PERIODS = 2.0  # RMS window of the envelope: periods of the slowest mode, or a beat of the two closest modes
 _ENVELOPE_SHARE = 0.05  # ... and at least this fraction of the record while the modes are unknown
 _EVENT_RISES, _EVENT_SHARE = 1.3, 0.3  # An event: the envelope rises by this factor, to this fraction of its maximum
-_TAIL = 0.3  # The tail of a decay, without command, begins after this fraction of it
 _MODE_SHARE = 0.2  # Modes are peaks above this fraction of the tail's largest; slower motion is of the axis
 # A window of one period with this fraction of the largest RMS begins at most half a period early, so the decay
 # has begun this fraction of a period later.
 _ONSET = 0.7
 _SLOWER = 0.8  # Vibration below this fraction of the slowest mode's frequency is motion of the axis
 _MOTION_SHARE = 0.4  # The axis moves if the mean over the slowest mode's period exceeds this fraction of the amplitude
-_LOWEST_HZ = 10.0  # lowest mode in an ordinary run; slower is motion
 
 
 def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
@@ -280,7 +278,7 @@ class _Scales:
 def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_samples: float) -> _Scales:
     """Find the slowest mode of a decay from its tail (after the command), the strongest from all of it."""
     rate = 1.0 / record.period_s
-    tail = quiet[start + int(_TAIL * (end - start)) : end]
+    tail = quiet[start + int(0.3 * (end - start)) : end]
     peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= 16 else ()
     modes = sorted(peak.frequency_hz for peak in peaks if peak.amplitude > _MODE_SHARE * peaks[0].amplitude)
     if not modes:
@@ -332,7 +330,7 @@ def split_stops(records: Iterable[Record], lowest_hz: float | None = None) -> li
 
 def _stops_of(record: Record, lowest_hz: float | None) -> Iterator[tuple[float, Record]]:
     quiet = _without_median(record)
-    period = 1.0 / ((lowest_hz or _LOWEST_HZ) * record.period_s)
+    period = 1.0 / ((lowest_hz or 10.0) * record.period_s)
     envelope = _envelope(quiet, period, _ENVELOPE_PERIODS * period)
     parts = []
     for begin, stop in _until_next(envelope, _events(envelope)):

@@ -24,7 +24,6 @@ SWEPT_HZ = (10.0, 130.0)  # Klipper's default sweep is 5 to 133 Hz; its ends are
 _BIN_HZ = 0.5  # averaging width of the spectrum, wider than the ripple from interfering harmonics
 _MIN_S = 10.0
 _WIDENED = 2.0  # Factor on intervals for the command's spectrum, friction and backlash, which are not noise
-_MIN_FREQUENCY, _MIN_DAMPING = 0.005, 0.1  # narrowest half intervals, relative
 _NO_VIBRATION = 0.5
 _MIN_SHARE = 0.02  # least motion of a significant mode, relative to that of the axis
 
@@ -159,7 +158,7 @@ def _checked_mode(best: _Model, other: _Model, index: int, bins: int) -> Identif
     place = 2 + 3 * index
     quantile = _WIDENED * float(student.ppf(0.975, max(bins - len(best.parameters), 1)))
     halves = []
-    for at, least in ((place + 1, _MIN_FREQUENCY), (place + 2, _MIN_DAMPING)):
+    for at, least in ((place + 1, 0.005), (place + 2, 0.1)):  # narrowest half intervals, relative
         apart = abs(float(other.parameters[at] - best.parameters[at]))
         halves.append(max(least, quantile * float(np.sqrt(max(best.covariance[at, at], 0.0))), apart))
     share, _, zeta = np.exp(best.parameters[place : place + 3])

@@ -25,8 +25,6 @@ _TRIED = 8, 24  # moves of a trial, and of a longer one
 _OF_STEP = 0.4  # feed over the corner speed difference: a reversal changes the speed by twice the feed; margin 20 %
 _MIN_AT_ONCE = 100.0  # mm/min; below it moves excite too little, and moves with ramps are used
 _SPARE = 1.15  # Margin to the shortest block time, for rounding of moves to increments
-_ENOUGH = 0.98  # of the largest amplitude: a higher feed gains nothing
-_MIN_INCREMENTS = 4  # of the shortest move
 _MIN_MM_S2 = 20.0  # a sensor of 12 bits and ± 2 g resolves 10 mm/s²
 _MIN_CYCLES = 3.0  # least cycles of the lowest frequency in its rise
 _MIN_BAND = 1.5  # upper end over lower end
@@ -225,7 +223,7 @@ class _Planner:
                 self._feed = min(self._feed, at_once)
         self.allowed = self.wanted = share * limits.max_acceleration_mm_s2
         self._block_s = max(controller.block_time_s, 2.0 * controller.interpolation_period_s)
-        self._min_mm = _MIN_INCREMENTS * controller.least_increment_mm
+        self._min_mm = 4 * controller.least_increment_mm
 
     def plan(self, low: float, high: float) -> tuple[list[_Move], str]:
         """Moves from the lowest frequency to *high*, or as high as can be reached; and a text on what limits them."""
@@ -259,7 +257,7 @@ class _Planner:
         top = min(self._feed, 60.0 * self._travel_mm / (0.5 / hertz))
         tried = [self._tried(hertz, float(feed)) for feed in np.geomspace(top / 100.0, top, 9)]
         largest = max(amplitude for _, amplitude in tried)
-        goal = min(self.wanted, _ENOUGH * largest)
+        goal = min(self.wanted, 0.98 * largest)
         place = next(k for k, (_, amplitude) in enumerate(tried) if amplitude >= goal)
         if place and tried[place][1] > goal:
             (below, low), (above, high) = tried[place - 1], tried[place]

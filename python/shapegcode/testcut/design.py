@@ -314,7 +314,6 @@ def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[FloatArray, Floa
 
 
 _SKIM_MM = 0.2
-_ROUGH_SHARE = 0.1  # of the diameter: largest radial depth of the cuts that mill the edge
 _RAW_MM = 0.5  # allowed protrusion of the raw edge
 _CLEAR_Z_MM, _NEAR_Z_MM = 10.0, 2.0
 _BLOCKS_OF_EDGE = 3.0  # least duration of a block of the edge, in block times
@@ -423,10 +422,10 @@ class _Writer:
         yield f"G00 Z{decimal(_NEAR_Z_MM, 3)}"
 
     def _offsets(self, before: float, wall: float) -> list[float]:
-        """Distance of each cut from the edge: equal small depths, and a thin last cut that hardly bends the tool."""
+        """Distance of each cut from the edge: equal ones up to 0.1 D, then a thin one that hardly bends the tool."""
         height = self.design.edge.at(np.linspace(0.0, self.design.stock_mm, 200))
         more = float(np.max(wall - height - before)) - _SKIM_MM
         if more <= 0.0:
             return [0.0]
-        rough = math.ceil(more / (_ROUGH_SHARE * self.cut.tool.diameter_mm))
+        rough = math.ceil(more / (0.1 * self.cut.tool.diameter_mm))
         return [round(_SKIM_MM + more * k / rough, 3) for k in range(rough - 1, -1, -1)] + [0.0]
