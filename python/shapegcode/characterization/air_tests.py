@@ -252,14 +252,12 @@ def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
     return tests
 
 
-# --- duration of the tests: paper 004 in docs/evidence/references.md, equations 2 to 16 -------------------------------
-
 NO_PERIOD_S = 1e-6  # too short to round anything
 
 
 @dataclass(frozen=True)
 class ControllerTiming:
-    """Parameters of the control that determine the duration of a test; times in s."""
+    """What determines the duration of a test, in s: paper 004 in docs/evidence/references.md, equations 2 to 16."""
 
     period_s: float
     block_end: BlockEnd

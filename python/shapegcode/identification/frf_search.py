@@ -473,13 +473,11 @@ def _correlated(columns: ComplexArray, correlation: ComplexArray) -> ComplexArra
     return np.asarray(product[len(correlation) - 1 :][: len(columns)], dtype=np.complex128)
 
 
-# --- poles by poly-reference least squares in the frequency domain (pLSCF), band by band -----------------------------
-
 _LINES_PER_ORDER, _MAX_ORDER, _MIN_ORDER, _MAX_POLE_DAMPING = 4, 24, 2, 0.3
 
 
 def band_poles(parts: Sequence[Lines], low: float, high: float) -> list[Pole]:
-    """Poles between two angular frequencies, of models of ascending order.
+    """Poles between two angular frequencies, of models of ascending order (pLSCF).
 
     Source: P. Guillaume et al., A poly-reference implementation of the least-squares complex frequency-domain
     estimator, IMAC 21, 2003.

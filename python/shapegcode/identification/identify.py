@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from shapegcode.program import Program
 
 _LARGEST_MODEL = 99
-_OPTIONS = {"period_s": "sample_period", "exponential_window_s": "exponential_window"}  # options with another name
 _MIN_SAMPLES = 3
 
 
@@ -183,7 +182,7 @@ def _refuse_of_sensors(
     }  # fmt: skip
     for name, is_said in said.items():
         if is_said:
-            option = _OPTIONS.get(name, name).replace("_", "-")
+            option = {"period_s": "sample_period"}.get(name, name).removesuffix("_s").replace("_", "-")
             raise ArgumentError(
                 f"{capture}: a capture of command and encoder, for which --{option} has no effect: it is for the "
                 "record of a sensor (--response-column names one in a CSV)"
@@ -287,7 +286,6 @@ _EXPLAINED, _NOISE_SHARE = 0.003, 1.5  # largest residual of few modes, relative
 _MANY = "many modes, or vibration that is no mode: fitted over frequency, band by band, within the excited band"
 _SPECTRUM = 4096  # points of the force's transform
 _FILTER_ERROR = 3e-4  # largest error of a mass by decimation: the filters attenuate by 80 dB
-_FILTER_MOVES = (1e-6, 1e-4)  # ... of a frequency and of a damping ratio
 _FINER = 16  # steps per sampling period of the check by Wilson's method
 _POSSIBLY = 15.0  # allowed loss of evidence (twice the log odds) of another intersample behaviour of the force
 
@@ -434,7 +432,7 @@ def _result(
         rival=model_search.rival_of(order, models.fits, problem.white_share),
         aliased=_aliased(ready, problem),
         white_share=white_share,
-        least=(0.0, 0.0) if thinned is None else _FILTER_MOVES,
+        least=(0.0, 0.0) if thinned is None else (1e-6, 1e-4),  # errors by decimation
     )
     found = model_search.checked_modes(fit, _alone(problem, fit), others, doubts)
     left = float(np.sqrt(fit.sum_of_squares / squares)) if squares > 0.0 else 1.0

@@ -118,8 +118,6 @@ def mode_envelopes(record: Record, frequencies_hz: Sequence[float]) -> list[Floa
     return found
 
 
-# --- command and response, part by part between rests -----------------------------------------------------------------
-
 REST_S = 0.5  # least rest of a command between two parts
 _EXCITED = 0.2  # least amplitude of a used line, relative to the median of the command's spectrum
 _BESIDE = 0.3  # least power relative to neighbouring lines: weaker lines show noise
@@ -128,7 +126,7 @@ _SMOOTH_LINES, _COHERENT = 31, 0.9
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """Spectra of the parts, all at the same frequencies; times are the program's, not the logger's."""
+    """Spectra of a command and its response, part by part between rests; times are the program's, not the logger's."""
 
     hertz: FloatArray  # (n,)
     command: ComplexArray  # (parts, n)

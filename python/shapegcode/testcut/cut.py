@@ -231,15 +231,13 @@ def read_test_cut(path: str | Path) -> TestCut:
     return cut
 
 
-# --- edges: heights are outwards from the wall of the measuring pass --------------------------------------------------
-
 _GRID_MM = 0.004
 _MOVED = 9  # increments
 
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """A polyline, ascending in X; extended straight beyond both ends."""
+    """A polyline, ascending in X; extended straight beyond both ends. Heights are outwards from the finished wall."""
 
     x_mm: FloatArray  # (n,) at least 2
     height_mm: FloatArray  # (n,)

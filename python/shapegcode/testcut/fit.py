@@ -208,10 +208,8 @@ def _joined(rows: Sequence[MeanForces]) -> MeanForces:
     return MeanForces(Engagement.joined(met), feed, speed, force, turns, group, Engagement.joined(displaced), torque)
 
 
-# --- corner: measured against expected resultant (paper 001, figure 7) ------------------------------------------------
-
-
 def _fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResult:
+    """Measured against expected resultant (paper 001, figure 7)."""
     passes = {}
     for number, record in measured.items():
         measuring = cut.passes[number - 1]
@@ -246,12 +244,11 @@ def _inside(cut: TestCut, number: int, x_mm: FloatArray) -> npt.NDArray[np.bool_
     return fully_engaged(cut, measuring, x_mm, margin)
 
 
-# --- interval test: from which interval on the controller follows the commanded feeds ---------------------------------
-
 _LAGS_S = np.concatenate([[0.0], np.geomspace(2e-3, 0.5, 49)])
 
 
 def _fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> IntervalResult:
+    """From which interval on the controller follows the commanded feeds."""
     passes = [(number, cut.passes[number - 1], record) for number, record in measured.items()]
     records = {number: place_samples(each, cut, at, expected(cut, at)) for number, at, each in passes}
     found = sorted((_followed(cut, number, record) for number, record in records.items()), key=lambda p: p.interval_mm)

@@ -206,8 +206,6 @@ class ForceModel:
         return found
 
 
-# --- the coefficients: power laws about the mean chip, where factor and exponent are uncorrelated ---------------------
-
 MIN_CHIP_RATIO = 1.5  # thickest over thinnest mean chip; below it exponents and factors are not distinguishable
 MIN_FEED_RATIO = 1.3  # largest over smallest feed; below it edge forces are not distinguishable
 _HUBER, _OUTLIER, _MIN_OUTLIER, _LARGEST_SHARE_OUT = 2.5, 4.0, 0.02, 0.25
@@ -253,7 +251,7 @@ class CoefficientFit:
 def fit_coefficients(
     data: MeanForces, tool: CutTool, axial_depth_mm: float, *, thickness: Thickness = "mean", edge: bool = False
 ) -> CoefficientFit:
-    """Fit the laws of k1 and k2 over the chip thickness, and if requested the edge forces."""
+    """Fit power laws of k1 and k2 about the mean chip (factor and exponent uncorrelated); *edge*: edge forces too."""
     count = 6 if edge else 4
     chip = np.zeros(len(data.feed_mm_per_min))
     for speed, at, met in _by_speed(data):
