@@ -134,6 +134,7 @@ _LOG_STOP_S, _LOG_DWELL_S, _LOG_PAUSE_S = 0.160, 0.096, 0.5
 _STEPS_MOVE_S = 0.8  # at full feed: longer than the ramps at both ends
 _LOG_RATIOS = (1.0, 0.5, 0.25, 0.1, 0.05)
 _MORE_RATIOS = (0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.45, 0.4, 0.35)
+_LONG_RAPID_S = 0.2
 _LONG_RAPIDS = ((1.0, 100), (0.5, 100), (0.2, 60), (0.14, 60), (0.1, 60), (0.07, 60), (0.05, 60), (0.03, 60))
 _SHORT_RAPIDS = ((1.0, 100), (0.85, 60), (0.7, 60), (0.55, 60), (0.4, 60), (0.3, 60), (0.2, 60), (0.1, 60), (0.05, 60))
 
@@ -186,7 +187,7 @@ class _Maker:
 
     def rate_is_reached(self, axis: str) -> bool:
         """Whether rapids over the box reach the rapid rate (if not, the tests have rapids of more lengths)."""
-        return abs(self._box.travel_mm(axis)) > 0.2 * self.rapid[axis] / 60.0
+        return abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / 60.0
 
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:
         """Moves of one length in one direction, alternately fast and slow, then back; none if the box is too small."""
@@ -281,7 +282,7 @@ class ControllerTiming:
 
 def whole_periods(duration_s: float, period_s: float) -> float:
     """Round a duration up to whole interpolation periods, in s."""
-    return math.ceil(duration_s / period_s - 1e-6) * period_s
+    return math.ceil(duration_s / period_s - 1e-6) * period_s  # less the round-off, in periods
 
 
 def part_time_s(part: Part, timing: ControllerTiming, override: float = 1.0) -> float:

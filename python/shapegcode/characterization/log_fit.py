@@ -16,6 +16,8 @@ from shapegcode.io.servo_log import ServoLog
 from shapegcode.io.units import FloatArray
 
 _Interval = tuple[float, float]  # a value and its half-width
+_FOLLOWED, _RUN_SETTLE_S, _STEPS_SETTLE_S = 0.9, 0.45, 0.3
+_FINE = 1.7  # periods
 
 
 @dataclass
@@ -89,11 +91,11 @@ def _period(
         facts.fine_s = facts.period if bent else 0.0
         facts.add(name, facts.period, 1e-3 * facts.period, key, note)
         return
-    facts.fine_s = 1.7 * (2.0 * sampling)
+    facts.fine_s = _FINE * (2.0 * sampling)
     for found in (_period_of_stops(stops), _period_of_run(run, sampling)):
         if found is not None:
             facts.period, half, note = found
-            facts.fine_s = max(facts.fine_s, 1.7 * facts.period)
+            facts.fine_s = max(facts.fine_s, _FINE * facts.period)
             facts.add(name, facts.period, half, key, note)
             return
     why = f"not longer than the {sampling * 1e3:g} ms between samples, or interpolated between periods"
@@ -118,7 +120,7 @@ def _period_of_stops(stops: list[moves.PartLog]) -> tuple[float, float, str] | N
 
 def _period_of_run(run: list[moves.PartLog], sampling: float) -> tuple[float, float, str] | None:
     """The one of `PERIODS_S` that explains the rounded block times of a run; with half-width and a note."""
-    steady = moves.line_slope(run[0], 0.45) if run else None
+    steady = moves.line_slope(run[0], _RUN_SETTLE_S) if run else None
     if steady is None:
         return None
     part = run[0].part
@@ -227,7 +229,7 @@ def _feed_steps(facts: LogFacts, parts: list[moves.PartLog]) -> None:
         return
     name = f"feed-control interval at F{parts[0].part.feed_mm_per_min:g}"
     depths = {abs(log.part.length_mm): depth for log in parts if (depth := _followed_share(log)) is not None}
-    followed = [d for d in depths if all(depths[e] >= 0.9 for e in depths if e >= d)]
+    followed = [d for d in depths if all(depths[e] >= _FOLLOWED for e in depths if e >= d)]
     shown = ", ".join(f"{d:g} mm {max(0.0, min(1.0, depths[d])) * 100:.0f} %" for d in sorted(depths))
     if not followed:
         facts.add_unknown(name, f"the speed follows over none of the distances in the box: {shown}", "mm")
@@ -242,7 +244,7 @@ def _followed_share(log: moves.PartLog) -> float | None:
     part = log.part
     top = int(np.argmax(log.travel_mm))  # the reversal, which smoothing shortens
     begin = log.times_s[int(np.argmax(log.travel_mm > max(0.02, 5 * log.noise_mm)))]
-    settle = min(0.3, 0.25 * (log.times_s[top] - begin))
+    settle = min(_STEPS_SETTLE_S, 0.25 * (log.times_s[top] - begin))
     inside = (log.times_s > begin + settle) & (log.times_s < log.times_s[top] - settle)
     pitch = float(np.median(np.diff(log.times_s)))
     width = max(1, round(min(0.02, 0.25 * part.duration_s) / pitch))
@@ -274,6 +276,7 @@ def fit_cutting(facts: LogFacts, stops: list[moves.PartLog]) -> None:
         for name in names:
             facts.add_unknown(name, f"{why}was a look-ahead mode on?")
         return
+    # Longest time of each fit first.
     pairs_of = [zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True) for fit in fits[best]]
     times = [sorted(pairs, reverse=True) for pairs in pairs_of]
     value, half = mean(*zip(*(pairs[0] for pairs in times), strict=True))

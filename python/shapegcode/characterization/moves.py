@@ -91,6 +91,7 @@ def ticks(log: ServoLog, bend: int) -> tuple[FloatArray, FloatArray]:
 
 
 _PAUSE_S = 0.3  # rests within a part are shorter, the pause between two parts is 0.5 s
+_SHORTEST_BOX_S, _STAMP, _MAX_SAMPLES = 2e-5, 0.03, 1500
 
 
 @dataclass(frozen=True)
@@ -169,7 +170,7 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
 
 def smoothed_share(times: FloatArray, boxes: Sequence[float] | FloatArray) -> FloatArray:
     """Fraction of the travel over time: a rectangle of speed, then moving averages; *boxes*: durations of these, s."""
-    used = [float(box) for box in boxes if box > 2e-5]
+    used = [float(box) for box in boxes if box > _SHORTEST_BOX_S]
     power, out = len(used), np.zeros_like(times)
     if not power:
         return np.asarray(np.where(times > 0.0, 1.0, 0.0))
@@ -214,7 +215,7 @@ def fit_shape(
         pieces_t.append(log.times_s[inside] - middle)
         pieces_y.append(travel if k % 2 == 0 else 1.0 - travel)
     t, y = np.concatenate(pieces_t), np.concatenate(pieces_y)
-    every = -(-len(t) // 1500)
+    every = -(-len(t) // _MAX_SAMPLES)
     t, y = t[::every], y[::every]
 
     def residual(p: FloatArray) -> FloatArray:
@@ -230,7 +231,7 @@ def fit_shape(
     jacobian = np.asarray(found.jac)
     covariance = variance * np.linalg.pinv(jacobian.T @ jacobian)
     # Time stamps are accurate to a fraction of the sampling time, however many samples agree.
-    stamp = 0.03 * float(np.median(np.diff(log.times_s)))
+    stamp = _STAMP * float(np.median(np.diff(log.times_s)))
     half = np.hypot(1.96 * np.sqrt(np.maximum(np.diag(covariance)[:n], 0.0)), stamp)
     return ShapeFit(found.x[:n], half, math.sqrt(variance))
 

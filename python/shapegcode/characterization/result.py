@@ -12,7 +12,8 @@ from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 CUTTING_SUM = "cutting time constant + bell time"  # acceleration after interpolation, as from a stopwatch
-PERIODS_S = tuple(ms / 1000.0 for ms in (0.125, 0.25, 0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16))  # usual, s
+#: Usual interpolation periods of controls, s.
+PERIODS_S = tuple(ms / 1000.0 for ms in (0.125, 0.25, 0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16))
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from shapegcode.characterization.programs import FilledSheet
 from shapegcode.characterization.result import CUTTING_SUM, PERIODS_S, Facts
 from shapegcode.io.units import FloatArray
 
+_CLEARLY = 9.0  # chi² difference of a clearly worse alternative
 _WIDE = 0.5  # ratio to the value: a wider half interval determines nothing
 _CONTRADICTS = 4.0  # standard deviations
 _SLOW = ("stop_slow", "stop_slower")
@@ -179,7 +180,7 @@ def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
 def _discrete(fits: Sequence[_Fit], facts: WatchFacts) -> tuple[_Fit, float | None]:
     """The best fit, and its interpolation period if certain; adds period and rule of block timing to the facts."""
     best = min(fits, key=lambda fit: fit.chi2)
-    close = [fit for fit in fits if fit.chi2 < best.chi2 + 9.0]  # the others are clearly worse
+    close = [fit for fit in fits if fit.chi2 < best.chi2 + _CLEARLY]
     periods = sorted({fit.period for fit in close})
     ends = {fit.end for fit in close}
     name = "interpolation period"

@@ -85,6 +85,9 @@ DOUBLE_HIT = 0.1  # Below, it may be the ringing of an anti-aliasing filter, whi
 MIN_FORCE = 10.0  # Least ratio of the peak force to its noise: the error of the mass is about the inverse
 MIN_PULSE = 3  # Least samples of a pulse: with three, the impulse of a half sine is known to about 10 %
 MIN_LEAD = 8  # Least samples before the impact to measure noise and offset: a standard deviation to 25 %
+_CUT_PULSE = 0.2  # Refuse a record that begins within the pulse above this fraction of its peak
+_AT_REST = 0.1  # At rest before the impact: vibration below this fraction of that afterwards
+_OPPOSED = -0.7  # Correlation of force and response below which they are opposite
 
 
 def _mean_to_remove(values: FloatArray) -> float:
@@ -103,7 +106,7 @@ def _is_opposed(record: Record, hit: Hit, response: FloatArray, force: FloatArra
     for _ in range(("acceleration", "velocity", "displacement").index(record.quantity)):
         push = np.cumsum(push)
     norm = float(np.linalg.norm(push) * np.linalg.norm(moved))
-    return norm > 0.0 and float(push @ moved) / norm < -0.7
+    return norm > 0.0 and float(push @ moved) / norm < _OPPOSED
 
 
 def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> Usable:
@@ -138,7 +141,7 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> Usable:
             f"double hit: a second pulse of {100 * hit.second_share:.0f} % comes {1000 * hit.second_s:.3g} ms after "
             f"the first; above {100 * DOUBLE_HIT:g} % it is not one tap: hit again"
         )
-    if hit.first == 0 and hit.peak > 0 and (force[0] - np.median(force)) / hit.peak_n > 0.2:
+    if hit.first == 0 and hit.peak > 0 and (force[0] - np.median(force)) / hit.peak_n > _CUT_PULSE:
         raise RecordError(
             "the record begins inside the pulse: part of the force is missing; required: a pre-trigger of some "
             f"{MIN_LEAD} samples or more"
@@ -177,7 +180,7 @@ def _windowed(
         response = response - _mean_to_remove(lead)
         noise = float(np.std(lead))
         after = float(np.sqrt(np.mean(response[hit.end :][: len(lead)] ** 2))) if hit.end < len(response) else 0.0
-        if noise > 0.1 * after > 0.0:
+        if noise > _AT_REST * after > 0.0:
             warnings.append(
                 f"{where}: before the impact the sensor shows {100 * noise / after:.0f} % of what it shows afterwards: "
                 "noise, or the machine was not at rest"
@@ -265,7 +268,11 @@ def _refuse_mixture(records: Sequence[Record]) -> None:
             )
 
 
+_CLIPPED_RUN = 3  # Consecutive equal extreme samples that may be an overload; a smooth peak has two
+_CLIPPED_STEP = 1e-4  # Values closer than this fraction of the range count as equal: filters do not clip to one value
 _SMOOTH_FALL = 6.0  # A smooth peak falls by four resolution steps at twice the distance of the run's ends from the top
+# A lobe is flat if over half of its samples above 50 % are above 95 %, with at least this many samples.
+_NEARLY_TOP, _FLAT_SHARE, _FLAT_RUN = 0.95, 0.5, 5
 EXCITED = 0.1  # Force spectrum fallen to this ratio (-20 dB): noise counts tenfold
 EXCITED_HALF_SINE = 1.3033  # A half sine reaches it at this multiple of 1/duration: cos(pi x) / (1 - 4 x²) = 0.1
 MIN_PERIODS = 8.0  # Least periods to find damping without full decay; fewer cannot distinguish decay from beat
@@ -285,14 +292,14 @@ def is_clipped(values: FloatArray) -> bool:
         return True
     steps = np.abs(np.diff(values))
     steps = steps[steps > 0.0]
-    step = max(1e-4 * float(np.ptp(values)), float(np.min(steps)))  # filters do not clip to one value
+    step = max(_CLIPPED_STEP * float(np.ptp(values)), float(np.min(steps)))
     for signal in (centred, -centred):
         top = float(np.max(signal))
         if top < 0.5 * largest:
             continue
         high = np.flatnonzero(signal >= top - 0.5 * step)
         for run in np.split(high, np.flatnonzero(np.diff(high) > 1) + 1):
-            if len(run) < 3:  # a smooth peak has two
+            if len(run) < _CLIPPED_RUN:
                 continue
             reach = (len(run) + 1) // 2
             sides = [k for k in (int(run[0]) - reach, int(run[-1]) + reach) if 0 <= k < len(signal)]
@@ -303,11 +310,11 @@ def is_clipped(values: FloatArray) -> bool:
 
 
 def _is_flat_topped(signal: FloatArray) -> bool:
-    """Whether the highest lobe is clipped, also under noise: 5 samples and half of its upper half are above 95 %."""
+    """Whether the highest lobe is clipped, also under noise: much of its upper half is above 95 % of the maximum."""
     top, crest = float(np.max(signal)), int(np.argmax(signal))
-    lobes = (label(signal > share * top)[0] for share in (0.95, 0.5))
+    lobes = (label(signal > share * top)[0] for share in (_NEARLY_TOP, 0.5))
     high, half = (np.count_nonzero(lobe == lobe[crest]) for lobe in lobes)
-    return bool(high >= 5 and high > 0.5 * half)
+    return bool(high >= _FLAT_RUN and high > _FLAT_SHARE * half)
 
 
 def excited_hz(force_n: FloatArray, period_s: float) -> float:
@@ -328,7 +335,10 @@ def excited_hz(force_n: FloatArray, period_s: float) -> float:
 def refuse_short(
     record: Record, response: FloatArray, noise: float, band_hz: float | None, warnings: list[str]
 ) -> float:
-    """Refuse a record too short, or sampled too slowly for the band or the strongest mode; return that mode's Hz."""
+    """Refuse a record too short, or sampled too slowly; return the frequency of its strongest mode, Hz.
+
+    With a band, its upper end decides whether sampling is too slow; the strongest mode then gives a warning only.
+    """
     half_rate = 0.5 / record.period_s
     if len(response) < _MIN_SAMPLES:
         raise RecordError(
@@ -383,6 +393,9 @@ _SMALLEST_HIT = 0.1  # An impact is above this fraction of the largest force; be
 _PULSE_NOISE = 7.0  # ... and above this many standard deviations, which a million samples of noise do not reach
 _RINGING_SAMPLES = 8  # A further pulse within this many samples is ringing of the anti-aliasing filter
 _BOUNCE_S = 0.1  # A second impact within this time is a bounce of the hammer
+_RESTED = 0.1  # Before an intended next impact the response has fallen to this fraction of its peak
+_LEAD_SHARE = 0.1  # A record of one impact begins before it by this fraction of the shortest time between impacts
+_MAD = 1.4826  # Normal noise: standard deviation over median absolute deviation
 
 
 def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
@@ -407,11 +420,11 @@ def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
 
 
 def _has_rested(record: Record, noise: float, hit: Hit, next_hit: Hit) -> bool:
-    """Whether the response decays between two impacts: at the end, a tenth of it remains above the noise."""
+    """Whether the response decays between two impacts: at the end, little of it remains above the noise."""
     between = (record.response - np.median(record.response))[hit.end : next_hit.first]
     peak = float(np.max(np.abs(between)))
     power = float(np.mean(between[-max(1, len(between) // 10) :] ** 2)) - noise**2
-    return bool(np.sqrt(2.0 * max(power, 0.0)) <= 0.1 * peak)
+    return bool(np.sqrt(2.0 * max(power, 0.0)) <= _RESTED * peak)
 
 
 def find_hits(record: Record) -> list[Hit]:
@@ -423,7 +436,7 @@ def find_hits(record: Record) -> list[Hit]:
     hits: list[Hit] = []
     largest = float(np.max(sign * force))
     noise = 0.0
-    sigma = 1.4826 * float(np.median(np.abs(force - np.median(force))))  # normal noise, as it is quiet most of the time
+    sigma = _MAD * float(np.median(np.abs(force - np.median(force))))  # quiet most of the time
     for pulse in _pulses(sign * force, sigma):
         if not hits and pulse.first > 1:
             noise = float(np.std(record.response[: pulse.first - 1]))
@@ -445,6 +458,6 @@ def split_hits(record: Record) -> list[Record]:
     hits = find_hits(record)
     if len(hits) < 2:
         return [record]
-    lead = int(0.1 * float(np.min(np.diff([hit.first for hit in hits]))))
+    lead = int(_LEAD_SHARE * float(np.min(np.diff([hit.first for hit in hits]))))
     edges = [*(max(0, hit.first - lead) for hit in hits), len(record.response)]
     return [part_of(record, *ends, f" hit {number}") for number, ends in enumerate(pairwise(edges), start=1)]

@@ -30,10 +30,19 @@ from shapegcode.io.record import ComplexArray, FrequencyResponse
 from shapegcode.io.units import FloatArray
 
 _BESIDE = 0.25  # also fit lines this far outside the requested band, relative to its ends
+_COMMON = 0.5  # least common fraction of the bands of several responses
+_FURTHER = 1.3  # fit lines up to this factor above the requested band, or the excited frequency
+_SAME_POINT = 0.1  # largest relative difference of responses of one point
 _MIN_WIDTH = 1.0  # least width of a resonance, in line spacings: narrower may be leakage
+_HUM = 0.1  # a mode at a mains harmonic may be hum if it has not decayed to this ratio when the record ends
+_MAINS_HZ, _HARMONICS, _HUM_WIDTH = (50.0, 60.0), 20, 1.5  # distance to a harmonic, in lines
+_MAINS_WIDTH_HZ = 2.0
+_VERY_CLEAR = 6.0  # added evidence needed by a mode unless it has both a peak of its own and a stable pole
 _LOCAL, _LOCAL_WIDTHS = 30.0, 2.0  # % residual; range in half-power widths
+_ACCEPTED_PERCENT = 50.0  # largest accepted half interval of the damping ratio
 _MAX_MODES = 40  # default largest number of modes of a structure
 _BEYOND = "beyond the requested number of modes: its peak is lower"
+_DIFFERENT = 0.5  # residual ratio of one impact after the model of all: another point, axis or sign
 POOR = 0.3  # largest residual ratio in the band of a usable model
 
 
@@ -132,7 +141,7 @@ def _chosen(
         used = [within(each, (1.0 - _BESIDE) * band_hz[0], (1.0 + _BESIDE) * band_hz[1]) for each in used]
     first_hz, last_hz = np.array([each.frequency_hz[[0, -1]] for each in used]).T
     common, whole = last_hz.min() - first_hz.max(), last_hz.max() - first_hz.min()
-    if common < 0.5 * whole:
+    if common < _COMMON * whole:
         raise RecordError(
             f"{used[0].source} and {len(used) - 1} more share {max(common, 0.0):.4g} Hz of {whole:.4g} Hz: "
             "identify responses of different bands separately"
@@ -141,7 +150,7 @@ def _chosen(
     if len(used) < 2 or not all(np.array_equal(each.frequency_hz, used[0].frequency_hz) for each in used[1:]):
         return used, False
     mean = np.mean([each.response for each in used], axis=0)
-    most = 0.1 * float(np.linalg.norm(mean))
+    most = _SAME_POINT * float(np.linalg.norm(mean))
     return used, all(float(np.linalg.norm(each.response - mean)) < most for each in used)
 
 
@@ -174,7 +183,7 @@ def _of_hits(ready: Prepared, responses: Sequence[FloatArray], sought: Sought) -
     low_hz, high_hz = MIN_CYCLES / duration, excited
     if sought.band_hz is not None:
         low_hz, high_hz = max(low_hz, sought.band_hz[0]), sought.band_hz[1]
-    highest = min(1.3 * high_hz, 0.49 / period)  # fitted beyond the band, as modes above it matter
+    highest = min(_FURTHER * high_hz, 0.49 / period)
     hits = hits_of(ready.usable, responses, low_hz / (1.0 + _BESIDE), highest, sought.exponential_window_s)
     force = np.sqrt(np.sum(np.abs(hits.force) ** 2, axis=0))
     low, high = (2.0 * np.pi * each for each in (low_hz, min(1.1 * high_hz, 0.49 / period)))
@@ -208,7 +217,7 @@ def find_hit_modes(ready: Prepared, sought: Sought) -> tuple[FrfModes, list[Floa
         samples[start : start + len(course)] = course
     shares = np.linalg.norm(rest, axis=1) / np.linalg.norm(np.where(inside, hits.response, 0.0), axis=1)
     worst = int(np.argmax(shares))
-    if len(shares) > 1 and shares[worst] > 0.5:  # another point, axis or sign
+    if len(shares) > 1 and shares[worst] > _DIFFERENT:
         found = replace(found, different=ready.records[worst].source)
     return found, fitted
 
@@ -321,7 +330,7 @@ def _missing_peak(measured: _Measured, modes: Sequence[IdentifiedMode]) -> float
     if np.count_nonzero(inside) < 3:
         return None
     level = np.log(np.maximum(height[inside], 1e-300))
-    tops, _ = find_peaks(level, prominence=np.log(2.0))
+    tops, _ = find_peaks(level, prominence=np.log(2.0))  # twice their surroundings
     if not len(tops):
         return None
     top = float(lines.omega[inside][tops[int(np.argmax(level[tops]))]]) / (2.0 * np.pi)
@@ -371,6 +380,7 @@ def _other_fits(window: Window) -> list[ModalFit]:
     found = []
     for parts in (narrow, other):
         columns = (2 + 1 + parts[0].complex_modes) * len(starts) + 6
+        # Three independent samples per parameter, or more.
         enough = min(2 * len(lines.s) * lines.independent for lines in parts) > 3.0 * columns
         found += [fit] if enough and (fit := fitted(parts, starts)) is not None else []
     return found
@@ -446,7 +456,7 @@ def _refusal(
         or (_response_refusal(frf_search.residues_of(window.fit)[:, index]) if sought.phase_known else "")
         or _evidence_refusal(window, index, hertz, pool)
         or _local_refusal(window, omega, width)
-        or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent or 50.0)
+        or interval_refusal(replace(mode, stiffness_n_per_m=None), sought.accepted_percent or _ACCEPTED_PERCENT)
     )
 
 
@@ -462,8 +472,8 @@ def _record_refusal(hertz: float, zeta: float, measured: _Measured) -> str:
     refusal, lasting = model_search.lasting_refusal(hertz, zeta, measured.record_s)
     if refusal:
         return refusal
-    mains = min((k * base for base in (50.0, 60.0) for k in range(1, 20)), key=lambda each: abs(each - hertz))
-    if lasting > 0.1 and abs(mains - hertz) < min(1.5 * measured.resolution_hz, 2.0):
+    mains = min((k * base for base in _MAINS_HZ for k in range(1, _HARMONICS)), key=lambda each: abs(each - hertz))
+    if lasting > _HUM and abs(mains - hertz) < min(_HUM_WIDTH * measured.resolution_hz, _MAINS_WIDTH_HZ):
         return f"at {mains:g} Hz, a mains harmonic, and still at {100.0 * lasting:.0f} %: it may be hum"
     return ""
 
@@ -509,10 +519,10 @@ def _evidence_refusal(window: Window, index: int, hertz: float, pool: Sequence[S
     stable = any(abs(each.omega - omega) < max(each.zeta, zeta) * omega for each in known)
     lines, left = window.parts[0], fit.left[0]
     modelled_lines = (lines.response - left / lines.weight) * lines.s ** (1 - lines.power)
-    near = np.flatnonzero(lines.near(omega, zeta * omega, steps=1.0))
+    near = np.flatnonzero(lines.near(omega, zeta * omega, steps=1.0))  # half of its half-power width
     course = np.abs(modelled_lines.real)
     peak = any(0 < i < len(course) - 1 and course[i] >= course[i - 1] and course[i] > course[i + 1] for i in near)
-    needed = 0.0 if peak and stable else 6.0
+    needed = 0.0 if peak and stable else _VERY_CLEAR
     if gain >= needed:
         return ""
     if peak and stable:

@@ -21,6 +21,7 @@ from shapegcode.io.units import FloatArray
 POWERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _LARGEST_STEP = 0.3  # largest change of ln omega and ln zeta in one iteration
 _RANK = 1e-12  # relative tolerance below which columns are dependent
+_MIN_DAMPING, _MAX_DAMPING = 1e-6, 0.99
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +152,9 @@ def _solved(triangle: FloatArray, right: FloatArray) -> FloatArray:
 def fit_modes(
     parts: Sequence[Lines], starts: Sequence[tuple[float, float]], iterations: int, gain_floor: float
 ) -> ModalFit:
-    """Fit modes by Levenberg-Marquardt in ln omega and ln zeta with exact derivatives; all linear is eliminated.
+    """Fit modes to lines: sum over modes of residue s^q / (s² + 2 zeta omega s + omega²), and the background.
+
+    Levenberg-Marquardt in ln omega and ln zeta with exact derivatives; everything linear is eliminated.
 
     Source: D. J. Ewins, Modal Testing, 2nd ed., ch. 4; variable projection: G. Golub and V. Pereyra, 2003.
     """
@@ -161,7 +164,7 @@ def fit_modes(
         raise ArgumentError(f"{samples // 2} lines are too few for {modes} modes")
     low = 0.3 * min(float(lines.omega[0]) for lines in parts)
     high = 3.0 * max(float(lines.omega[-1]) for lines in parts)
-    bounds = np.log([low, high]), np.log([1e-6, 0.99])
+    bounds = np.log([low, high]), np.log([_MIN_DAMPING, _MAX_DAMPING])
     at, damping = _linearised(parts, theta), 1e-3
     for _ in range(iterations):
         gram = at.projected.T @ at.projected

@@ -13,6 +13,7 @@ from shapegcode.io.record import ComplexArray
 from shapegcode.io.units import FloatArray
 
 _BAND = 1.8  # upper end of a band of poles over its lower end
+_STEP = 1.3  # ratio from band to band
 _EDGE = 1.05  # poles this near to the end of a band belong to the next one
 _SAME, _SAME_DAMPING = 0.35, 0.4  # poles count as one: distance in half-power half widths, and in ln zeta
 _CORE = 1.35  # upper end of a window over its lower end
@@ -68,7 +69,7 @@ def candidates_of(parts: Sequence[Lines]) -> tuple[list[StablePole], list[Pole]]
         highest = max((pole.order for pole in poles), default=0)
         orders = {pole.order for pole in poles if pole.order > highest // 3}
         found += _clusters([pole for pole in kept if pole.order in orders], len(orders))
-        begin *= 1.3
+        begin *= _STEP
     candidates: list[StablePole] = []
     for each in sorted(found, key=lambda each: -each.share):
         if each.share >= _SEEN and not any(_same(each, other) for other in candidates):
@@ -280,6 +281,7 @@ class _Selection:
         if fit is None:
             return False
         samples = 2 * sum(map(len, fit.left)) * self.share
+        # Standard errors of the residues, up to a common factor.
         spread = [_inverse(jacobian, 1e-13)[1:] for jacobian in fit.jacobian]
         squares = np.max((np.abs(fit.residues) / [each[: len(fit.omega)] for _, each in spread]) ** 2, axis=0)
         for index in np.argsort(squares)[:_WEAKEST]:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 _LARGEST_MODEL = 99
 _MIN_SAMPLES = 3
+_FIRST_STOPS, _STOP_LEFT = 4, 0.1  # least number of stops fitted first; largest residual energy ratio of a used stop
 
 
 def identify(
@@ -234,11 +235,11 @@ def _modes_of_stops(records: Sequence[Record], files: tuple[str, ...], sought: m
             "required: a run with pauses, such as dwells, or the decay after one stop"
         )
     ready = prepare(stops, band_hz=highest_hz)
-    first = ready.usable[: max(4, len(ready.usable) // 3)]
+    first = ready.usable[: max(_FIRST_STOPS, len(ready.usable) // 3)]
     found = find_modes(replace(ready, usable=first), files, sought)
     if not found.modes:
         return found
-    moving = [use for use in ready.usable if left_by(found.modes, use.record) > 0.1]
+    moving = [use for use in ready.usable if left_by(found.modes, use.record) > _STOP_LEFT]
     if len(moving) == len(ready.usable):
         return found
     why = "the modes of the stillest stops do not explain it: something moved"
@@ -286,6 +287,7 @@ _EXPLAINED, _NOISE_SHARE = 0.003, 1.5  # largest residual of few modes, relative
 _MANY = "many modes, or vibration that is no mode: fitted over frequency, band by band, within the excited band"
 _SPECTRUM = 4096  # points of the force's transform
 _FILTER_ERROR = 3e-4  # largest error of a mass by decimation: the filters attenuate by 80 dB
+_FILTER_MOVES = (1e-6, 1e-4)  # ... of a frequency and of a damping ratio
 _FINER = 16  # steps per sampling period of the check by Wilson's method
 _POSSIBLY = 15.0  # allowed loss of evidence (twice the log odds) of another intersample behaviour of the force
 
@@ -432,7 +434,7 @@ def _result(
         rival=model_search.rival_of(order, models.fits, problem.white_share),
         aliased=_aliased(ready, problem),
         white_share=white_share,
-        least=(0.0, 0.0) if thinned is None else (1e-6, 1e-4),  # errors by decimation
+        least=(0.0, 0.0) if thinned is None else _FILTER_MOVES,
     )
     found = model_search.checked_modes(fit, _alone(problem, fit), others, doubts)
     left = float(np.sqrt(fit.sum_of_squares / squares)) if squares > 0.0 else 1.0

@@ -35,11 +35,15 @@ _COARSE_STEP, _FINE_STEP = 0.001, 5e-4
 _FURTHEST_RATE, _EXACT_RATE = 0.003, 3e-6  # largest change from the rate found below 40 Hz; tolerance
 _LONGEST_WAIT_S, _WAIT_STEP_S = 0.21, 0.015  # largest difference of a part's duration from the simulated one; step
 _WAIT_GRID_S = np.arange(-0.025, 0.025, 2.5e-4)  # around the wait found below 40 Hz
+_REPORTED_WAIT_S, _NEAR_S = 0.005, 0.03
 _CLOCK_KNOWN, _CLOCK_HZ = 3e-4, 150.0  # relative uncertainty of the clock (95 %); highest line used to refine it
 _COARSE_HZ = 40.0  # start and clock are first searched below this frequency
 _AFTER_S, _RINGS_S = 3.0, 2.0  # record used after the last part; record needed after a part, unless the next one begins
 _OVER_HALF = 2.5  # samples per cycle of the highest line
 _LONGEST_LAG_S = 0.02  # largest lag of a part relative to the others
+_IRREGULAR_S = 0.008  # irregularity of the time between a rise and its fall
+_LAST_LAG_S = 0.004  # below half a cycle of the fastest moves
+_UNLIKELY = 0.3  # cost of the longest lag; a perfect correlation gains 1
 _EXPLAINED = 0.5  # least fraction of a part's power explained by the others
 _FEWEST_PARTS = 2
 _LOWEST_HZ, _NARROWEST = 4.0, 8.0  # lowest line; least ratio of the highest line to it
@@ -221,7 +225,7 @@ class _Clock:
                 own = np.maximum(own, _QUIET * float(np.max(own)))
                 share = found / (own * 0.5 * float(np.sum(np.abs(wave) ** 2)))
                 squares[row] = np.roll(share, -round(begin / every))
-            wide = maximum_filter1d(squares, 2 * max(1, round(0.03 / every)) + 1, axis=1, mode="wrap")
+            wide = maximum_filter1d(squares, 2 * max(1, round(_NEAR_S / every)) + 1, axis=1, mode="wrap")
             for wait in waits:
                 total = np.zeros(size, dtype=np.float32)
                 for correlated, part in zip(wide, used, strict=True):
@@ -370,7 +374,7 @@ class _Clock:
             f"the program begins {abs(begins_s):.3f} s {'after' if begins_s >= 0.0 else 'before'} the record does; the "
             f"logger's clock is {-100.0 * self.rate:+.4f} % off the control's"
         ]
-        if abs(waits) > 0.005:
+        if abs(waits) > _REPORTED_WAIT_S:
             notes.append(
                 f"each part of the program with the rest after it takes {1e3 * abs(waits):.0f} ms "
                 f"{'longer' if waits > 0.0 else 'less'} than simulated: the control's ramps or waits are not those of "
@@ -444,9 +448,9 @@ def _lags(spectra: Spectra, rows: npt.NDArray[np.intp]) -> FloatArray:
     # part would not move.
     between = [lags[pair[1]] - lags[pair[0]] for pair in pairs if len(pair) > 1]
     lags = np.asarray((float(np.median(between)) if between else 0.0) * (rows - np.mean(rows)), dtype=np.float64)
-    lags = moved(lags, each, 0.008)  # irregularity of the time between a rise and its fall
+    lags = moved(lags, each, _IRREGULAR_S)
     lags = moved(lags, pairs if len(pairs) > 1 else [], _LONGEST_LAG_S)
-    lags = moved(lags, each, 0.004)  # below half a cycle of the fastest moves
+    lags = moved(lags, each, _LAST_LAG_S)
     return lags - float(np.mean(lags))
 
 
@@ -459,7 +463,7 @@ def _lag(spectra: Spectra, block: npt.NDArray[np.intp], own: npt.NDArray[np.bool
 
     def missed(lag: float) -> float:
         """Cost of a lag; the fastest parts correlate nearly as well one cycle away, so shorter lags are preferred."""
-        unlikely = 0.3 * (lag / _LONGEST_LAG_S) ** 2  # a perfect correlation gains 1
+        unlikely = _UNLIKELY * (lag / _LONGEST_LAG_S) ** 2
         return unlikely - float(np.sum((crossed * np.exp(spectra.turn * lag)).real))
 
     steps = np.arange(-longest_s, longest_s + 1e-9, 5e-4)

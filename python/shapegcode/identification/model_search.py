@@ -14,9 +14,13 @@ from shapegcode.identification.problem import MIN_CYCLES, Fit, FitProblem, Start
 from shapegcode.identification.result import ChartPole, Estimate, IdentifiedMode
 from shapegcode.io.units import FloatArray
 
-_APART = np.pi  # rad: two modes must differ by this phase over the record
 MAX_MODES = 8  # default largest number of modes of a model
 _TWINS = 0.25  # distance of coinciding modes, relative to the half-power half width
+_STABLE_FREQUENCY, _STABLE_DAMPING = 0.01, 0.05  # of a stable pole: largest relative change from one order lower
+_APART = np.pi  # rad: two modes must differ by this phase over the record
+# Chart poles merged to one start: distance in half-power half widths, and in ln of damping.
+_SAME_FREQUENCY, _SAME_DAMPING = 0.2, 0.2
+_MAX_DAMPING = 0.7  # of a pole used as a start
 _PATIENCE = 2  # Consecutive unsupported models that end the search: one alone may have started badly
 
 
@@ -94,8 +98,8 @@ def chart_of(models: Iterable[tuple[int, Starts]]) -> tuple[ChartPole, ...]:
     for order, now in models:
         omega, zeta = before.T
         for w, z in now:
-            near = np.abs(w / omega - 1.0) <= 0.01
-            damped_alike = near & (np.abs(z - zeta) <= 0.05 * zeta)
+            near = np.abs(w / omega - 1.0) <= _STABLE_FREQUENCY
+            damped_alike = near & (np.abs(z - zeta) <= _STABLE_DAMPING * zeta)
             chart.append(ChartPole(order, w / (2.0 * np.pi), z, bool(np.any(near)), bool(np.any(damped_alike))))
         before = np.array(now).reshape(-1, 2)
     return tuple(chart)
@@ -106,9 +110,9 @@ def _pool(problem: FitProblem) -> Starts:
     low, high = problem.band_hz
     kept: Starts = []
     for w, z in reversed([mode for modes in chart_modes(problem) for mode in modes]):
-        inside = z < 0.7 and low <= w / (2.0 * np.pi) <= high
-        near = [y for v, y in kept if abs(w - v) < 0.2 * min(z, y) * w]
-        if inside and not any(abs(np.log(z / y)) < 0.2 for y in near):
+        inside = z < _MAX_DAMPING and low <= w / (2.0 * np.pi) <= high
+        near = [y for v, y in kept if abs(w - v) < _SAME_FREQUENCY * min(z, y) * w]
+        if inside and not any(abs(np.log(z / y)) < _SAME_DAMPING for y in near):
             kept.append((w, z))
     return kept
 
@@ -157,6 +161,9 @@ def _attempt(problem: FitProblem, starts: Starts, **how: Any) -> Fit | None:
 
 
 ACCEPTED_PERCENT = 5.0  # Widest accepted half interval of damping ratio and stiffness: an error of 10 % is then 4 sigma
+_NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode for a shaper
+_LASTING = 0.8  # Not decayed: still above this ratio at the end (mains hum, a pump, a turning spindle)
+_RIVAL_PROBABILITY = 0.05  # Largest probability that a competing model with one more mode fits as well by chance
 _UNKNOWN = 7.0  # half width of the logarithm of an unknown value: a factor of a thousand
 SCATTER_PROBABILITY = 0.01  # probability that noise alone makes taps differ as much
 TURNED = (
@@ -264,7 +271,7 @@ def rival_of(order: int, fits: Sequence[Fit], white_share: float) -> Fit | None:
     chosen, larger = fits[order - 1 : order + 1]
     better = chosen.sum_of_squares / max(larger.sum_of_squares, np.finfo(float).tiny)
     gain = white_share * chosen.samples * np.log(better)
-    by_chance = stats.chi2.ppf(0.95, larger.parameters - chosen.parameters)
+    by_chance = stats.chi2.ppf(1.0 - _RIVAL_PROBABILITY, larger.parameters - chosen.parameters)
     return larger if gain > by_chance else None
 
 
@@ -274,7 +281,7 @@ def checked_modes(fit: Fit, alone: Sequence[Fit], others: Sequence[Fit], doubts:
     found = [
         replace(mode, refusal=_refusal_of(mode, doubts))
         for mode in _estimates(fit, alone, others, doubts)
-        if mode.damping_ratio.value <= 0.5 and low <= mode.frequency_hz.value <= high
+        if mode.damping_ratio.value <= _NO_VIBRATION and low <= mode.frequency_hz.value <= high
     ]
     return sorted(found, key=lambda mode: mode.frequency_hz.value)
 
@@ -315,7 +322,7 @@ def lasting_refusal(frequency_hz: float, damping_ratio: float, record_s: float) 
         f"still at {100.0 * lasting:.0f} % after {record_s:.3g} s: a steady disturbance (mains, pump, "
         "spindle), or a record too short for a mode of so little damping"
     )
-    return said if lasting > 0.8 else "", lasting
+    return said if lasting > _LASTING else "", lasting
 
 
 def interval_refusal(mode: IdentifiedMode, limit_percent: float, folded_percent: float = 0.0) -> str:

@@ -111,7 +111,7 @@ def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisReco
     rate = _round_up(_PULSE_SAMPLES / shortest)
     fallen = max(math.log(1.0 / _FALLEN_TO) / (2.0 * math.pi * f * (z or _USUAL_DAMPING)) for f, z in known)
     duration = _round_up(max(fallen, _PERIODS / min(f for f, _ in known)))
-    lead = max(0.1 * duration, 100 / rate)
+    lead = max(0.1 * duration, 100 / rate)  # pre-trigger
     known_hz = tuple(sorted({frequency for frequency, _ in modes}))
     return AxisRecording(axis, known_hz, highest, rate, duration, lead, pulse, tip)
 

@@ -235,6 +235,6 @@ def _filters(factor: int) -> tuple[FloatArray, FloatArray]:
     count, beta = kaiserord(_STOP_DB, (0.5 - FLAT) * 2.0 / factor)
     count |= 1
     plain = firwin(count, (0.5 + FLAT) / factor, window=("kaiser", beta))
-    size = 8 * count
+    size = 8 * count  # of the transform: eight points per coefficient
     spectrum = np.fft.rfft(plain, size) * np.sinc(np.fft.rfftfreq(size)) ** 2
     return np.asarray(plain, dtype=np.float64), np.asarray(np.fft.irfft(spectrum, size)[:count], dtype=np.float64)

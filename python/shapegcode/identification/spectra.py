@@ -74,7 +74,7 @@ def decay_spectrum(record: Record) -> Spectrum:
     response = record.response - np.mean(record.response)
     samples = len(response)
     window = 0.5 * (1.0 + np.cos(np.pi * np.arange(samples) / samples))
-    count = fft.next_fast_len(4 * samples, real=True)
+    count = fft.next_fast_len(4 * samples, real=True)  # with zero padding
     amplitude = np.abs(fft.rfft(response * window, count)) * 2.0 / float(np.sum(window))
     frequency = np.asarray(fft.rfftfreq(count, record.period_s), dtype=np.float64)
     peaks = _peaks(frequency, amplitude, 1.0 / (samples * record.period_s))
@@ -200,12 +200,17 @@ def moving_parts(x_mm: FloatArray, period_s: float) -> list[tuple[int, int]]:
 _ENVELOPE_PERIODS = 2.0  # RMS window of the envelope: periods of the slowest mode, or a beat of the two closest modes
 _ENVELOPE_SHARE = 0.05  # ... and at least this fraction of the record while the modes are unknown
 _EVENT_RISES, _EVENT_SHARE = 1.3, 0.3  # An event: the envelope rises by this factor, to this fraction of its maximum
+_TAIL = 0.3  # The tail of a decay, without command, begins after this fraction of it
+_MIN_TAIL = 16  # Least samples of a tail to find a frequency
 _MODE_SHARE = 0.2  # Modes are peaks above this fraction of the tail's largest; slower motion is of the axis
 # A window of one period with this fraction of the largest RMS begins at most half a period early, so the decay
 # has begun this fraction of a period later.
 _ONSET = 0.7
 _SLOWER = 0.8  # Vibration below this fraction of the slowest mode's frequency is motion of the axis
 _MOTION_SHARE = 0.4  # The axis moves if the mean over the slowest mode's period exceeds this fraction of the amplitude
+_FEWEST_PERIODS = 3.0  # of the strongest frequency in the record
+_STOP_PERIODS, _STOP_FALLS = 3.0, 0.3  # periods of the lowest frequency after a stop; ratio to which the envelope falls
+_LOWEST_HZ = 10.0  # lowest mode in an ordinary run; slower is motion
 
 
 def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
@@ -213,7 +218,7 @@ def _fast_frequency_hz(response: FloatArray, period_s: float) -> float:
     jerk = np.diff(response)
     count = 4 * len(jerk)
     spectrum = np.abs(np.fft.rfft(jerk - np.mean(jerk), count))
-    spectrum[:12] = 0.0  # fewer than three periods in the record
+    spectrum[: int(np.ceil(_FEWEST_PERIODS * 4))] = 0.0
     # Divide by the differences' gain above the lowest quarter of the band, where it would favour noise.
     frequency = np.arange(len(spectrum)) / (count * period_s)
     weight = np.maximum(np.sin(np.pi * frequency * period_s), np.sin(np.pi / 8))
@@ -276,8 +281,8 @@ class _Scales:
 def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_samples: float) -> _Scales:
     """Find the slowest mode of a decay from its tail (after the command), the strongest from all of it."""
     rate = 1.0 / record.period_s
-    tail = quiet[start + int(0.3 * (end - start)) : end]
-    peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= 16 else ()
+    tail = quiet[start + int(_TAIL * (end - start)) : end]
+    peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= _MIN_TAIL else ()
     modes = sorted(peak.frequency_hz for peak in peaks if peak.amplitude > _MODE_SHARE * peaks[0].amplitude)
     if not modes:
         return _Scales(fast_samples, fast_samples, _ENVELOPE_PERIODS * fast_samples)
@@ -328,13 +333,13 @@ def split_stops(records: Iterable[Record], lowest_hz: float | None = None) -> li
 
 def _stops_of(record: Record, lowest_hz: float | None) -> Iterator[tuple[float, Record]]:
     quiet = _without_median(record)
-    period = 1.0 / ((lowest_hz or 10.0) * record.period_s)
+    period = 1.0 / ((lowest_hz or _LOWEST_HZ) * record.period_s)
     envelope = _envelope(quiet, period, _ENVELOPE_PERIODS * period)
     parts = []
     for begin, stop in _until_next(envelope, _events(envelope)):
         rest = _rest_after_motion(quiet, period, float(envelope[begin]), begin, stop)
         whole = max(rest, min(stop, len(envelope) - round(_ENVELOPE_PERIODS * period)) - 1)
-        if stop - rest > 3.0 * period and envelope[whole] < 0.3 * envelope[rest]:
+        if stop - rest > _STOP_PERIODS * period and envelope[whole] < _STOP_FALLS * envelope[rest]:
             parts.append((rest, stop))
     slow = _mean_over(_mean_over(quiet, period), period)
 

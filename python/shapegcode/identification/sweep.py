@@ -22,7 +22,10 @@ from shapegcode.io.units import FloatArray
 
 SWEPT_HZ = (10.0, 130.0)  # Klipper's default sweep is 5 to 133 Hz; its ends are not a steady sweep
 _BIN_HZ = 0.5  # averaging width of the spectrum, wider than the ripple from interfering harmonics
+_BIN_NOISE = 0.05  # standard deviation of the logarithm of a bin's power
 _MIN_S = 10.0
+_APART_HZ = 8.0  # least distance of two tried peaks
+_MAX_MODES = 4
 _WIDENED = 2.0  # Factor on intervals for the command's spectrum, friction and backlash, which are not noise
 _NO_VIBRATION = 0.5
 _MIN_SHARE = 0.02  # least motion of a significant mode, relative to that of the axis
@@ -42,7 +45,7 @@ class _Model:
 
     def evidence(self, bins: int) -> float:
         """Bayesian information criterion; a bin's error is 5 % or more, since harmonics of the command interfere."""
-        return float(bins * np.log(self.squares / bins + 0.05**2) + len(self.parameters) * np.log(bins))
+        return float(bins * np.log(self.squares / bins + _BIN_NOISE**2) + len(self.parameters) * np.log(bins))
 
 
 def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> Identification:
@@ -51,7 +54,7 @@ def find_swept_modes(record: Record, files: tuple[str, ...], sought: Sought) -> 
     frequency, power = _spectrum(record, band)
     fits = [_fit(frequency, power, [], free=False)]
     evidence = [fits[0].evidence(len(power))]
-    while len(fits) - 1 < (modes or min(sought.max_modes or 4, 4)):
+    while len(fits) - 1 < (modes or min(sought.max_modes or _MAX_MODES, _MAX_MODES)):
         fits.append(_next(frequency, power, fits[-1]))
         evidence.append(fits[-1].evidence(len(power)))
         if modes is None and len(fits) - 1 - int(np.argmin(evidence)) >= 1:
@@ -143,7 +146,7 @@ def _next(frequency: FloatArray, power: FloatArray, last: _Model) -> _Model:
     left = np.log(power) - _log_power(last.parameters, frequency)
     smooth = np.convolve(left, np.ones(5) / 5.0, "same")
     first = int(np.argmax(smooth))
-    peaks = [first, int(np.argmax(smooth * (np.abs(frequency - frequency[first]) > 8.0)))]
+    peaks = [first, int(np.argmax(smooth * (np.abs(frequency - frequency[first]) > _APART_HZ)))]
     tried = [
         _fit(frequency, power, [*last.starts, (share, 2.0 * np.pi * frequency[peak], zeta)], free=False)
         for peak in peaks
@@ -183,6 +186,7 @@ def _checked_mode(best: _Model, other: _Model, index: int, bins: int) -> Identif
 
 _LOWEST_HZ, _OVER_HALF = 4.0, 2.5  # lowest line; samples per cycle of the highest line
 _WINDOW_S = 8.0  # of a motion without rests
+_AFTER_S = 1.0  # of the decay after each part, at most
 
 
 def is_capture(path: Path) -> bool:
@@ -255,7 +259,7 @@ def _response(
 def _windows(trace: ServoTrace, period_s: float) -> list[tuple[FloatArray, FloatArray]]:
     """Changes of speed, commanded and actual, of each part between rests; long parts are split into tapered windows."""
     found: list[tuple[FloatArray, FloatArray]] = []
-    after, size = round(1.0 / period_s), round(_WINDOW_S / period_s)
+    after, size = round(_AFTER_S / period_s), round(_WINDOW_S / period_s)
     for command, actual in zip(trace.command, trace.actual, strict=True):
         parts = moving_parts(command, period_s)
         followed = [*(first for first, _ in parts[1:]), len(command)][: len(parts)]

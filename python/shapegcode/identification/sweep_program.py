@@ -223,7 +223,7 @@ class _Planner:
                 self._feed = min(self._feed, at_once)
         self.allowed = self.wanted = share * limits.max_acceleration_mm_s2
         self._block_s = max(controller.block_time_s, 2.0 * controller.interpolation_period_s)
-        self._min_mm = 4 * controller.least_increment_mm
+        self._min_mm = 4 * controller.least_increment_mm  # of the shortest move
 
     def plan(self, low: float, high: float) -> tuple[list[_Move], str]:
         """Moves from the lowest frequency to *high*, or as high as can be reached; and a text on what limits them."""
@@ -257,7 +257,7 @@ class _Planner:
         top = min(self._feed, 60.0 * self._travel_mm / (0.5 / hertz))
         tried = [self._tried(hertz, float(feed)) for feed in np.geomspace(top / 100.0, top, 9)]
         largest = max(amplitude for _, amplitude in tried)
-        goal = min(self.wanted, 0.98 * largest)
+        goal = min(self.wanted, 0.98 * largest)  # a higher feed gains nothing more
         place = next(k for k, (_, amplitude) in enumerate(tried) if amplitude >= goal)
         if place and tried[place][1] > goal:
             (below, low), (above, high) = tried[place - 1], tried[place]

@@ -24,9 +24,11 @@ from shapegcode.program import Program, given_program
 from shapegcode.program.compensation import paired_regions
 
 _LONGEST_REST_S = 10.0  # longest observation of a vibration after a stop
+_MIN_REST_S = 0.25
 _MAX_PROFILE_STATIONS = 200_000  # stored per program for pictures
 _MAX_TOOL_MM, _MIN_SPACING_MM, _SHORT_MM = 1000.0, 1e-3, 0.5
 _MAX_SECTIONS = 20_000  # largest number of sections of a program
+_LAST_LINE = 2**32 - 1
 _BLOCKS_PER_CURVE = 2.5  # blocks of a shaped program are shorter than this many block periods at its feed
 
 
@@ -238,7 +240,7 @@ def _measured(
 def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Yield command and response of a region, including the decay of vibration and servo lag after the stop."""
     model = MachineModel(machine)
-    memory_s = max(model.vibration_memory_s, 0.25)
+    memory_s = max(model.vibration_memory_s, _MIN_REST_S)
     if plant != "modal":
         # The lag decays as exp(-gain t): wait until a millionth remains, as for vibration.
         memory_s = max(memory_s, math.log(1e6) / min(machine.controller.position_gain_per_s.as_tuple()))
@@ -267,7 +269,7 @@ def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequenc
         if lines is None:
             sections = _core.path_sections(path, joined * short_mm)
         else:
-            sections = _core.line_sections(path, [(min(a, 2**32 - 1), min(b, 2**32 - 1)) for a, b in lines])
+            sections = _core.line_sections(path, [(min(a, _LAST_LINE), min(b, _LAST_LINE)) for a, b in lines])
         if sections:
             jobs.append(Job(simulated, region, sections, joined * short_mm if joined > 1.0 else 0.0))
     if lines is not None and not jobs:

@@ -71,6 +71,7 @@ def fit_test_cut(
     return _fit_corner(known, measured) if known.kind == "corner" else _fit_interval(known, measured)
 
 
+_BINS_PER_PASS = 60
 _ONE_FILE = np.zeros(0, dtype=np.intp)  # placeholder: groups are numbered when files are joined
 _PLACE = 0.25  # standard error of the tool's position found from entry and exit, in feeds per revolution
 
@@ -180,7 +181,7 @@ def _of_revolutions(cut: TestCut, measuring: MeasuringPass, found: Revolutions) 
     kept = np.flatnonzero(fully_engaged(cut, measuring, found.x_mm, margin) & ~found.chatter)
     if kept.size < 4:
         raise ArgumentError(f"{found.record.file}: {kept.size} revolutions in full engagement: too few")
-    many = max(1, kept.size // 60)
+    many = max(1, kept.size // _BINS_PER_PASS)
     # A bin contains consecutive revolutions only: none spans an ignored part.
     runs = np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1)
     bins = np.vstack([run[: len(run) // many * many].reshape(-1, many) for run in runs])
@@ -244,6 +245,7 @@ def _inside(cut: TestCut, number: int, x_mm: FloatArray) -> npt.NDArray[np.bool_
     return fully_engaged(cut, measuring, x_mm, margin)
 
 
+_DEVIATION_LIMIT, _NOISE_SHARE = 0.05, 2.0
 _LAGS_S = np.concatenate([[0.0], np.geomspace(2e-3, 0.5, 49)])
 
 
@@ -297,7 +299,7 @@ def _followed(cut: TestCut, number: int, record: PlacedRecord) -> result.Followe
     off = np.abs(seen - wanted) / wanted
     noise = _noise(record.x_mm[straight], force[straight], 0.5 * interval)
     worst = int(np.argmax(off))
-    ok = bool(off[worst] <= 0.05 + 2.0 * noise)
+    ok = bool(off[worst] <= _DEVIATION_LIMIT + _NOISE_SHARE * noise)
     told = number, interval, float(off[worst]), float(ends[worst]), noise, lag, ok
     return result.FollowedPass(*told, time, size, immediate, course(lag))
 

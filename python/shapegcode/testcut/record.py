@@ -82,7 +82,7 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
     path = Path(path)
     table = TextTable(path)
     columns = _columns(table)
-    numbers = table.numbers([index for index, _ in columns.values()], 4)
+    numbers = table.numbers([index for index, _ in columns.values()], 4)  # four rows or more
     values = {name: numbers[:, k] * factor for k, (name, (_, factor)) in enumerate(columns.items())}
     sign = -1.0 if on == "workpiece" else 1.0
     time = values.get("time")
@@ -181,7 +181,7 @@ def _spindle_speed(force_n: FloatArray, period_s: float, commanded: float, flute
     """Speed by the clearest spectral line of spindle, teeth or harmonics, and True; else the commanded one, False."""
     count = len(force_n)
     turns = count * period_s * commanded / 60.0
-    if turns < 20.0:
+    if turns < 20.0:  # too few for a line
         return commanded, False
     padded = 1 << int(np.ceil(np.log2(4 * count)))
     window = np.hanning(count)[:, None]
@@ -274,6 +274,7 @@ def _positions(
     ends = [_shift(forecast, x, size, side) for side in wanted]
     if not free:
         return np.asarray(x + ends[0])
+    # Both ends: offset and rate.
     share = (x - wanted[0]) / wanted_length
     x = x + ends[0] * (1.0 - share) + ends[1] * share
     rate = float(np.polyfit(time, x, 1)[0]) * 60.0

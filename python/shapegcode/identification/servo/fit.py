@@ -302,7 +302,9 @@ def torque_friction(
     return (range_of_three(name, [value for value, _ in fits], unit),)
 
 
+_LAG_SPREAD = 0.03
 _MAX_SAMPLES = 40_000
+_MIN_SPEED = 0.02  # least speed, relative to the top speed, to find a lag at constant speed
 _KEYS = {"controller.position_gain_per_s": "position gain", "controller.feed_forward_ratio": "feed-forward"}
 
 
@@ -417,10 +419,10 @@ def _two_lags(trace: ServoTrace, speeds: Sequence[FloatArray], top: float) -> st
         for start in range(0, len(lag) - 2 * count, count):
             part = speed[start : start + 2 * count]
             mean = float(np.mean(part))
-            if abs(mean) > 0.02 * top and float(np.ptp(part)) < 1e-3 * abs(mean):
+            if abs(mean) > _MIN_SPEED * top and float(np.ptp(part)) < 1e-3 * abs(mean):
                 late = lag[start + count : start + 2 * count]
                 found.append((float(np.mean(late)) / mean, mean, float(time[start])))
-    if not found or max(found)[0] - min(found)[0] <= 0.03 * abs(max(found)[0]):
+    if not found or max(found)[0] - min(found)[0] <= _LAG_SPREAD * abs(max(found)[0]):
         return ""
     least, most = (
         f"{1e3 * lag:.3f} ms at {speed:.5g} {trace.unit}/s ({time_s:.2f} s)"
