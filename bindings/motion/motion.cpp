@@ -110,7 +110,7 @@ void register_motion(py::module_& module) {
       .def_readwrite("corner_stop_angle_rad", &MotionLimits::corner_stop_angle_rad,
                      "A corner that turns by this angle or more is a stop, rad.")
       .def_readwrite("junction_deviation_mm", &MotionLimits::junction_deviation_mm,
-                     "A corner is passed as an arc that cuts it by this distance, mm.")
+                     "A corner is as fast as an arc that cuts it by this distance, mm.")
       .def_readwrite("block_time_s", &MotionLimits::block_time_s, "Minimum duration of a block, s.")
       .def_readwrite(
           "contour_acceleration_mm_per_s2", &MotionLimits::contour_acceleration_mm_per_s2,

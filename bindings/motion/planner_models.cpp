@@ -30,7 +30,7 @@ void register_planner_models(py::module_& module) {
                      "klipper: max_accel_to_decel is max_accel times (1 - ratio).")
       .def_readwrite("arc_tolerance_mm", &PlannerRules::arc_tolerance_mm, "grbl: chords of an arc lie within it ($12).")
       .def_readwrite("junction_deviation_mm", &PlannerRules::junction_deviation_mm,
-                     "grbl: a corner is passed as an arc that cuts it by this distance ($11).")
+                     "grbl: a corner is as fast as an arc that cuts it by this distance ($11).")
       .def_readwrite("period_s", &PlannerRules::period_s, "linuxcnc: period of the servo thread, which plans, s.")
       .def_readwrite("blend_tolerance_mm", &PlannerRules::blend_tolerance_mm,
                      "linuxcnc: G64 P; 0: only half of a segment limits.")

@@ -831,7 +831,7 @@ class MotionLimits:
     @property
     def junction_deviation_mm(self) -> float:
         """
-        A corner is passed as an arc that cuts it by this distance, mm.
+        A corner is as fast as an arc that cuts it by this distance, mm.
         """
     @junction_deviation_mm.setter
     def junction_deviation_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -1052,7 +1052,7 @@ class PlannerRules:
     @property
     def junction_deviation_mm(self) -> float:
         """
-        grbl: a corner is passed as an arc that cuts it by this distance ($11).
+        grbl: a corner is as fast as an arc that cuts it by this distance ($11).
         """
     @junction_deviation_mm.setter
     def junction_deviation_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:

@@ -8,7 +8,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable
 from importlib import resources
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
 _WRONG = re.compile(r"unexpected keyword argument '(\w+)'$|positional argument")
@@ -53,9 +53,26 @@ def missing_attribute(owner: object, name: str) -> AttributeError:
     return AttributeError(f"{what} has no attribute {name!r}{near}")
 
 
+class HintedClass(type):
+    """Metaclass whose classes answer an attribute that they do not have with a hint."""
+
+    def __getattr__(cls, name: str) -> NoReturn:
+        raise missing_attribute(cls, name)
+
+
+class Hinted(metaclass=HintedClass):
+    """Base of classes that, like their objects, answer an attribute that they do not have with a hint."""
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> NoReturn:
+            raise missing_attribute(self, name)
+
+
 def wrong_argument(called: str, name: str, known: Iterable[str], taken: str) -> TypeError:
     """A TypeError on a keyword that a function or class does not have."""
-    return TypeError(f"{called}() has no argument {name!r}{hint(name, known, called)}; it takes {taken}")
+    near = hint(name, known, called) or guess(_ALL, called)
+    return TypeError(f"{called}() has no argument {name!r}{near}; it takes {taken}")
 
 
 def with_hints(function: F) -> F:
@@ -72,10 +89,10 @@ def with_hints(function: F) -> F:
                 raise
             name = function.__qualname__.removesuffix(".__init__")
             names = [each for each in inspect.signature(function).parameters if each not in ("cls", "self")]
-            taken = ", ".join(names)
+            taken = ", ".join(names) or "none"
             if wrong[1]:
                 raise wrong_argument(name, wrong[1], names, taken) from None
-            raise TypeError(f"{error}; it takes {taken}{guess(_ALL, name)}") from None
+            raise TypeError(f"{error}; it takes {taken}{guess(_ALL, name, function.__name__)}") from None
         with_hints_in(type(value))
         return value
 

@@ -6,6 +6,7 @@ import inspect
 import json
 import pickle
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -158,6 +159,18 @@ def test_a_simple_machine() -> None:
         ("sg.Shaper('ei', 46, 0.02)", "choose_shaper"),
         ("sg.ZVD(46)", "use repeated_zv"),
         ("sg.Program('part.nc')", "use sg.Program.read"),
+        ("sg.Program.load('part.nc')", "use sg.Program.read"),
+        ("sg.Conversion.from_json('part.json')", "use sg.load_result"),
+        ("next(sg.stream(TEXT, 'vx500')).t", "use time_s"),
+        ("sg.convert(TEXT, 'vx500').contour_error_um.max", "use .response"),
+        ("sg.convert(TEXT, 'vx500').plots('out')", "use plot.name., or save_plots"),
+        ("sg.corner_cut('vx500')", "sg.CutConditions.* is needed, not str"),
+        ("sg.FrequencyResponse(TIME_S, TIME_S)", "use sg.FrequencyResponse"),
+        ("sg.FrequencyResponse('x', TIME_S + 1, TIME_S, 'receptance')", "one of acceleration"),
+        ("sg.identify('tap.csv', quantity='displacement')", "quantity is that of arrays"),
+        ("sg.identify(1.0 - TIME_S, TIME_S)", "must ascend; identify.time_s"),
+        ("sg.simulate(TEXT, 'vx500', record_samples=-3)", "record_samples = -3"),
+        ("sg.MotionController().push(x=10)", "push_line"),
         ("sg.Tool(diameter=10)", "Tool: .*; use sg.Tool.load"),
         ("sg.Machine.load('vx500').update", "use sg.update_machine"),
         ("sg.convert(TEXT, 'vx500', only=(10, 20))", "only: pairs of lines"),
@@ -189,9 +202,14 @@ def test_errors_say_what_to_do(guess: str, said: str) -> None:
 def test_what_is_suggested_is_there() -> None:
     """Each table of hints.toml is of something public; none of its names exists, all that is suggested does."""
     tables = tomllib.loads((Path(sg.__file__).parent / "hints.toml").read_text(encoding="utf-8"))
-    modes = {"AxisMode": type(sg.Machine.load("vx500").axes.x.modes[0])}
+    for each in dir(sg):
+        getattr(sg, each)
+    modules = [module for name, module in sys.modules.items() if name.startswith("shapegcode")]
     for owner, table in tables.items():
-        at = sg if owner == "shapegcode" else modes.get(owner) or functools.reduce(getattr, owner.split("."), sg)
+        if [*table] == ["()"]:
+            continue  # of any method of this name
+        homes = (module for module in (sg, *modules) if hasattr(module, owner.partition(".")[0]))
+        at = sg if owner == "shapegcode" else functools.reduce(getattr, owner.split("."), next(homes))
         keywords = [] if owner == "shapegcode" or isinstance(at, type) else list(inspect.signature(at).parameters)
         fields = {field.name for field in dataclasses.fields(at)} if dataclasses.is_dataclass(at) else set()
         for name in " ".join(table).split():
@@ -214,6 +232,9 @@ def test_what_one_function_gives_the_others_take() -> None:
     assert f"{found.frequency_hz:.0f}" == "46" and sg.zv(found) == sg.zv(mode)  # type: ignore[arg-type]
     shaper = sg.choose_shaper([found], families="zv", periods_s=0.001).shaper
     assert shaper.amplitudes == pytest.approx(sg.zv_on_grid(mode, 0.001).amplitudes)
+    vx500 = sg.Machine.load("vx500").axes.x
+    several = (vx500, vx500.modes, [(46.0, 0.02)], (46.0, 0.02))
+    assert len({str(sg.choose_shaper(each, families="zv", periods_s=0.001)) for each in several}) == 1  # type: ignore[arg-type]
     assert sg.Machine.simple({"x": found}).axes.x.modes == sg.Machine.simple({"x": mode}).axes.x.modes  # type: ignore[dict-item]
     assert sg.repeated_zv(46, 2) == sg.repeated_zv(sg.Mode(46), 2)  # type: ignore[arg-type]
     assert sg.shortest_non_negative([46], 0.005) == sg.shortest_non_negative([sg.Mode(46)], 0.005)  # type: ignore[list-item]
@@ -246,6 +267,12 @@ def test_a_result_is_kept_as_json(tmp_path: Path) -> None:
     with pytest.raises(sg.ArgumentError, match=r"use to_json\(\)"):
         sg.load_result(result.to_dict())
     assert pickle.loads(pickle.dumps(sg.cycle_time)) is sg.cycle_time
+
+
+def test_modes_that_no_machine_has_are_questioned() -> None:
+    """Times in ms."""
+    assert not any("below 1 Hz" in each for each in sg.identify(TIME_S, decay(46.0, 0.02)).warnings)
+    assert any("below 1 Hz" in each for each in sg.identify(1e3 * TIME_S, decay(46.0, 0.02)).warnings)
 
 
 def test_names_of_the_version_before_are_read_with_a_warning() -> None:

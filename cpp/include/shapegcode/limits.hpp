@@ -37,7 +37,7 @@ struct MotionLimits {
   double corner_stop_angle_rad = none;  ///< a corner that turns by this angle or more is a stop
   double block_time_s = 0.0;            ///< minimum duration of a block: the control's block processing time
   double junction_deviation_mm =
-      none;  ///< a corner is passed as an arc that cuts it by this distance, at the axes' acceleration
+      none;  ///< a corner is as fast as an arc that cuts it by this distance, at the axes' acceleration
   double centripetal_acceleration_mm_per_s2 = none;                  ///< on arcs (1735)
   double polyline_acceleration_mm_per_s2 = none;                     ///< the same along polylines
   Vector3 contour_acceleration_mm_per_s2 = Vector3::Constant(none);  ///< per axis, of a change of direction (1737)

@@ -27,7 +27,7 @@ struct PlannerRules {
   double square_corner_velocity_mm_per_s = 5.0;  ///< klipper: speed at a corner of 90 degrees
   double minimum_cruise_ratio = 0.5;             ///< klipper: max_accel_to_decel is max_accel times (1 - ratio)
   double arc_tolerance_mm = 0.002;               ///< grbl: chords of an arc lie within it ($12)
-  double junction_deviation_mm = 0.01;  ///< grbl: a corner is passed as an arc that cuts it by this distance ($11)
+  double junction_deviation_mm = 0.01;  ///< grbl: a corner is as fast as an arc that cuts it by this distance ($11)
   double period_s = 0.001;              ///< linuxcnc: of the servo thread, which plans ([EMCMOT] SERVO_PERIOD)
   double blend_tolerance_mm = 0.0;      ///< linuxcnc: G64 P; 0: limited by half of a segment only
   /// linuxcnc: G64 Q, by default that of P: lines of one feed within it are joined, an arc in XY within it becomes two

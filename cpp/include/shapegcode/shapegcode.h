@@ -115,7 +115,7 @@ typedef enum shapegcode_number {
   SHAPEGCODE_JERK_TIME_S = 12,
   SHAPEGCODE_CORNER_STOP_ANGLE_RAD = 13,  ///< a corner that turns by this angle or more is a stop
   SHAPEGCODE_BLOCK_TIME_S = 14,           ///< minimum duration of a segment
-  SHAPEGCODE_JUNCTION_DEVIATION_MM = 15,  ///< a corner is passed as an arc that cuts it by this distance
+  SHAPEGCODE_JUNCTION_DEVIATION_MM = 15,  ///< a corner is as fast as an arc that cuts it by this distance
   SHAPEGCODE_CENTRIPETAL_ACCELERATION = 16,
   SHAPEGCODE_POLYLINE_ACCELERATION = 17,
   SHAPEGCODE_ARC_FEED_RATIO = 18,        ///< feed on arcs relative to the programmed one

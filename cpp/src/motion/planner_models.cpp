@@ -49,7 +49,7 @@ double least_share_limit(const Vector3& direction, const Vector3& limit) noexcep
   return least;
 }
 
-// Speed at which a corner is passed as an arc that cuts it by a deviation: with s = sin(theta/2), theta the inner angle
+// Speed of a corner: that of an arc that cuts it by a deviation: with s = sin(theta/2), theta the inner angle
 // of the corner, the arc has the radius deviation s / (1 - s).
 double corner_radius_mm(double inner_half_sine, double deviation_mm) noexcept {
   return inner_half_sine < 1.0 ? deviation_mm * inner_half_sine / (1.0 - inner_half_sine) : MotionLimits::none;

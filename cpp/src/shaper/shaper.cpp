@@ -97,7 +97,7 @@ Fir to_fir(const Shaper& shaper, double period_s) {
       throw Error(
           ErrorKind::design,
           fmt::format("the shaper's tap at {:.12g} ms is not on the grid of {:.12g} ms: it lies {:.12g} ms from "
-                      "the nearest multiple; design the shaper on this grid",
+                      "the nearest multiple; design the shaper on this grid (zv_on_grid)",
                       time * 1e3, period_s * 1e3, offset * 1e3));
     }
     if (multiple > static_cast<double>(std::numeric_limits<int>::max())) {

@@ -233,7 +233,8 @@ _SCHEMA_ACTION = Interface(
 )
 
 MACHINE = Interface(
-    "",
+    "Writes or explains a machine file, or imports one. Exit code 0: done; 1: nothing read, or values differ; "
+    "2: bad input.",
     actions={
         "init": ("write a commented machine file as a start", _INIT_ACTION),
         "import": ("make a machine file from a control's parameter dump (CNC-PARA.TXT)", _IMPORT_ACTION),

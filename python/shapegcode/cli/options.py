@@ -92,7 +92,8 @@ def cutting(*, required: bool) -> tuple[Row, ...]:
          "has a T number"),
         ("--stock", "S.toml", {"required": required},
          "stock file: shape of the workpiece before the first block (docs/reference/tool_files.md)"),
-        ("--margin", "RATIO", share, "margin of scheduled feeds to the limits of force and torque (default: 1.5%%)"),
+        ("--margin", "RATIO", share,
+         "margin of scheduled feeds to limits of force, deflection, torque and power (default: 1.5%%)"),
         ("--resolution", "LENGTH", micrometres,
          "grid spacing of the simulated material, for example 50um (default: 1 %% of the smallest tool's diameter)"),
     )  # fmt: skip

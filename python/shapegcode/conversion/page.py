@@ -154,8 +154,8 @@ def _cases(conversion: Conversion) -> model.Section:
                "worst figure, % of its limit")  # fmt: skip
     rows = tuple(_case(rank, case, axes, conversion) for rank, case in enumerate(conversion.cases))
     how = (
-        "Each row is an operating condition under which the emitted program was simulated. The colour is the ratio "
-        "to the limit: up to 100 % is within. A condition in brackets does not count in the verdict."
+        "Each row is an operating condition. The colour is the ratio to the limit: up to 100 % is within. One in "
+        "brackets does not count in the verdict; if override or modes differ, shaped cuts only."
     )
     counted = sum(case.counts for case in conversion.cases)
     caption = f"{counted} of {len(rows)} operating conditions count (table [verdict] of the machine file)"

@@ -378,7 +378,7 @@ class _Translator:
         return lines
 
     def _named(self, words: Sequence[tuple[str, str]]) -> dict[str, str]:
-        """For FANUC words of a block, the words of the original, if that was written for the control of the output."""
+        """The original's words for FANUC words of a block, if the original is for the control of the output."""
         held = dict(words)
         found = {}
         if (tool := self._names.get(f"T{held.get('T', '')}")) is not None:

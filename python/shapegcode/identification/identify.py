@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from shapegcode.program import Program
 
 _LARGEST_MODEL = 99
+_STRANGE = "a mode below 1 Hz, or with a mass above 100 t: are times in s, forces in N, and is the quantity right?"
 _MIN_SAMPLES = 3
 _FIRST_STOPS, _STOP_LEFT = 4, 0.1  # least number of stops fitted first; largest residual energy ratio of a used stop
 
@@ -42,7 +43,7 @@ def identify(
     force: ArrayLike | None = None,
     *,
     options: ReadOptions | None = None,
-    quantity: Quantity = "acceleration",
+    quantity: Quantity | None = None,
     max_modes: int | None = None,
     modes: int | None = None,
     band_hz: tuple[float, float] | None = None,
@@ -64,7 +65,7 @@ def identify(
             here is taken as `options`.
         force: of the hammer at these instants in N, shape (n,); None: a free decay.
         options: information missing in the files.
-        quantity: of `response`: "acceleration" in m/s², "velocity" in m/s or "displacement" in m.
+        quantity: of `response`: "acceleration" in m/s² (None), "velocity" in m/s or "displacement" in m.
         max_modes: largest number of modes; None: 40 (frequency fit), 8 (time fit). A sweep without force: 4 at most.
         modes: number of modes; None: by information criterion.
         band_hz: lowest and highest frequency of interest; None: all (a sweep without force: 10 to 130 Hz).
@@ -99,10 +100,12 @@ def identify(
     if isinstance(response, ReadOptions):
         options, response = response, None
     options = options or ReadOptions()
-    if quantity not in (kinds := get_args(Quantity)):
+    if quantity is not None and quantity not in (kinds := get_args(Quantity)):
         raise ArgumentError(f"quantity = {quantity!r}: must be one of {', '.join(kinds)}")
+    if quantity is not None and response is None:
+        raise ArgumentError("quantity is that of arrays: files, records and frequency responses state their own")
     if response is not None:
-        source = [replace(_record_of(source, response, force, quantity), axis=options.axis)]
+        source = [replace(_record_of(source, response, force, quantity or "acceleration"), axis=options.axis)]
     elif force is not None:
         raise ArgumentError("force is given without a response: identify(time_s, response, force)")
     is_one = isinstance(source, str | Path | Record | FrequencyResponse)
@@ -123,6 +126,8 @@ def identify(
     found = _identified(
         sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is not False, strict=strict
     )
+    if any(mode.frequency_hz.value < 1.0 or (mode.mass_kg and mode.mass_kg.value > 1e5) for mode in found.modes):
+        found = replace(found, warnings=(*found.warnings, _STRANGE))
     if across is False or sweep is not None or (not found.modes and found.reason):
         return found
     others: Any = [across] if isinstance(across, str | Path | Record | FrequencyResponse) else across
@@ -261,7 +266,7 @@ def _record_of(time_s: Any, response: ArrayLike, force: ArrayLike | None, quanti
     try:
         period_s, warnings = even_period(times)
     except UnevenTimeError as error:
-        raise RecordError(f"arrays: {error}") from None
+        raise RecordError(f"arrays: {error}; identify(time_s, response, force)") from None
     hammer = None if force is None else np.asarray(force, dtype=np.float64)
     start_s = float(times[0])
     return Record("arrays", period_s, samples, quantity, hammer, start_s=start_s, warnings=tuple(warnings))

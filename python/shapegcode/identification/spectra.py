@@ -293,7 +293,7 @@ def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_sample
 
 
 def _onset(quiet: FloatArray, scales: _Scales, start: int, end: int) -> int:
-    """First sample from which a period of the strongest vibration has half of the full power, plus 0.7 periods."""
+    """0.7 periods after the first sample from which a period of the strongest mode has half of the full power."""
     last = min(end, start + max(2, round(scales.window)))
     one = max(2, round(scales.strongest))
     short = _forward_rms(quiet[start : min(end, last + one)], one)

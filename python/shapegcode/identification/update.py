@@ -16,6 +16,7 @@ from scipy.optimize import linear_sum_assignment
 from tomlkit.items import AoT, Key, SingleKey, Table, Whitespace
 
 from shapegcode.errors import ArgumentError, MachineError
+from shapegcode.hints import Hinted
 from shapegcode.identification.across import MIN_MOVE, significant_motions
 from shapegcode.identification.result import Estimate, Identification, IdentifiedMode, MachineFile
 from shapegcode.machine import Machine, check_axes
@@ -25,7 +26,7 @@ from shapegcode.settings.load import read_text
 
 
 @dataclass(frozen=True)
-class MachineUpdate:
+class MachineUpdate(Hinted):
     """A machine file with identified modes, not yet written.
 
     Attributes:
@@ -39,7 +40,8 @@ class MachineUpdate:
     notes: tuple[str, ...]
 
     def __repr__(self) -> str:
-        return f"<MachineUpdate of {self.machine.name}, not yet written: {'; '.join(self.notes)}>"
+        notes = "; ".join(self.notes)
+        return f"<MachineUpdate of {self.machine.name}, to be written: Path(file).write_text(update.text); {notes}>"
 
     def noted_in(self, found: Identification, path: str | Path) -> Identification:
         """Set `machine_file` in the identification.

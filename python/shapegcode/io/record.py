@@ -14,6 +14,7 @@ import numpy.typing as npt
 from scipy.linalg import solveh_banded
 
 from shapegcode.errors import RecordError
+from shapegcode.hints import Hinted
 from shapegcode.io.units import FloatArray, Measured, Unit, find_unit, units_of, words_of
 
 Quantity = Literal["acceleration", "velocity", "displacement"]
@@ -182,7 +183,7 @@ _NAMES: dict[str, Quantity] = {
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse:
+class FrequencyResponse(Hinted):
     """A measured frequency response: response over force, one value per frequency.
 
     Attributes:
@@ -208,6 +209,9 @@ class FrequencyResponse:
     scaled: bool = True
 
     def __post_init__(self) -> None:
+        if not isinstance(self.source, str) or self.quantity not in get_args(Quantity):
+            kinds = ", ".join(get_args(Quantity))
+            raise RecordError(f"a frequency response: a name first, and a quantity that is one of {kinds}")
         count = len(self.frequency_hz)
         named = {"frequencies": self.frequency_hz, "lines": self.response, "coherence": self.coherence}
         for what, values in named.items():

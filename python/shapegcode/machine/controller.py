@@ -95,7 +95,7 @@ class GrblPlanner(TomlTable):
     """Motion settings of `$$`, and compiled-in settings."""
 
     junction_deviation_mm: Annotated[Positive, Field(ge=1e-6, le=10)] = key(
-        "$11: a corner is passed as an arc with this distance to it, at the acceleration of the axes", assumed=0.01
+        "$11: a corner is as fast as an arc this far from it, at the acceleration of the axes", assumed=0.01
     )
     arc_tolerance_mm: Annotated[Positive, Field(ge=1e-5, le=10)] = key(
         "$12: distance between an arc and the lines that replace it", assumed=0.002
@@ -172,7 +172,7 @@ class Controller(TomlTable):
     )
     corner_rule: Literal["speed_difference", "junction_deviation", "stops"] = key(
         'corner rule of look-ahead. "speed_difference": no axis changes its speed by more than '
-        'corner_speed_difference_mm_per_min (FANUC); "junction_deviation": the corner is passed as an arc '
+        'corner_speed_difference_mm_per_min (FANUC); "junction_deviation": a corner is as fast as an arc '
         'within junction_deviation_mm of it (GRBL and others); "stops": the control stops where the direction turns by '
         "corner_stop_angle_deg or more. It does not change the dialect of emitted programs (emission.dialect)",
         fanuc="1783",

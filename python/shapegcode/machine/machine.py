@@ -76,7 +76,7 @@ class Machine(TomlTable):
     verdict: Verdict = key("operating conditions in which the tolerances must be kept", default={})
 
     def __new__(cls, *args: object, **values: object) -> Machine:
-        """Refuse values: what is read from a file is validated with its lines."""
+        """Refuse arguments: values come from TOML, so that errors name lines."""
         if args or values:
             raise ArgumentError("use Machine.load(name or file), Machine.simple(modes) or Machine.from_toml(text)")
         return super().__new__(cls)
@@ -234,7 +234,7 @@ class Machine(TomlTable):
 
     @property
     def dial_positions(self) -> tuple[float, ...]:
-        """Ratios of override-tolerant blocks: limits of [verdict] (both 100 %: .7 and 1.2), multiples of .1 between."""
+        """Feed overrides to be tolerated: limits of [verdict] (if both are 100 %: .7, 1.2), multiples of .1 between."""
         low, high = self.verdict.override_percent
         if low == high == 100.0:
             low, high = _USUAL_DIAL_PERCENT

@@ -84,7 +84,7 @@ def _sign_classes() -> None:
 
 
 def _with_modes(found: inspect.Signature, args: Any, kwargs: Any) -> inspect.BoundArguments:
-    """The arguments; where modes are expected, numbers are undamped modes in Hz, and identified modes are modes."""
+    """The arguments; where modes are expected, numbers, pairs and identified modes are converted to modes."""
     given = found.bind(*args, **kwargs)
     for name, value in given.arguments.items():
         expected = str(found.parameters[name].annotation)
@@ -96,7 +96,9 @@ def _with_modes(found: inspect.Signature, args: Any, kwargs: Any) -> inspect.Bou
 
 
 def _mode(value: Any) -> Any:
-    return _core.Mode(value, 0.0) if isinstance(value, int | float) else getattr(value, "mode", value)
+    if isinstance(value, int | float | tuple):
+        return _core.Mode(*value) if isinstance(value, tuple) else _core.Mode(value, 0.0)
+    return getattr(value, "mode", value)
 
 
 def _refusal(error: TypeError, name: str, found: inspect.Signature, args: Any, kwargs: Any) -> TypeError:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.hints import Hinted
 from shapegcode.io.units import FloatArray
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, fanuc_model
@@ -27,7 +28,7 @@ _OF_DRIVES = ("motor_mm", "motor_force_n", "friction_force_n")
 
 
 @dataclass(frozen=True, eq=False)
-class Chunk:
+class Chunk(Hinted):
     """A section of a simulated program; one row per interpolation period."""
 
     sample: npt.NDArray[np.int64]  # number of each row since the start of the program, (k,)

@@ -8,11 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.errors import ProgramError, located_error
-from shapegcode.hints import missing_attribute
+from shapegcode.hints import Hinted
 from shapegcode.io.units import MM_PER_INCH
 from shapegcode.machine import Machine
 from shapegcode.program.computer import require_memory_for_lines
@@ -33,7 +32,7 @@ _ARC_OFF_RADIUS = "off its radius"
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class Program(Hinted):
     """A CNC program that has been read.
 
     Attributes:
@@ -53,12 +52,6 @@ class Program:
     folder: Path | None = None
     number: int | str | None = None
     foreign: ForeignProgram | None = None
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> object:
-            """Refuse an attribute that programs do not have, with a hint."""
-            raise missing_attribute(self, name)
 
     def __repr__(self) -> str:
         return f"<Program {self.source}: {len(self.regions)} cuts>"

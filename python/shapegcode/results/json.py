@@ -23,7 +23,7 @@ from typing import Any, Self, cast
 
 import numpy as np
 
-from shapegcode.hints import missing_attribute
+from shapegcode.hints import Hinted, missing_attribute
 from shapegcode.io.data_file import open_file
 
 FORMAT = 1  # format of the JSON of results: increased when older files can no longer be read
@@ -126,7 +126,7 @@ def renamed_of(cls: type) -> Mapping[str, str]:
     return {old: new for base in cls.__mro__ for old, new in RENAMED.get(base.__name__, {}).items()}
 
 
-class OldNames:
+class OldNames(Hinted):
     """Base of classes with renamed fields: the former name gives the value, with a warning."""
 
     if not typing.TYPE_CHECKING:

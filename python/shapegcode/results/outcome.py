@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 import numpy as np
 
 from shapegcode import _core
+from shapegcode.hints import Hinted
 from shapegcode.io.units import FloatArray
 from shapegcode.results.json import OldNames, plain, sparse
 
@@ -132,10 +133,18 @@ class Pair(Generic[T]):
     original: T
     emitted: T
 
+    def __getitem__(self, key: Any) -> Pair[Any]:
+        """The pair of what is inside of both, such as of one axis."""
+        original: Any = self.original
+        emitted: Any = self.emitted
+        return Pair(original[key], emitted[key])
+
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            raise AttributeError(f"a pair of figures has no {name!r}: .original.{name} or .emitted.{name}?")
+            inside = hasattr(self.original, name)
+            near = f".original.{name} or .emitted.{name}?" if inside else "it has .original and .emitted"
+            raise AttributeError(f"a pair of figures has no {name!r}: {near}")
 
 
 @dataclass(frozen=True)
@@ -262,7 +271,7 @@ CONTOURS = {"command": "contour error of the command", "response": "contour erro
 
 
 @dataclass(frozen=True)
-class Tracks(Generic[T]):
+class Tracks(Hinted, Generic[T]):
     """A figure of the command, and the same figure of the machine table."""
 
     command: T  # of the set-points

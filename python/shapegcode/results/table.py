@@ -13,6 +13,8 @@ from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Literal
 
+from shapegcode.hints import Hinted
+
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
     from rich.table import Table as RichTable
@@ -72,7 +74,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class Table(Hinted):
     """A table as data.
 
     Attributes:

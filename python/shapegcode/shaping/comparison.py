@@ -92,6 +92,9 @@ def choose_shaper(
     """
     if isinstance(modes, Machine):
         machine, modes = modes, ()
+    modes = getattr(modes, "modes", modes)  # of an axis or an identification
+    if isinstance(modes, tuple) and len(modes) == 2 and isinstance(modes[1], float) and modes[1] < 1.0:
+        modes = [mode_band(modes, uncertainty)]  # a frequency and a damping ratio
     machine = None if machine is None else Machine.of(machine)
     # Convert arrays to lists of Python numbers.
     several: list[float | str | Mode | ModeBand] = np.atleast_1d(np.asarray(modes, dtype=object)).tolist()

@@ -67,6 +67,8 @@ def simulate(
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
+    if isinstance(record_samples, bool) or record_samples < 0:
+        raise _core.ArgumentError(f"record_samples = {record_samples}: a number of samples, 0 or more")
     machine = Machine.of(machine)
     program = given_program(program, machine)
     model, band_um = MachineModel(machine), machine.tolerance.residual_floor_um

@@ -254,7 +254,7 @@ class Edge:
 def unrolled_edge(
     s_mm: FloatArray, radial_depth_mm: FloatArray, radius_mm: float, stock_mm: float, at_mm: float
 ) -> Edge:
-    """Edge that gives a straight pass, at each distance, another path's radial depth."""
+    """Edge that gives a straight pass the radial depth of another path at each point."""
     depth = radial_depth_mm
     if depth.max() >= radius_mm:
         raise ArgumentError(

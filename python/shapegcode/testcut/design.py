@@ -51,6 +51,12 @@ class CutConditions:
     spindle_rev_per_min: float | None = None
     up: bool = False
 
+    def __post_init__(self) -> None:
+        """A machine may be given by its file or name."""
+        object.__setattr__(self, "machine", Machine.of(self.machine))
+        if not isinstance(self.tool, Tool):
+            raise ArgumentError(f"tool: sg.Tool.load(file) is needed, not {type(self.tool).__name__}")
+
     @property
     def spindle(self) -> float:
         """Spindle speed, rev/min.
@@ -120,6 +126,12 @@ _FEW_UM = 1e-3  # mm
 _SAME_MM = 1e-6
 
 
+def _require_conditions(given: object) -> None:
+    if not isinstance(given, CutConditions):
+        needed = "sg.CutConditions(machine, sg.Tool.load(file), feed_mm_per_min=..., axial_depth_mm=...)"
+        raise ArgumentError(f"{needed} is needed, not {type(given).__name__}")
+
+
 def taper_cut(
     given: CutConditions,
     feeds_mm_per_min: Sequence[float] | None = None,
@@ -141,6 +153,7 @@ def taper_cut(
         ArgumentError: a feed or depth beyond the limits of tool or machine, radial depths that do not increase, or a
             length below five times their difference.
     """
+    _require_conditions(given)
     feeds = feeds_mm_per_min or [given.feed_mm_per_min * share for share in (0.5, 1.0, 2.0)]
     given._check_feeds(feeds)
     low, high = depths_mm or (0.05 * given.diameter_mm, 0.35 * given.diameter_mm)
@@ -170,6 +183,7 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     Raises:
         ArgumentError: the corner cannot be unrolled, or exceeds the limits of tool or machine.
     """
+    _require_conditions(given)
     sizes = (corner or CornerShape())._sizes_mm(given.diameter_mm)
     interval = given.machine.feed_control.interval_mm if interval_mm is None else interval_mm
     constant: _Block = (None, given.feed_mm_per_min)
@@ -221,6 +235,7 @@ def interval_cut(
     Raises:
         ArgumentError: beyond the limits of tool or machine.
     """
+    _require_conditions(given)
     sizes = (corner or CornerShape())._sizes_mm(given.diameter_mm)
     depth, feed = sizes[0], given.feed_mm_per_min
     sequences = [list(feeds_mm_per_min or ())] * len(intervals_mm)

@@ -334,7 +334,7 @@ def _speeds(measuring: MeasuringPass, time_s: FloatArray, lag: float) -> FloatAr
 
 
 def _block_time(travel: float, speed: float, command: float, lag: float) -> float:
-    """Time of a travel at speed v approaching the commanded c: travel = c t + (v - c) lag (1 - exp(-t / lag))."""
+    """Time of a travel from speed v towards the commanded c: travel = c t + (v - c) lag (1 - exp(-t / lag))."""
     if lag <= 0.0:
         return travel / command
     change = (speed - command) / command

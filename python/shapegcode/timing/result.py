@@ -8,6 +8,7 @@ from dataclasses import astuple, dataclass, field, fields, replace
 from operator import attrgetter
 from typing import Any, ClassVar
 
+from shapegcode.hints import Hinted
 from shapegcode.model.programs import SimulatedPrograms
 from shapegcode.results.json import hidden
 from shapegcode.results.outcome import Plot
@@ -60,7 +61,7 @@ class RegionTime:
 
 
 @dataclass(frozen=True)
-class BlockTime:
+class BlockTime(Hinted):
     """One cutting block, rapid, dwell, or block with M codes."""
 
     line: int  # from 1

@@ -185,7 +185,7 @@ class Recognition:
 
 
 def recognize(text: bytes, *, of_fanuc: bool = False) -> tuple[Recognition, ...]:
-    """First sign of each control for which a program may have been written; FANUC's if needed, or with *of_fanuc*."""
+    """First sign of each control a program may be for; FANUC's only beside another's, or with *of_fanuc*."""
     code = re.sub(rb";[^\n]*", b"", COMMENT.sub(b" ", text[:LOOKED_AT_BYTES].upper()))
     ends = [match.end() for match in _PERCENT.finditer(code)] if b"%" in code else []
     code = code[: ends[1]] if len(ends) > 1 else code  # no control reads beyond its second `%` line
