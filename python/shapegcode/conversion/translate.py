@@ -36,6 +36,7 @@ _WORD = re.compile(rf"([A-Z])\s*({_NUMBER})")
 _MOVE = re.compile(r"(N\d+)?(?:G0?([0123]))?((?:[XYZIJKRF]-?(?:\d+\.\d*|\.\d+))+)")
 _RADIUS = re.compile(r"R|(?<![\d.])\.")
 _COMMENT = re.compile(r"\(([^()]*)\)")
+_CENTRE = re.compile(r"\([^()]*\)|[IJK] *-? *[\d.]+", re.IGNORECASE)
 _ACTIVE_COMMENT = re.compile(r"\s*(MSG|DEBUG|PRINT|LOG|PROBE|PY|AXIS)")
 _EMISSION_COMMENT = re.compile(r"(N\d+)?\(EMISSION (PROLOGUE|EPILOGUE|LOCK|UNLOCK)\)")
 _MOTION = ("G00", "G01", "G02", "G03")
@@ -188,6 +189,7 @@ class _Translator:
         others = core.other_moves
         self._dwells = {line: others[index][1] for _, index, line in dwells if others[index][1] > 0.0}
         self._arcs = dict(_arcs(program)) if self._dialect.chord_tolerance_mm else {}
+        self._uneven = dict(_uneven_arcs(program, self._dialect.arc_radius_ratio))
         self._times: dict[int, str] = {}
         self._firsts, self._lasts = set[int](), set[int]()
         foreign = original.foreign
@@ -258,6 +260,8 @@ class _Translator:
         state = self.state
         if number in self._linear:
             return self._linear[number]
+        if number in self._uneven:
+            line = _with_even_radii(line, self._uneven[number], MM_PER_INCH if state.unit == "G20" else 1.0)
         if state.percents > 1 or (state.ended_at and line.lstrip()[:1] not in ("%", "(", "")):
             # Another control might execute this line.
             left_out = f"{self._where(number)}: lines after the end of the program are left out"
@@ -582,14 +586,36 @@ _BEHIND_THE_MOVE = {"M00", "M01", "M02", "M05", "M09", "M30"}
 _CURE = ": delete it in the program, or set a replacement (emission.words)"
 
 
-def _arcs(program: Program) -> Iterator[tuple[int, _core.Segment]]:
+def _arcs(program: Program, *, unshaped: bool = False) -> Iterator[tuple[int, _core.Segment]]:
     for region in program.regions:
+        if unshaped and region.shaped:
+            continue
         for number, line in enumerate(region.path.segment_lines):
             if (segment := region.path[number]).kind == _core.SegmentKind.arc:
                 yield int(line), segment
     for segment, _ in program.core.other_moves:
         if segment.kind == _core.SegmentKind.arc:
             yield segment.line_number, segment
+
+
+def _uneven_arcs(program: Program, ratio: float) -> Iterator[tuple[int, _core.Segment]]:
+    """Arcs with I, J, K that end at another radius, since their words are rounded; those of shaped cuts have R."""
+    if not ratio or program.has_absolute_arc_centres:
+        return
+    for line, arc in _arcs(program, unshaped=True):
+        at_end_mm = float(np.linalg.norm(np.delete(arc.end_mm - arc.centre_mm, arc.normal)))
+        if abs(at_end_mm - arc.radius_mm) > ratio * arc.radius_mm:
+            yield line, arc
+
+
+def _with_even_radii(line: str, arc: _core.Segment, unit_mm: float) -> str:
+    """The block with the centre of its arc moved onto the bisector of its chord, with six decimals."""
+    chord = np.delete(arc.end_mm - arc.start_mm, arc.normal)
+    offset = np.delete(arc.centre_mm - arc.start_mm, arc.normal)
+    offset += (0.5 - offset @ chord / (chord @ chord)) * chord
+    names = "IJK".replace("IJK"[arc.normal], "")
+    words = iter(["".join(f"{name}{value / unit_mm:.6f}" for name, value in zip(names, offset, strict=True))])
+    return _CENTRE.sub(lambda found: found[0] if found[0][0] == "(" else next(words, ""), line)
 
 
 def _block_times(blocks: _core.Path, period_s: float) -> Iterator[tuple[int, str]]:

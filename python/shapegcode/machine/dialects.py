@@ -41,6 +41,7 @@ class Dialect:
     arc_radius: str = "R"  # address of the radius of an arc; empty: arcs are written as chords
     # largest distance of an arc from its chords; 0: arcs stay arcs
     chord_tolerance_mm: float = 0.0
+    arc_radius_ratio: float = 0.0  # largest relative difference of the radii at both ends of an arc; 0: no such limit
     time_feed: bool = False  # F of shaped blocks is their time in seconds, with G93
     one_code: bool = False  # one code per line, and G in every move
     short_codes: bool = False  # codes have no leading zeros
