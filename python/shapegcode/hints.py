@@ -5,9 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 import re
-import tomllib
 from collections.abc import Callable, Iterable
-from importlib import resources
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -23,6 +21,9 @@ def guess(name: str, *owners: str) -> str:
 
 @functools.cache
 def _guesses() -> dict[str, dict[str, str]]:
+    import tomllib
+    from importlib import resources
+
     text = (resources.files("shapegcode") / "hints.toml").read_text(encoding="utf-8")
     tables = tomllib.loads(text).items()
     return {owner: {name: use for names, use in table.items() for name in names.split()} for owner, table in tables}
