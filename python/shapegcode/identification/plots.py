@@ -24,13 +24,15 @@ _BELOW_NOISE = 0.3
 def plots_of(found: Identification) -> dict[str, Plot]:
     """Pictures of an identification, by name."""
     if found.sweep is not None:
-        drawn_by = [plot_sweep]
+        drawn_by = {"identify-sweep": plot_sweep}
     elif found.responses:
-        drawn_by = [plot_response, plot_stabilisation]
+        drawn_by = {"identify-response": plot_response, "identify-stabilisation": plot_stabilisation}
     else:
-        decays = [plot_decay] if found.modes else []
-        drawn_by = [plot_traces, plot_stabilisation, *decays, plot_spectrum if found.decay else plot_response]
-    return {each.__name__.replace("plot_", "identify-"): partial(each, found) for each in drawn_by}
+        drawn_by = {"identify-traces": plot_traces, "identify-stabilisation": plot_stabilisation}
+        if found.modes:
+            drawn_by["identify-decay"] = plot_decay
+        drawn_by |= {"identify-spectrum": plot_spectrum} if found.decay else {"identify-response": plot_response}
+    return {name: partial(draw, found) for name, draw in drawn_by.items()}
 
 
 def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:

@@ -142,7 +142,7 @@ class Pair(Generic[T]):
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            inside = hasattr(self.original, name)
+            inside = hasattr(vars(self).get("original"), name)  # absent while it is copied
             near = f".original.{name} or .emitted.{name}?" if inside else "it has .original and .emitted"
             raise AttributeError(f"a pair of figures has no {name!r}: {near}")
 
