@@ -101,7 +101,11 @@ test-all-core:
 	$(MAKE) sanitize
 	$(MAKE) threads
 
+# Of benchmarks only whether they call what there is: nobody runs all of them.
+BENCHMARK_CHECK := --follow-imports=silent --ignore-missing-imports --no-warn-unused-ignores \
+  $(addprefix --disable-error-code=,arg-type call-overload index misc no-any-return no-untyped-call)
 test-all-python: package dev fetched
+	$(BIN)/mypy $(BENCHMARK_CHECK) tests/benchmarks
 	$(PYTEST) -m slow $(PYTEST_FLAGS)
 
 # LinuxCNC is installed for it, with a user that may run it where this is root, and the component into its modules.
@@ -110,9 +114,6 @@ LINUXCNC_TESTS ?= -m 'not slow'
 test-linuxcnc: package dev
 	$(BIN)/python -m pytest tests/linuxcnc $(LINUXCNC_TESTS)
 
-# Of benchmarks only whether they call what there is: nobody runs all of them.
-BENCHMARK_CHECK := --follow-imports=silent --ignore-missing-imports --no-warn-unused-ignores \
-  $(addprefix --disable-error-code=,arg-type call-overload index misc no-any-return no-untyped-call)
 lint: test-packages dev
 	$(MAKE) $(TOGETHER) lint-package lint-others
 	@echo 'lint: nothing to complain about'
@@ -124,7 +125,6 @@ lint-others: test-packages dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	PYTHONPATH=python $(BIN)/lint-imports --no-logo --no-cache
-	$(BIN)/mypy $(BENCHMARK_CHECK) tests/benchmarks
 	clang-format --dry-run -Werror $(CPP_FILES)
 	$(MAKE) tidy
 

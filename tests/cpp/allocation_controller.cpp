@@ -112,7 +112,7 @@ long live(Control& control) noexcept {
   MotionController& controller = control.controller;
   for (int round = 0; round < 8; ++round) {
     control.push(1000);
-    for (int i = 0; i < 150; ++i, ++steps) {
+    for (int i = 0; i < 100; ++i, ++steps) {
       if (i % 37 == 0) controller.feed_override(0.1 * static_cast<double>(steps % 21));
       if (i % 16 == 0) control.push(4);  // absorbed by the steps that follow, while it moves
       control.step();
