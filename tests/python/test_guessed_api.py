@@ -68,6 +68,8 @@ def test_identify_arrays() -> None:
     assert mode.damping_ratio.value == pytest.approx(0.02, rel=0.02)
     with pytest.raises(sg.RecordError, match=r"\(1000,\) instants and \(5,\) samples"):
         sg.identify(TIME_S, TIME_S[:5])
+    with pytest.raises(sg.RecordError, match=r"identify\(time_s, response, force\)"):
+        sg.identify(TIME_S, decay(46, 0.02), np.random.default_rng(2).standard_normal(1000))
     with pytest.raises(sg.ArgumentError, match="force is given without a response"):
         sg.identify(TIME_S, force=TIME_S)
 
@@ -171,6 +173,9 @@ def test_a_simple_machine() -> None:
         ("sg.identify(1.0 - TIME_S, TIME_S)", "must ascend; identify.time_s"),
         ("sg.simulate(TEXT, 'vx500', record_samples=-3)", "record_samples = -3"),
         ("sg.MotionController().push(x=10)", "push_line"),
+        ("sg.Tool(10)", "only keywords are taken; use sg.Tool.load"),
+        ("sg.survey(TEXT, 'vx500', 10, None)", "sg.Tool.load.file. is needed, not int"),
+        ("sg.study('STUDY.toml')", "sg.load_study"),
         ("sg.Tool(diameter=10)", "Tool: .*; use sg.Tool.load"),
         ("sg.Machine.load('vx500').update", "use sg.update_machine"),
         ("sg.convert(TEXT, 'vx500', only=(10, 20))", "only: pairs of lines"),

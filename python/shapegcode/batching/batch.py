@@ -354,8 +354,9 @@ def batch(
         raise ArgumentError(f"jobs {jobs}, time limit {time_limit_s}, memory limit {memory_limit_bytes}: not below 0")
     begin = time.monotonic()
     programs, machines = ([each] if isinstance(each, str | Path) else each for each in (programs, machines))
-    if any(not isinstance(each, str | Path) for each in (*programs, *machines)):
-        raise ArgumentError("programs, machines: files or built-in names are needed, since each run reads them anew")
+    for what, given in (("programs", programs), ("machines", machines)):
+        if any(not isinstance(each, str | Path) for each in given):
+            raise ArgumentError(f"{what}: files or built-in names are needed, since each run reads them anew")
     folders = [Path(output), *([Path(html)] if html is not None else [])]
     processes = jobs or cores()
     with contextlib.ExitStack() as stack:

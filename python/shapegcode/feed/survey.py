@@ -78,9 +78,11 @@ def survey(
         StockError: the stock does not suit the program.
     """
     machine = Machine.of(machine)
-    tools = [tools] if isinstance(tools, Tool) else list(tools)
+    tools = list(tools) if isinstance(tools, Sequence) else [tools]
     if not tools:
         raise _core.ArgumentError("no tool is given; required: at least one")
+    if wrong := [each for each in tools if not isinstance(each, Tool)]:
+        raise _core.ArgumentError(f"tools: sg.Tool.load(file) is needed, not {type(wrong[0]).__name__}")
     program = program_for_conversion(program, machine)
     walk = Walk(program, tools)
     material = _material(walk, program, machine, tools, stock, resolution_mm)

@@ -123,9 +123,15 @@ def identify(
         raise ArgumentError("across: a sweep needs one record of all axes, whose other channels are used")
     if sweep is not None and (stops or start_s is not None or options.ignore_force):
         raise ArgumentError("a sweep with its program has neither force, start of a decay nor stops: omit them")
-    found = _identified(
-        sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is not False, strict=strict
-    )
+    try:
+        found = _identified(
+            sources, names, options, sought, start_s, sweep, machine, stops=stops, across=across is not False,
+            strict=strict,
+        )  # fmt: skip
+    except RecordError as error:
+        if force is None:
+            raise
+        raise RecordError(f"{error}; the order of arrays is identify(time_s, response, force)") from None
     if any(mode.frequency_hz.value < 1.0 or (mode.mass_kg and mode.mass_kg.value > 1e5) for mode in found.modes):
         found = replace(found, warnings=(*found.warnings, _STRANGE))
     if across is False or sweep is not None or (not found.modes and found.reason):

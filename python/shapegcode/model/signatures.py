@@ -108,14 +108,15 @@ def _refusal(error: TypeError, name: str, found: inspect.Signature, args: Any, k
     signature = str(found).replace("'", "")
     if unknown := [key for key in kwargs if key not in found.parameters]:
         return wrong_argument(name, unknown[0], found.parameters, signature)
-    taken = f"it takes {signature}{guess('()', name)}"
+    taken = f"it takes {signature}"
+    use = guess("()", name)
     try:
         given = found.bind(*args, **kwargs).arguments
     except TypeError as wrong:
-        return TypeError(f"{name}(): {wrong}; {taken}")
+        return TypeError(f"{name}(): {wrong}{use}; {taken}")
     sizes = {key: f"({len(value)})" if isinstance(value, list | tuple) else "" for key, value in given.items()}
     shown = (f"{key}: {type(value).__name__}{getattr(value, 'shape', sizes[key])}" for key, value in given.items())
-    return TypeError(f"{name}() was given {', '.join(shown)}; {taken}")
+    return TypeError(f"{name}() was given {', '.join(shown)}{use}; {taken}")
 
 
 def _signature(doc: str | None) -> inspect.Signature | None:

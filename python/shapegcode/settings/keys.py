@@ -221,6 +221,8 @@ else:
 class _Table(ModelMetaclass):
     def __call__(cls, *args: Any, **values: Any) -> Any:
         """Make a table in Python; wrong values are refused in one line."""
+        if args and "__new__" not in vars(cls):
+            raise ArgumentError(f"{cls.__name__}: only keywords are taken{guess('()', cls.__name__)}")
         try:
             return super().__call__(*args, **values)
         except ValidationError as error:
