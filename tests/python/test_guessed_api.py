@@ -269,6 +269,10 @@ def test_a_result_is_kept_as_json(tmp_path: Path) -> None:
     result = sg.cycle_time(TEXT, "vx500")
     (file := tmp_path / "time.json").write_text(json.dumps(result.to_json()))
     assert str(sg.load_result(file)) == str(sg.load_result(result.to_json())) == str(result)
+    (program := tmp_path / "part.nc").write_text(TEXT)
+    batch = sg.batch(program, "vx500", tmp_path / "out", command="time")
+    (file := tmp_path / "batch.json").write_text("".join(json.JSONEncoder().iterencode(batch.to_json())))
+    assert str(sg.load_result(file)) == str(batch)
     with pytest.raises(sg.ArgumentError, match=r"use to_json\(\)"):
         sg.load_result(result.to_dict())
     assert pickle.loads(pickle.dumps(sg.cycle_time)) is sg.cycle_time

@@ -356,7 +356,7 @@ def batch(
     programs, machines = ([each] if isinstance(each, str | Path) else each for each in (programs, machines))
     for what, given in (("programs", programs), ("machines", machines)):
         if any(not isinstance(each, str | Path) for each in given):
-            raise ArgumentError(f"{what}: files or built-in names are needed, since each run reads them anew")
+            raise ArgumentError(f"{what}: files or built-in names are needed, since each run reads them again")
     folders = [Path(output), *([Path(html)] if html is not None else [])]
     processes = jobs or cores()
     with contextlib.ExitStack() as stack:

@@ -208,7 +208,7 @@ class Batch(Result):
             return "run one of the emitted programs above the workpiece first."
         return f"open {self.summary} in a spreadsheet."
 
-    def to_json(self) -> dict[str, Any]:
+    def _to_write(self) -> dict[str, Any]:
         """Like `to_dict`, with streamed rows."""
         names = [each.name for each in fields(self) if each.name != "rows" and not each.metadata.get("hidden")]
         found: dict[str, Any] = plain({name: getattr(self, name) for name in (*names, *self.json_extra)})

@@ -2,10 +2,11 @@
 
 from functools import partial
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from shapegcode._core import Mode
 from shapegcode.errors import ArgumentError
 from shapegcode.settings.keys import Bool, Float, InlineTable, NonNegative, Positive, Text, TomlTable, key, toml
 
@@ -270,6 +271,11 @@ class Axes(TomlTable):
     def __getitem__(self, axis: str) -> Axis:
         """The axis of a name, x, y or z."""
         return dict(zip("xyz", self.as_tuple(), strict=True))[axis.lower()]
+
+
+def as_mode(given: Any) -> Any:
+    """The mode of a pair (Hz, damping ratio), or of what has one, such as an identified mode; others as they are."""
+    return Mode(*given) if isinstance(given, tuple) else getattr(given, "mode", given)
 
 
 def check_axes(keep: str, rigid: str) -> None:

@@ -17,7 +17,7 @@ from pydantic import Field, PrivateAttr, Strict, model_validator
 
 from shapegcode._core import Mode
 from shapegcode.errors import ArgumentError, MachineError, Problem
-from shapegcode.machine.axes import Axes
+from shapegcode.machine.axes import Axes, as_mode
 from shapegcode.machine.controller import Controller, FeedControl, PowerOn, Times
 from shapegcode.machine.dialects import CODE, code_name, dialect_of, fanuc_meaning
 from shapegcode.machine.programs import Emission, Input, Price, Shaping, Tolerance, Verdict
@@ -497,8 +497,8 @@ def inherited_text(name: str) -> str:
     return with_remarks(text, remark)
 
 
-def _table_of(mode: float | Mode | tuple[float, float]) -> dict[str, float | dict[str, float]]:
-    mode = Mode(*mode) if isinstance(mode, tuple) else getattr(mode, "mode", mode)
+def _table_of(given: float | Mode | tuple[float, float]) -> dict[str, float | dict[str, float]]:
+    mode: float | Mode = as_mode(given)
     if not isinstance(mode, Mode):
         return {"frequency_hz": mode, "damping_ratio": _ASSUMED_DAMPING_RATIO}
     directions = {"excited_by": dict(zip("xyz", mode.excited_by, strict=True))} if any(mode.excited_by) else {}

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from shapegcode import _core
 from shapegcode.hints import guess, missing_attribute, wrong_argument
+from shapegcode.machine.axes import as_mode
 
 T = TypeVar("T")
 
@@ -96,9 +97,7 @@ def _with_modes(found: inspect.Signature, args: Any, kwargs: Any) -> inspect.Bou
 
 
 def _mode(value: Any) -> Any:
-    if isinstance(value, int | float | tuple):
-        return _core.Mode(*value) if isinstance(value, tuple) else _core.Mode(value, 0.0)
-    return getattr(value, "mode", value)
+    return _core.Mode(value, 0.0) if isinstance(value, int | float) else as_mode(value)
 
 
 def _refusal(error: TypeError, name: str, found: inspect.Signature, args: Any, kwargs: Any) -> TypeError:

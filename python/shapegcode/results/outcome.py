@@ -214,6 +214,10 @@ class Outcome(OldNames):
         return found
 
     def to_json(self) -> dict[str, Any]:
+        """The JSON that the command writes, as far as the result knows it."""
+        return self._to_write()
+
+    def _to_write(self) -> dict[str, Any]:
         """`to_dict` for immediate writing: very many rows may be `shapegcode.results.json.Streamed`."""
         return self.to_dict()
 

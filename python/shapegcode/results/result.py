@@ -126,7 +126,7 @@ class Result(Outcome):
     def to_json(self) -> dict[str, Any]:
         """`to_dict` with class and version, so that a file of it is read by `load_result`; `json.dump` can write it."""
         provenance = Provenance(type(self).__name__, this_version(), FORMAT, "", ())
-        return {**super().to_json(), "provenance": plain(provenance)}
+        return {**self._to_write(), "provenance": plain(provenance)}
 
     def report(self, path: str | Path, script: Script = "inline") -> list[str]:
         """Write the page of the result: one HTML file, readable offline.

@@ -16,7 +16,7 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
@@ -25,7 +25,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict, Vali
 from pydantic.fields import FieldInfo
 
 from shapegcode._core import ArgumentError
-from shapegcode.hints import guess, missing_attribute
+from shapegcode.hints import HintedClass, guess, missing_attribute
 
 Origin = Literal["measured", "dump", "inherited", "assumed", "choice", "file", "default"]
 """Origin of a value: measured on this machine; read from the control's dump; inherited from another machine; assumed; a
@@ -218,7 +218,12 @@ else:
     ModelMetaclass = type(BaseModel)
 
 
-class _Table(ModelMetaclass):
+def _own(names: Iterable[str]) -> list[str]:
+    """Names without Pydantic's."""
+    return sorted({*names} - {*type.__dir__(BaseModel)})
+
+
+class _Table(HintedClass, ModelMetaclass):
     def __call__(cls, *args: Any, **values: Any) -> Any:
         """Make a table in Python; wrong values are refused in one line."""
         if args and "__new__" not in vars(cls):
@@ -230,15 +235,7 @@ class _Table(ModelMetaclass):
             raise ArgumentError(f"{cls.__name__}: {'; '.join(wrong)}{guess('()', cls.__name__)}") from None
 
     def __dir__(cls) -> list[str]:
-        """Names of its own, without Pydantic's."""
-        return sorted({*super().__dir__()} - {*type.__dir__(BaseModel)})
-
-    def __getattr__(cls, name: str) -> Any:
-        """Refuse an attribute that the class does not have, with a hint."""
-        try:
-            return super().__getattr__(name)  # type: ignore[misc]
-        except AttributeError:
-            raise missing_attribute(cls, name) from None
+        return _own(super().__dir__())
 
 
 class TomlTable(BaseModel, metaclass=_Table):
@@ -255,8 +252,7 @@ class TomlTable(BaseModel, metaclass=_Table):
                 noted["unit"] = _UNITS[max((end for end in _UNITS if name.endswith(end)), key=len, default="")]
 
     def __dir__(self) -> list[str]:
-        """Names of its own, without Pydantic's."""
-        return sorted({*super().__dir__()} - {*type.__dir__(BaseModel)})
+        return _own(super().__dir__())
 
     def __getattr__(self, name: str) -> Any:
         """Refuse an attribute that the table does not have, with a hint."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, WorstResidual, worst_residual
-from shapegcode.machine.axes import AxisMode
+from shapegcode.machine.axes import AxisMode, as_mode
 from shapegcode.results.json import hidden
 
 if TYPE_CHECKING:
@@ -150,9 +150,8 @@ def mode_band(given: Any, uncertainty: float = 0.0) -> ModeBand:
     """Convert a frequency in Hz, a text for `parse_mode_band`, a pair (Hz, damping ratio) or a mode to a `ModeBand`."""
     if isinstance(given, ModeBand):
         return given
-    if isinstance(given, list | tuple) and len(given) == 2:
-        given = Mode(*given)
-    if isinstance(given := getattr(given, "mode", given), AxisMode):
+    given = as_mode(tuple(given) if isinstance(given, list) else given)
+    if isinstance(given, AxisMode):
         given = Mode(given.frequency_hz, given.damping_ratio)
     if isinstance(given, Mode):
         return ModeBand(given, uncertainty)
